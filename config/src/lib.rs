@@ -1,0 +1,1 @@
+//! Reads, checks and explains the configuration of an installation.

@@ -1,0 +1,3 @@
+//! Draws a robot in Rerun.
+
+fn main() {}

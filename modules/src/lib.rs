@@ -1,0 +1,3 @@
+//! Module template, interfaces, launch and built-in modules.
+
+pub mod types;
