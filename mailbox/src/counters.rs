@@ -1,0 +1,287 @@
+//! Counters of a mailbox, in its segment's first page: anyone may read them, and reading changes nothing.
+//!
+//! A row a class, claimed by the first that needs it; the last row takes all classes for which none is left. Losses are
+//! counted by whoever causes or finds them; a process killed between counting and acting can leave a count one too high,
+//! never too low: no loss is hidden.
+
+use crate::name::{Class, Priority};
+use crate::step::step;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Rows of a mailbox: nine classes and the rest.
+pub(crate) const ROWS: usize = 10;
+/// Buckets of a latency histogram: two to the octave, from 256 ns up to 2^36 ns (69 s).
+pub const LATENCY_BUCKETS: usize = 56;
+const FIRST_OCTAVE: u32 = 8;
+const USED: u32 = 0x100;
+const REST: u32 = 0x200;
+
+/// Why a package was lost.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(usize)]
+pub enum Loss {
+    /// Accepted, then pushed out by a more important one.
+    Displaced,
+    /// Not accepted: the mailbox was full. Its sender was told.
+    Refused,
+    /// Older than the mailbox's `max-age` when its turn came.
+    Stale,
+    /// Its receiver died with it in hand, twice.
+    Poison,
+    /// Accepted, then the mailbox was closed or replaced by one of another shape before it was received.
+    Closed,
+    /// Not accepted: its sender died while it wrote.
+    Unfinished,
+}
+
+impl Loss {
+    /// All causes, in the order of the counters.
+    pub const ALL: [Self; 6] =
+        [Self::Displaced, Self::Refused, Self::Stale, Self::Poison, Self::Closed, Self::Unfinished];
+
+    /// One word for tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Displaced => "displaced",
+            Self::Refused => "refused",
+            Self::Stale => "stale",
+            Self::Poison => "poison",
+            Self::Closed => "closed",
+            Self::Unfinished => "unfinished",
+        }
+    }
+
+    /// Whether the package had been accepted: sent = received + such losses + depth.
+    pub const fn was_accepted(self) -> bool {
+        matches!(self, Self::Displaced | Self::Stale | Self::Poison | Self::Closed)
+    }
+}
+
+#[repr(C, align(64))]
+pub(crate) struct Row {
+    /// 0 unused; 0x100 + class; 0x200 the rest.
+    class: AtomicU32,
+    padding: AtomicU32,
+    received: AtomicU64,
+    losses: [AtomicU64; Loss::ALL.len()],
+    latency_max_ns: AtomicU64,
+    latency: [AtomicU32; LATENCY_BUCKETS],
+}
+const _: () = assert!(size_of::<Row>() == 320);
+
+/// The rows of a mailbox.
+#[repr(C)]
+pub(crate) struct Counters([Row; ROWS]);
+
+impl Counters {
+    /// The row of a class, claimed if it is new. Bounded: one pass over the rows.
+    fn row(&self, class: Class) -> &Row {
+        let mine = USED | u32::from(class.0);
+        for row in &self.0[..ROWS - 1] {
+            match row.class.compare_exchange(0, mine, Ordering::Relaxed, Ordering::Relaxed) {
+                Ok(_) => return row,
+                Err(there) if there == mine => return row,
+                Err(_) => {}
+            }
+        }
+        let rest = &self.0[ROWS - 1];
+        rest.class.store(REST, Ordering::Relaxed);
+        rest
+    }
+
+    pub(crate) fn lost(&self, priority: Priority, cause: Loss, packages: u64) {
+        self.row(Class(priority.0)).losses[cause as usize].fetch_add(packages, Ordering::Relaxed);
+        step!("counters: loss");
+    }
+
+    /// By the receiver alone, which may therefore load and store.
+    pub(crate) fn received(&self, priority: Priority, waited: Duration) {
+        let row = self.row(Class(priority.0));
+        let ns = u64::try_from(waited.as_nanos()).unwrap_or(u64::MAX);
+        let bucket = &row.latency[bucket(ns)];
+        bucket.store(bucket.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
+        if ns > row.latency_max_ns.load(Ordering::Relaxed) {
+            row.latency_max_ns.store(ns, Ordering::Relaxed);
+        }
+        row.received.store(row.received.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+    }
+
+    /// A new segment goes on counting where the one it replaces stopped. The caller owns both.
+    pub(crate) fn carry_over(&self, old: &Self) {
+        for (to, from) in self.0.iter().zip(&old.0) {
+            let copy32 = |to: &AtomicU32, from: &AtomicU32| to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
+            let copy64 = |to: &AtomicU64, from: &AtomicU64| to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
+            copy32(&to.class, &from.class);
+            copy64(&to.received, &from.received);
+            copy64(&to.latency_max_ns, &from.latency_max_ns);
+            to.losses.iter().zip(&from.losses).for_each(|(to, from)| copy64(to, from));
+            to.latency.iter().zip(&from.latency).for_each(|(to, from)| copy32(to, from));
+        }
+    }
+
+    /// The rows in use, by class as it stands in the names of their senders; the rest last.
+    pub(crate) fn read(&self) -> Vec<ClassTraffic> {
+        let mut rows: Vec<ClassTraffic> = self.0.iter().filter_map(Row::read).collect();
+        rows.sort_by_key(|row| std::cmp::Reverse(row.class));
+        rows
+    }
+}
+
+impl Row {
+    fn read(&self) -> Option<ClassTraffic> {
+        let class = match self.class.load(Ordering::Relaxed) {
+            0 => return None,
+            REST => None,
+            class => Some(Class(class as u8)),
+        };
+        Some(ClassTraffic {
+            class,
+            received: self.received.load(Ordering::Relaxed),
+            losses: std::array::from_fn(|i| self.losses[i].load(Ordering::Relaxed)),
+            latency: Latency {
+                max: Duration::from_nanos(self.latency_max_ns.load(Ordering::Relaxed)),
+                buckets: std::array::from_fn(|i| self.latency[i].load(Ordering::Relaxed)),
+            },
+        })
+    }
+}
+
+fn bucket(ns: u64) -> usize {
+    if ns < 1 << FIRST_OCTAVE {
+        return 0;
+    }
+    let octave = ns.ilog2();
+    let half = (ns >> (octave - 1)) & 1;
+    ((octave - FIRST_OCTAVE) as usize * 2 + half as usize).min(LATENCY_BUCKETS - 1)
+}
+
+/// Shortest time that counts in a bucket, nanoseconds.
+fn bucket_start_ns(bucket: usize) -> f64 {
+    let octave = 2f64.powi(FIRST_OCTAVE as i32 + (bucket / 2) as i32);
+    if bucket == 0 { 0.0 } else { octave * (1.0 + 0.5 * (bucket % 2) as f64) }
+}
+
+/// What one class did in a mailbox.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClassTraffic {
+    /// The class, that is, the priority its packages came with; none: all classes for which there was no row left.
+    pub class: Option<Class>,
+    /// Packages received.
+    pub received: u64,
+    /// Packages lost, in the order of [`Loss::ALL`].
+    pub losses: [u64; Loss::ALL.len()],
+    /// Time from publishing to being taken.
+    pub latency: Latency,
+}
+
+impl ClassTraffic {
+    /// Lost for this cause.
+    pub fn lost(&self, cause: Loss) -> u64 {
+        self.losses[cause as usize]
+    }
+
+    /// Lost for any cause.
+    pub fn lost_in_all(&self) -> u64 {
+        self.losses.iter().sum()
+    }
+
+    /// Adds what the same class did in another mailbox.
+    pub fn add(&mut self, other: &Self) {
+        self.received += other.received;
+        self.losses.iter_mut().zip(&other.losses).for_each(|(a, b)| *a += b);
+        self.latency.add(&other.latency);
+    }
+}
+
+/// A histogram of waiting times, two buckets to the octave.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Latency {
+    /// The longest.
+    pub max: Duration,
+    /// Packages by waiting time.
+    pub buckets: [u32; LATENCY_BUCKETS],
+}
+
+impl Latency {
+    /// Adds another histogram.
+    pub fn add(&mut self, other: &Self) {
+        self.max = self.max.max(other.max);
+        self.buckets.iter_mut().zip(&other.buckets).for_each(|(a, b)| *a = a.saturating_add(*b));
+    }
+
+    /// What was counted since `earlier` was read. The longest is not known for a part: it stays the longest of all.
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self { max: self.max, buckets: std::array::from_fn(|i| self.buckets[i].saturating_sub(earlier.buckets[i])) }
+    }
+
+    /// The time that this share of the packages (0..=1) did not exceed, interpolated inside its bucket (so within a
+    /// quarter or so); none when nothing was received.
+    pub fn quantile(&self, share: f64) -> Option<Duration> {
+        let total: u64 = self.buckets.iter().map(|n| u64::from(*n)).sum();
+        let mut before = 0.0;
+        let wanted = share.clamp(0.0, 1.0) * total as f64;
+        for (i, n) in self.buckets.iter().enumerate().filter(|(_, n)| **n > 0) {
+            let here = f64::from(*n);
+            if before + here >= wanted {
+                let (start, end) = (bucket_start_ns(i), bucket_start_ns(i + 1));
+                let ns = start + (end - start) * ((wanted - before) / here);
+                return Some(Duration::from_nanos(ns as u64).min(self.max));
+            }
+            before += here;
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn counters() -> Counters {
+        Counters(std::array::from_fn(|_| Row {
+            class: AtomicU32::new(0),
+            padding: AtomicU32::new(0),
+            received: AtomicU64::new(0),
+            losses: std::array::from_fn(|_| AtomicU64::new(0)),
+            latency_max_ns: AtomicU64::new(0),
+            latency: std::array::from_fn(|_| AtomicU32::new(0)),
+        }))
+    }
+
+    #[test]
+    fn classes_without_a_row_share_the_last() {
+        let counters = counters();
+        for class in 0..=255 {
+            counters.lost(Priority(class), Loss::Refused, 1);
+            counters.received(Priority(class), Duration::from_micros(1));
+        }
+        let rows = counters.read();
+        assert_eq!(rows.len(), ROWS);
+        assert_eq!(rows[0].class, Some(Class(ROWS as u8 - 2)));
+        assert_eq!((rows[0].received, rows[0].lost(Loss::Refused)), (1, 1));
+        let rest = rows.last().unwrap();
+        assert_eq!((rest.class, rest.received), (None, 256 - ROWS as u64 + 1));
+    }
+
+    #[test]
+    fn quantiles_of_nothing_are_nothing_and_of_one_are_it() {
+        let counters = counters();
+        assert!(counters.read().is_empty());
+        counters.received(Priority(9), Duration::from_micros(100));
+        let latency = &counters.read()[0].latency;
+        assert_eq!(latency.max, Duration::from_micros(100));
+        assert_eq!(latency.quantile(1.0), Some(Duration::from_micros(100)));
+        assert_eq!(latency.since(latency).quantile(0.5), None);
+    }
+
+    proptest! {
+        #[test]
+        fn a_time_lies_in_its_bucket(ns in 0u64..1 << 35) {
+            let b = bucket(ns);
+            prop_assert!(bucket_start_ns(b) <= ns as f64);
+            prop_assert!((ns as f64) < bucket_start_ns(b + 1));
+        }
+    }
+}

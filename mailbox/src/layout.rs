@@ -1,0 +1,225 @@
+//! The shape of a mailbox's segment.
+//!
+//! ```text
+//!     0  Identity   what this is: written once, before the segment gets its name; then only read
+//!    64  Owner      who receives: changed on adoption
+//!   128  Hot        ticket, sleeping, retired, ready hints
+//!   320  Counters   ten rows of 320 bytes
+//!  4096  words      one a slot, 64 B apart up to 64 slots, 8 B above
+//!     …  slots      each: published (u64 ns, monotonic), head (16 B), body; a multiple of 64 B
+//! ```
+//!
+//! docs/src/shared-memory.md has the same for other languages.
+
+use crate::counters::{Counters, ROWS};
+use crate::name::Name;
+use crate::package::{BODY_BYTES_MAX, HEAD_BYTES};
+use crate::slots::{Full, Hot, SLOTS_MAX};
+use std::mem::offset_of;
+use std::sync::atomic::{AtomicU32, AtomicU64};
+use std::time::Duration;
+
+/// `rohrpost` in ASCII, little-endian.
+pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"rohrpost");
+/// Raised with every change of a layout in shared memory.
+pub(crate) const VERSION: u32 = 1;
+pub(crate) const PAGE: usize = 4096;
+/// Bytes of a slot before its body: time of publishing and head.
+pub(crate) const SLOT_PREFIX: usize = 8 + HEAD_BYTES;
+/// Up to so many slots each word has a cache line of its own.
+const SPREAD_MAX: usize = 64;
+
+/// What a mailbox is asked to be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Shape {
+    /// Slots, 1..=1024.
+    pub slots: u16,
+    /// Largest body, bytes.
+    pub body_bytes_max: u16,
+    /// What happens when all slots are in use.
+    pub full: Full,
+    /// Packages that waited longer are dropped when their turn comes.
+    pub max_age: Option<Duration>,
+    /// Slots that one participant may hold unpublished at a time.
+    pub claims: u8,
+}
+
+impl Default for Shape {
+    fn default() -> Self {
+        Self { slots: 32, body_bytes_max: 1024, full: Full::Displace, max_age: None, claims: 1 }
+    }
+}
+
+/// Why a [`Shape`] cannot be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum ShapeError {
+    /// No slot, or more than there can be.
+    #[error("{0} slots; a mailbox has 1 to {SLOTS_MAX}")]
+    Slots(u16),
+    /// Larger than a package can be.
+    #[error("bodies of {0} bytes; a package holds at most {BODY_BYTES_MAX}, larger things are streams")]
+    Body(u16),
+    /// Nobody could send.
+    #[error("0 claims a participant; at least 1 is needed to send")]
+    Claims,
+}
+
+impl Shape {
+    pub(crate) fn check(&self) -> Result<(), ShapeError> {
+        if self.slots == 0 || usize::from(self.slots) > SLOTS_MAX {
+            return Err(ShapeError::Slots(self.slots));
+        }
+        if usize::from(self.body_bytes_max) > BODY_BYTES_MAX {
+            return Err(ShapeError::Body(self.body_bytes_max));
+        }
+        if self.claims == 0 {
+            return Err(ShapeError::Claims);
+        }
+        Ok(())
+    }
+
+    /// Bytes of shared memory that such a mailbox takes.
+    pub fn segment_bytes(&self) -> usize {
+        let slots = usize::from(self.slots);
+        (self.slots_offset() + slots * self.slot_bytes()).next_multiple_of(PAGE)
+    }
+
+    /// Words from one slot's word to the next.
+    pub(crate) fn word_stride(&self) -> usize {
+        if usize::from(self.slots) <= SPREAD_MAX { 8 } else { 1 }
+    }
+
+    pub(crate) fn words(&self) -> usize {
+        usize::from(self.slots) * self.word_stride()
+    }
+
+    pub(crate) fn slots_offset(&self) -> usize {
+        PAGE + (self.words() * 8).next_multiple_of(64)
+    }
+
+    pub(crate) fn slot_bytes(&self) -> usize {
+        (SLOT_PREFIX + usize::from(self.body_bytes_max)).next_multiple_of(64)
+    }
+
+    fn full_code(&self) -> u32 {
+        match self.full {
+            Full::Displace => 0,
+            Full::Reject => 1,
+        }
+    }
+}
+
+/// The first line of a segment.
+#[repr(C, align(64))]
+pub(crate) struct Identity {
+    pub(crate) magic: AtomicU64,
+    pub(crate) version: AtomicU32,
+    pub(crate) name: AtomicU32,
+    slots: AtomicU32,
+    body_bytes_max: AtomicU32,
+    full: AtomicU32,
+    claims: AtomicU32,
+    /// 0: none.
+    max_age_ns: AtomicU64,
+}
+
+impl Identity {
+    /// Before the segment has its name, so that nobody else can see it.
+    pub(crate) fn write(&self, name: Name, shape: &Shape) {
+        use std::sync::atomic::Ordering::Relaxed;
+        self.version.store(VERSION, Relaxed);
+        self.name.store(name.raw(), Relaxed);
+        self.slots.store(u32::from(shape.slots), Relaxed);
+        self.body_bytes_max.store(u32::from(shape.body_bytes_max), Relaxed);
+        self.full.store(shape.full_code(), Relaxed);
+        self.claims.store(u32::from(shape.claims), Relaxed);
+        let max_age_ns = shape.max_age.map_or(0, |age| u64::try_from(age.as_nanos()).unwrap_or(u64::MAX).max(1));
+        self.max_age_ns.store(max_age_ns, Relaxed);
+        self.magic.store(MAGIC, std::sync::atomic::Ordering::Release);
+    }
+
+    /// What the segment claims to be; none when that cannot be. Another process wrote it, so everything is checked here,
+    /// once; afterwards only the result is used.
+    pub(crate) fn read(&self) -> Option<(Name, Shape)> {
+        use std::sync::atomic::Ordering::{Acquire, Relaxed};
+        if self.magic.load(Acquire) != MAGIC || self.version.load(Relaxed) != VERSION {
+            return None;
+        }
+        let max_age_ns = self.max_age_ns.load(Relaxed);
+        let shape = Shape {
+            slots: self.slots.load(Relaxed).try_into().ok()?,
+            body_bytes_max: self.body_bytes_max.load(Relaxed).try_into().ok()?,
+            full: match self.full.load(Relaxed) {
+                0 => Full::Displace,
+                1 => Full::Reject,
+                _ => return None,
+            },
+            max_age: (max_age_ns != 0).then(|| Duration::from_nanos(max_age_ns)),
+            claims: self.claims.load(Relaxed).try_into().ok()?,
+        };
+        shape.check().ok()?;
+        Some((Name::from_raw(self.name.load(Relaxed)), shape))
+    }
+}
+
+/// Who receives, and what it has seen.
+#[repr(C, align(64))]
+pub(crate) struct Owner {
+    /// Participant whose bell wakes the receiver.
+    pub(crate) participant: AtomicU32,
+    pub(crate) pid: AtomicU32,
+    /// Times a new owner took over.
+    pub(crate) adoptions: AtomicU32,
+    /// Most packages seen waiting at once.
+    pub(crate) depth_max: AtomicU32,
+}
+
+/// The first page of a segment.
+#[repr(C)]
+pub(crate) struct Page {
+    pub(crate) identity: Identity,
+    pub(crate) owner: Owner,
+    pub(crate) hot: Hot,
+    pub(crate) counters: Counters,
+}
+
+const _: () = {
+    assert!(size_of::<Identity>() == 64 && offset_of!(Identity, max_age_ns) == 32);
+    assert!(size_of::<Owner>() == 64);
+    assert!(size_of::<Hot>() == 192 && offset_of!(Hot, sleeping) == 8 && offset_of!(Hot, ready) == 16);
+    assert!(offset_of!(Page, hot) == 128 && offset_of!(Page, counters) == 320);
+    assert!(size_of::<Counters>() == ROWS * 320 && size_of::<Page>() <= PAGE);
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_the_slots_and_at_most_64_bytes_a_slot_and_a_page() {
+        for slots in [1, 3, 64, 65, 1024] {
+            for body_bytes_max in [0, 40, 1024, 65519] {
+                let shape = Shape { slots, body_bytes_max, ..Shape::default() };
+                let words = shape.slots_offset() - PAGE;
+                assert!(words <= usize::from(slots) * 64);
+                assert!(shape.segment_bytes() >= shape.slots_offset() + usize::from(slots) * shape.slot_bytes());
+                assert_eq!(shape.slot_bytes() % 64, 0);
+            }
+        }
+    }
+
+    #[test]
+    fn shapes_that_cannot_be_say_why() {
+        for (shape, why) in [
+            (Shape { slots: 0, ..Shape::default() }, "0 slots; a mailbox has 1 to 1024"),
+            (Shape { slots: 1025, ..Shape::default() }, "1025 slots; a mailbox has 1 to 1024"),
+            (
+                Shape { body_bytes_max: 65520, ..Shape::default() },
+                "bodies of 65520 bytes; a package holds at most 65519, larger things are streams",
+            ),
+            (Shape { claims: 0, ..Shape::default() }, "0 claims a participant; at least 1 is needed to send"),
+        ] {
+            assert_eq!(shape.check().unwrap_err().to_string(), why);
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Open-file-description locks: they tell which processes live.
+//!
+//! Not POSIX record locks, which vanish when any descriptor of the file closes. Files are opened close-on-exec, so a started
+//! program does not keep them; a forked child without exec does, and then counts as alive. (fcntl(2), F_OFD_SETLK)
+
+use nix::errno::Errno;
+use nix::fcntl::{FcntlArg, fcntl};
+use std::fs::File;
+use std::io;
+
+fn region(kind: i32, byte: u64) -> libc::flock {
+    libc::flock {
+        l_type: kind as libc::c_short,
+        l_whence: libc::SEEK_SET as libc::c_short,
+        l_start: byte as libc::off_t,
+        l_len: 1,
+        l_pid: 0,
+    }
+}
+
+/// Locks one byte for this open file; false when another holds it.
+pub(crate) fn try_lock(file: &File, byte: u64) -> io::Result<bool> {
+    match fcntl(file, FcntlArg::F_OFD_SETLK(&region(libc::F_WRLCK, byte))) {
+        Ok(_) => Ok(true),
+        Err(Errno::EAGAIN | Errno::EACCES) => Ok(false),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Whether another open file holds the byte. `file` itself must hold none: a lock never stands in its own way.
+pub(crate) fn is_locked(file: &File, byte: u64) -> io::Result<bool> {
+    let mut answer = region(libc::F_WRLCK, byte);
+    fcntl(file, FcntlArg::F_OFD_GETLK(&mut answer))?;
+    Ok(i32::from(answer.l_type) != libc::F_UNLCK)
+}
+
+/// Gives one byte back.
+pub(crate) fn unlock(file: &File, byte: u64) -> io::Result<()> {
+    fcntl(file, FcntlArg::F_OFD_SETLK(&region(libc::F_UNLCK, byte)))?;
+    Ok(())
+}

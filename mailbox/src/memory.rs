@@ -1,0 +1,90 @@
+//! Files mapped into memory that other processes map too. The only place that turns addresses into references.
+
+use nix::sys::mman::{MapFlags, ProtFlags, mlock, mmap, munmap};
+use std::fs::File;
+use std::io;
+use std::num::NonZeroUsize;
+use std::ptr::NonNull;
+use std::sync::atomic::{AtomicU32, AtomicU64};
+
+/// Types that may lie in memory which other processes write at any time.
+///
+/// # Safety
+/// Every bit pattern is a valid value, and every field that anyone writes after creation is an atomic.
+pub(crate) unsafe trait Shared {}
+
+// SAFETY: an atomic; all bit patterns are numbers.
+unsafe impl Shared for AtomicU32 {}
+// SAFETY: an atomic; all bit patterns are numbers.
+unsafe impl Shared for AtomicU64 {}
+// SAFETY: made of atomics alone.
+unsafe impl Shared for crate::layout::Page {}
+// SAFETY: made of atomics alone.
+unsafe impl Shared for crate::node::NodePage {}
+// SAFETY: made of atomics alone.
+unsafe impl Shared for crate::system_time::TimePage {}
+
+/// A shared mapping of a file's beginning. Truncating the file afterwards is outside our contract: all processes of a user
+/// trust each other's memory.
+pub(crate) struct Mapping {
+    base: NonNull<u8>,
+    bytes: usize,
+}
+
+// SAFETY: the mapping belongs to no thread; what lies in it is reached as atomics or under the slot protocol.
+unsafe impl Send for Mapping {}
+// SAFETY: as above: shared references give access to atomics only, bodies come as raw pointers.
+unsafe impl Sync for Mapping {}
+
+impl Mapping {
+    /// Maps the first `bytes` of a file that is at least so long, all pages present.
+    pub(crate) fn new(file: &File, bytes: usize, writable: bool) -> io::Result<Self> {
+        let length = NonZeroUsize::new(bytes).ok_or(io::ErrorKind::InvalidInput)?;
+        if file.metadata()?.len() < bytes as u64 {
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, format!("file is shorter than {bytes} bytes")));
+        }
+        let protection = if writable { ProtFlags::PROT_READ | ProtFlags::PROT_WRITE } else { ProtFlags::PROT_READ };
+        let flags = MapFlags::MAP_SHARED | MapFlags::MAP_POPULATE;
+        // SAFETY: a new mapping at an address of the kernel's choice touches nothing that exists.
+        let base = unsafe { mmap(None, length, protection, flags, file, 0) }?;
+        Ok(Self { base: base.cast(), bytes })
+    }
+
+    /// Asks the kernel to keep the pages in memory; false when the memlock limit does not allow it.
+    pub(crate) fn lock_in_memory(&self) -> bool {
+        // SAFETY: the range is our own mapping.
+        unsafe { mlock(self.base.cast(), self.bytes) }.is_ok()
+    }
+
+    /// The value at `offset`.
+    ///
+    /// # Panics
+    /// When it does not lie inside the mapping or is not aligned: offsets come from checked layouts.
+    pub(crate) fn at<T: Shared>(&self, offset: usize) -> &T {
+        &self.slice(offset, 1)[0]
+    }
+
+    /// `count` values from `offset` on. Panics as [`Mapping::at`] does.
+    pub(crate) fn slice<T: Shared>(&self, offset: usize, count: usize) -> &[T] {
+        let first = self.bytes_at(offset, count * size_of::<T>()).cast::<T>();
+        assert!(first.is_aligned());
+        // SAFETY: inside the mapping and aligned (both asserted); any bits are a `T` and others write only atomics of it
+        // (`Shared`); the borrow of `self` keeps the mapping.
+        unsafe { std::slice::from_raw_parts(first.as_ptr(), count) }
+    }
+
+    /// The address of `count` bytes from `offset` on. Panics as [`Mapping::at`] does.
+    pub(crate) fn bytes_at(&self, offset: usize, count: usize) -> NonNull<u8> {
+        assert!(offset.checked_add(count).is_some_and(|end| end <= self.bytes));
+        // SAFETY: stays inside the mapping, as just asserted.
+        unsafe { self.base.add(offset) }
+    }
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        // SAFETY: our own mapping, and every reference into it borrowed `self`.
+        let unmapped = unsafe { munmap(self.base.cast(), self.bytes) };
+        debug_assert!(unmapped.is_ok());
+    }
+}

@@ -1,0 +1,337 @@
+//! A node's directory in shared memory and what all its processes share: the table of participants.
+//!
+//! ```text
+//! /dev/shm/rohrpost-UID/INSTALLATION.NODE/     mode 0700
+//!     node           this page: epochs, participants (their bells, states, process ids)
+//!     time           system time (see `system_time`)
+//!     01c80000.mbx   a mailbox: its name in hexadecimal (see `layout`)
+//! ```
+//!
+//! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the file
+//! `node`: the kernel drops that lock with the process, whatever killed it.
+
+use crate::doorbell;
+use crate::layout::{MAGIC, VERSION};
+use crate::lock;
+use crate::memory::Mapping;
+use crate::name::Name;
+use crate::step::step;
+use crate::word::Claimant;
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Most participants of a node at a time.
+pub const PARTICIPANTS_MAX: usize = 256;
+/// Lock bytes above the participants': whoever launched the node, and whoever changes the registry.
+const LAUNCH_BYTE: u64 = 1 << 20;
+const REGISTRY_BYTE: u64 = LAUNCH_BYTE + 1;
+/// Changing the registry takes microseconds; who holds it longer is stopped.
+const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
+
+/// What a module is doing, as its node's table says.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u32)]
+pub enum ModuleState {
+    /// Not ready for commands yet.
+    Starting = 1,
+    /// Ready, and switched off.
+    Off = 2,
+    /// Working.
+    On = 3,
+    /// It has stopped working and says why in its status.
+    Error = 4,
+    /// About to end.
+    Stopping = 5,
+}
+
+impl ModuleState {
+    /// One word for tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Off => "off",
+            Self::On => "on",
+            Self::Error => "error",
+            Self::Stopping => "stopping",
+        }
+    }
+
+    fn from_code(code: u32) -> Option<Self> {
+        [Self::Starting, Self::Off, Self::On, Self::Error, Self::Stopping].into_iter().find(|s| *s as u32 == code)
+    }
+}
+
+/// One participant's line.
+#[repr(C, align(64))]
+pub(crate) struct Entry {
+    /// Of its present or last user; 0: never used.
+    pub(crate) incarnation: AtomicU32,
+    pub(crate) pid: AtomicU32,
+    /// The futex word it sleeps on.
+    pub(crate) bell: AtomicU32,
+    pub(crate) module: AtomicU32,
+    pub(crate) state: AtomicU32,
+    /// Times that launch has started this module again.
+    pub(crate) restarts: AtomicU32,
+    pub(crate) joined_ns: AtomicU64,
+}
+
+/// The file `node`.
+#[repr(C)]
+pub(crate) struct NodePage {
+    magic: AtomicU64,
+    version: AtomicU32,
+    /// Raised with every new and every gone mailbox.
+    pub(crate) registry_epoch: AtomicU32,
+    /// Raised whenever somebody's death was noticed: receivers then look for what the dead left.
+    pub(crate) deaths: AtomicU32,
+    pub(crate) incarnations: AtomicU32,
+    launch_pid: AtomicU32,
+    padding: [AtomicU32; 9],
+    entries: [Entry; PARTICIPANTS_MAX],
+}
+const _: () = assert!(size_of::<Entry>() == 64 && size_of::<NodePage>() == 64 + PARTICIPANTS_MAX * 64);
+
+/// Why a node's directory could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum NodeError {
+    /// The system said no.
+    #[error("node directory {0}: {1}")]
+    Io(PathBuf, io::Error),
+    /// Somebody else could have put it there.
+    #[error("node directory {0} belongs to user {1}, not to us; remove it, or set ROHRPOST_DIR to another place")]
+    Foreign(PathBuf, u32),
+    /// Another version's layout.
+    #[error(
+        "node directory {0} has layout version {1}, this program version {VERSION}; stop what runs there and remove it"
+    )]
+    Version(PathBuf, u32),
+    /// No such node.
+    #[error("no node at {0}: is it launched?")]
+    Missing(PathBuf),
+    /// Nothing free in the table.
+    #[error("node {0} has {PARTICIPANTS_MAX} participants already; end some, or spread them over nodes")]
+    Crowded(PathBuf),
+    /// Somebody stopped while changing the registry.
+    #[error("node {0}: the registry has been locked for {REGISTRY_PATIENCE:?}; is a process there stopped or traced?")]
+    Busy(PathBuf),
+    /// It runs already.
+    #[error("node {0} is launched already, by process {1}; stop that one first")]
+    Launched(PathBuf, u32),
+}
+
+/// Where the directories of this user's nodes lie: `$ROHRPOST_DIR`, or else below /dev/shm.
+pub fn base_directory() -> PathBuf {
+    match std::env::var_os("ROHRPOST_DIR") {
+        Some(path) => path.into(),
+        None => format!("/dev/shm/rohrpost-{}", nix::unistd::getuid()).into(),
+    }
+}
+
+/// The directory of a node.
+pub fn node_directory(installation: &str, node: &str) -> PathBuf {
+    base_directory().join(format!("{installation}.{node}"))
+}
+
+/// A node's shared memory, opened by this process.
+pub struct Node {
+    path: PathBuf,
+    /// Holds no lock, so that it can ask about all.
+    file: File,
+    mapping: Mapping,
+}
+
+impl Node {
+    /// Opens a node, making its directory with this mode (0o700 unless configured otherwise) if there is none.
+    ///
+    /// # Errors
+    /// When the directory cannot be made or is not ours to trust.
+    pub fn create(path: &Path, mode: u32) -> Result<Arc<Self>, NodeError> {
+        let failed = |error| NodeError::Io(path.into(), error);
+        let made = fs::DirBuilder::new().recursive(true).mode(mode).create(path);
+        made.map_err(failed)?;
+        let metadata = fs::symlink_metadata(path).map_err(failed)?;
+        if metadata.uid() != nix::unistd::getuid().as_raw() {
+            return Err(NodeError::Foreign(path.into(), metadata.uid()));
+        }
+        fs::set_permissions(path, fs::Permissions::from_mode(mode)).map_err(failed)?;
+        Self::open_file(path, true)
+    }
+
+    /// Opens a node that is there.
+    ///
+    /// # Errors
+    /// [`NodeError::Missing`] when nobody has made it.
+    pub fn open(path: &Path) -> Result<Arc<Self>, NodeError> {
+        if !path.join("node").exists() {
+            return Err(NodeError::Missing(path.into()));
+        }
+        Self::open_file(path, false)
+    }
+
+    fn open_file(path: &Path, create: bool) -> Result<Arc<Self>, NodeError> {
+        let failed = |error| NodeError::Io(path.into(), error);
+        let file = open_shared(&path.join("node"), create).map_err(failed)?;
+        let bytes = size_of::<NodePage>();
+        let lock = RegistryLock::take(path)?;
+        if file.metadata().map_err(failed)?.len() < bytes as u64 {
+            allocate(&file, bytes).map_err(failed)?;
+        }
+        let node = Self { path: path.into(), mapping: Mapping::new(&file, bytes, true).map_err(failed)?, file };
+        node.check_in()?;
+        drop(lock);
+        Ok(Arc::new(node))
+    }
+
+    /// Writes or checks the magic number; under the registry's lock.
+    fn check_in(&self) -> Result<(), NodeError> {
+        let page = self.page();
+        if page.magic.load(Ordering::Acquire) != MAGIC {
+            // New, or its maker died on the way. Seconds make a first incarnation that no earlier boot has used.
+            let seconds = crate::clock::realtime_ns() / 1_000_000_000;
+            page.incarnations.store(seconds as u32, Ordering::Relaxed);
+            page.version.store(VERSION, Ordering::Relaxed);
+            step!("node: before magic");
+            page.magic.store(MAGIC, Ordering::Release);
+        }
+        match page.version.load(Ordering::Relaxed) {
+            VERSION => Ok(()),
+            other => Err(NodeError::Version(self.path.clone(), other)),
+        }
+    }
+
+    /// Its directory.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn page(&self) -> &NodePage {
+        self.mapping.at(0)
+    }
+
+    pub(crate) fn entry(&self, index: u16) -> &Entry {
+        &self.page().entries[usize::from(index) % PARTICIPANTS_MAX]
+    }
+
+    /// Whether this use of an entry has ended. An answer of false may be late by moments, never an answer of true.
+    pub(crate) fn is_dead(&self, who: Claimant) -> bool {
+        if usize::from(who.participant) >= PARTICIPANTS_MAX {
+            return true;
+        }
+        let same = || self.entry(who.participant).incarnation.load(Ordering::Acquire) == who.incarnation;
+        // A lock that cannot be asked about counts as held: taking a slot from the living is the worse mistake.
+        !same() || !lock::is_locked(&self.file, u64::from(who.participant)).unwrap_or(true)
+    }
+
+    /// Tells all receivers that somebody died, so that they look for what was left. Sleeping needs no timeout because
+    /// whoever sees a process end (launch, above all) calls this.
+    pub fn announce_death(&self) {
+        self.page().deaths.fetch_add(1, Ordering::AcqRel);
+        self.page().entries.iter().filter(|e| e.pid.load(Ordering::Relaxed) != 0).for_each(|e| doorbell::ring(&e.bell));
+    }
+
+    /// All participants alive.
+    pub fn participants(&self) -> Vec<ParticipantInfo> {
+        let alive = |index: &u16| lock::is_locked(&self.file, u64::from(*index)).unwrap_or(false);
+        (0..PARTICIPANTS_MAX as u16).filter(alive).map(|index| self.entry(index).read()).collect()
+    }
+
+    /// Process id of the launch that runs this node now.
+    pub fn launcher(&self) -> Option<u32> {
+        let held = lock::is_locked(&self.file, LAUNCH_BYTE).unwrap_or(false);
+        held.then(|| self.page().launch_pid.load(Ordering::Acquire))
+    }
+
+    /// Makes this process the node's launch, for as long as the result lives.
+    ///
+    /// # Errors
+    /// [`NodeError::Launched`] names the process that is it already.
+    pub fn launch_lock(self: &Arc<Self>) -> Result<LaunchLock, NodeError> {
+        let failed = |error| NodeError::Io(self.path.clone(), error);
+        let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
+        if !lock::try_lock(&file, LAUNCH_BYTE).map_err(failed)? {
+            return Err(NodeError::Launched(self.path.clone(), self.page().launch_pid.load(Ordering::Acquire)));
+        }
+        self.page().launch_pid.store(std::process::id(), Ordering::Release);
+        Ok(LaunchLock { _file: file })
+    }
+}
+
+/// Held by the launch of a node.
+pub struct LaunchLock {
+    _file: File,
+}
+
+/// One participant, as the table has it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ParticipantInfo {
+    /// The module it is, local id 0; [`Name::NONE`] for one without a name.
+    pub module: Name,
+    /// Its process.
+    pub pid: u32,
+    /// Tells this use of the name from earlier ones.
+    pub incarnation: u32,
+    /// What the module is doing; none for participants that are no modules.
+    pub state: Option<ModuleState>,
+    /// Times that launch has started it again.
+    pub restarts: u32,
+    /// When it joined, on the monotonic clock.
+    pub joined_ns: u64,
+}
+
+impl Entry {
+    fn read(&self) -> ParticipantInfo {
+        ParticipantInfo {
+            module: Name::from_raw(self.module.load(Ordering::Acquire)),
+            pid: self.pid.load(Ordering::Relaxed),
+            incarnation: self.incarnation.load(Ordering::Relaxed),
+            state: ModuleState::from_code(self.state.load(Ordering::Acquire)),
+            restarts: self.restarts.load(Ordering::Relaxed),
+            joined_ns: self.joined_ns.load(Ordering::Relaxed),
+        }
+    }
+}
+
+/// Held while mailboxes are made, adopted, replaced or removed. Dropped by the kernel with its holder.
+pub(crate) struct RegistryLock {
+    file: File,
+}
+
+impl RegistryLock {
+    pub(crate) fn take(path: &Path) -> Result<Self, NodeError> {
+        let failed = |error| NodeError::Io(path.into(), error);
+        let file = open_shared(&path.join("node"), false).map_err(failed)?;
+        let start = Instant::now();
+        while !lock::try_lock(&file, REGISTRY_BYTE).map_err(failed)? {
+            if start.elapsed() > REGISTRY_PATIENCE {
+                return Err(NodeError::Busy(path.into()));
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        Ok(Self { file })
+    }
+}
+
+impl Drop for RegistryLock {
+    fn drop(&mut self) {
+        let _ = lock::unlock(&self.file, REGISTRY_BYTE);
+    }
+}
+
+/// Opens a file of the node's directory, never through a link.
+pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(create).mode(0o600);
+    options.custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW).open(path)
+}
+
+/// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later.
+pub(crate) fn allocate(file: &File, bytes: usize) -> io::Result<()> {
+    let length = libc::off_t::try_from(bytes).map_err(|_| io::ErrorKind::InvalidInput)?;
+    Ok(nix::fcntl::posix_fallocate(file, 0, length)?)
+}

@@ -1,0 +1,105 @@
+//! A participant: one user of mailboxes on a node, mostly a process.
+
+use crate::doorbell;
+use crate::lock;
+use crate::name::Name;
+use crate::node::{Entry, ModuleState, Node, NodeError, PARTICIPANTS_MAX, open_shared};
+use crate::step::step;
+use crate::word::Claimant;
+use std::fs::File;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// This process's place in a node's table. A thread that sleeps on mailboxes of its own joins on its own.
+pub struct Participant {
+    node: Arc<Node>,
+    /// Holds the lock; never inherited by a program that this one starts.
+    file: File,
+    me: Claimant,
+    /// Mailboxes it sends to now, so that nobody holds more claims than the mailbox allows. Not on any hot path.
+    sending: Mutex<Vec<Name>>,
+}
+
+impl Participant {
+    /// Takes a free place in the table, under this module name (local id 0; [`Name::NONE`] for a bystander).
+    ///
+    /// # Errors
+    /// [`NodeError::Crowded`] when there is none.
+    pub fn join(node: &Arc<Node>, module: Name) -> Result<Arc<Self>, NodeError> {
+        let failed = |error| NodeError::Io(node.path().into(), error);
+        let file = open_shared(&node.path().join("node"), false).map_err(failed)?;
+        for participant in 0..PARTICIPANTS_MAX as u16 {
+            if !lock::try_lock(&file, u64::from(participant)).map_err(failed)? {
+                continue;
+            }
+            step!("join: locked");
+            let incarnation = node.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1);
+            let entry = node.entry(participant);
+            entry.state.store(0, Ordering::Relaxed);
+            entry.restarts.store(0, Ordering::Relaxed);
+            entry.joined_ns.store(crate::clock::monotonic_ns(), Ordering::Relaxed);
+            step!("join: before incarnation");
+            entry.incarnation.store(incarnation, Ordering::Release);
+            entry.pid.store(std::process::id(), Ordering::Relaxed);
+            entry.module.store(module.module().raw(), Ordering::Release);
+            step!("join: joined");
+            let me = Claimant { participant, incarnation };
+            return Ok(Arc::new(Self { node: node.clone(), file, me, sending: Default::default() }));
+        }
+        Err(NodeError::Crowded(node.path().into()))
+    }
+
+    /// The node it is on.
+    pub fn node(&self) -> &Arc<Node> {
+        &self.node
+    }
+
+    /// Tells this use of the name from all earlier ones on this node, also after a reboot.
+    pub fn incarnation(&self) -> u32 {
+        self.me.incarnation
+    }
+
+    /// The module it joined as.
+    pub fn module(&self) -> Name {
+        Name::from_raw(self.entry().module.load(Ordering::Relaxed))
+    }
+
+    /// Says what the module is doing, for everyone to read.
+    pub fn set_state(&self, state: ModuleState) {
+        self.entry().state.store(state as u32, Ordering::Release);
+    }
+
+    /// Says how often launch has started this module again.
+    pub fn set_restarts(&self, restarts: u32) {
+        self.entry().restarts.store(restarts, Ordering::Relaxed);
+    }
+
+    /// Ends this participant's sleep, now or when it next wants to: for signal handlers' threads and the like.
+    pub fn ring(&self) {
+        doorbell::ring(&self.entry().bell);
+    }
+
+    pub(crate) fn entry(&self) -> &Entry {
+        self.node.entry(self.me.participant)
+    }
+
+    /// The mailboxes it sends to now.
+    pub(crate) fn sending(&self) -> MutexGuard<'_, Vec<Name>> {
+        self.sending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn claimant(&self) -> Claimant {
+        self.me
+    }
+}
+
+impl Drop for Participant {
+    fn drop(&mut self) {
+        let entry = self.entry();
+        entry.module.store(0, Ordering::Relaxed);
+        entry.state.store(0, Ordering::Relaxed);
+        entry.pid.store(0, Ordering::Release);
+        // Closing the file would unlock it too; doing it by name says when.
+        let _ = lock::unlock(&self.file, u64::from(self.me.participant));
+    }
+}

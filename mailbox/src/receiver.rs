@@ -1,0 +1,211 @@
+//! The receiving side of a mailbox: read a package in place, most important first; sleep when there is none.
+
+use crate::clock::monotonic_ns;
+use crate::counters::Loss;
+use crate::doorbell;
+use crate::name::Name;
+use crate::package::{Head, Options};
+use crate::participant::Participant;
+use crate::queue::Queue;
+use crate::registry;
+use crate::segment::Segment;
+use crate::slots::Taken;
+use crate::step::step;
+use std::fs::File;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The one receiver of a mailbox. Dropped, the mailbox stays, and with it what was accepted: the next owner adopts it. See
+/// [`Receiver::close`] to remove it.
+pub struct Receiver {
+    participant: Arc<Participant>,
+    segment: Segment,
+    queue: Queue,
+    /// The node's count of deaths when the slots were last searched for what the dead left.
+    deaths_seen: u32,
+    /// Holds the owner's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
+    _lock: File,
+}
+
+impl Receiver {
+    pub(crate) fn new(participant: Arc<Participant>, segment: Segment, lock: File) -> Self {
+        let queue = Queue::new(usize::from(segment.shape.slots));
+        let deaths_seen = participant.node().page().deaths.load(Ordering::Acquire);
+        let mut receiver = Self { participant, segment, queue, deaths_seen, _lock: lock };
+        receiver.search();
+        receiver
+    }
+
+    /// The mailbox's name.
+    pub fn name(&self) -> Name {
+        self.segment.name
+    }
+
+    /// Whom its bell wakes.
+    pub fn participant(&self) -> &Arc<Participant> {
+        &self.participant
+    }
+
+    /// The most important package, if there is one.
+    pub fn try_receive(&mut self) -> Option<Package<'_>> {
+        let taken = self.next()?;
+        Some(Package::new(self, taken))
+    }
+
+    /// The most important package; sleeps until there is one.
+    pub fn receive(&mut self) -> Package<'_> {
+        loop {
+            if let Some(taken) = self.next() {
+                return Package::new(self, taken);
+            }
+            wait_any(&mut [self], None, || false);
+        }
+    }
+
+    /// The most important package; sleeps until there is one, at most for `timeout`.
+    pub fn receive_timeout(&mut self, timeout: Duration) -> Option<Package<'_>> {
+        let deadline = Instant::now() + timeout;
+        loop {
+            if let Some(taken) = self.next() {
+                return Some(Package::new(self, taken));
+            }
+            if Instant::now() >= deadline {
+                return None;
+            }
+            wait_any(&mut [self], Some(deadline), || false);
+        }
+    }
+
+    /// Removes the mailbox. What it still holds is lost, and counted in the result.
+    pub fn close(mut self) -> usize {
+        let slots = self.segment.slots();
+        slots.retire();
+        step!("close: retired");
+        let unlinked = registry::remove(self.participant.node(), self.name());
+        debug_assert!(unlinked.is_ok());
+        // After the fence of `retire` a sender either sees it and takes its package back, or its package is seen here.
+        self.queue.rescan(&slots);
+        let mut lost = 0;
+        while let Some(taken) = self.queue.take(&slots) {
+            self.segment.page().counters.lost(taken.word.priority(), Loss::Closed, 1);
+            slots.release(taken);
+            lost += 1;
+        }
+        lost
+    }
+
+    /// Takes the next package that is not too old.
+    fn next(&mut self) -> Option<Taken> {
+        if self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen {
+            self.search();
+        }
+        let slots = self.segment.slots();
+        loop {
+            let taken = self.queue.take(&slots)?;
+            let depth = self.queue.len() as u32 + 1;
+            let depth_max = &self.segment.page().owner.depth_max;
+            if depth > depth_max.load(Ordering::Relaxed) {
+                depth_max.store(depth, Ordering::Relaxed);
+            }
+            // SAFETY: just taken, and freed only below or by its guard.
+            let (published_ns, _, _) = unsafe { self.segment.read(taken.slot) };
+            let waited = Duration::from_nanos(monotonic_ns().saturating_sub(published_ns));
+            if self.segment.shape.max_age.is_none_or(|max| waited <= max) {
+                self.segment.page().counters.received(taken.word.priority(), waited);
+                return Some(taken);
+            }
+            self.segment.page().counters.lost(taken.word.priority(), Loss::Stale, 1);
+            slots.release(taken);
+        }
+    }
+
+    /// Looks through all slots for what the dead left.
+    fn search(&mut self) {
+        let node = self.participant.node().clone();
+        // Read before the search: who dies after it raises the count once more.
+        self.deaths_seen = node.page().deaths.load(Ordering::Acquire);
+        let me = self.participant.claimant();
+        let counters = &self.segment.page().counters;
+        let lost = |priority| counters.lost(priority, Loss::Displaced, 1);
+        let slots = self.segment.slots();
+        let freed = slots.reclaim(|by| by != me && node.is_dead(by), lost);
+        if freed > 0 {
+            // The dead had not said yet how important their packages were.
+            counters.lost(crate::name::Priority(0), Loss::Unfinished, freed as u64);
+        }
+        self.queue.rescan(&slots);
+    }
+
+    fn may_have(&self) -> bool {
+        self.queue.may_have_more(&self.segment.slots())
+            || self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen
+    }
+}
+
+/// Sleeps until one of these mailboxes may have a package, `other` says that there is something else to do, or the deadline
+/// has passed. May return early for no reason. All must be of one participant, whose bell it is that wakes.
+///
+/// Whoever makes `other` true from outside calls [`Participant::ring`] afterwards.
+///
+/// # Panics
+/// When the mailboxes are of different participants: their bells are different words.
+pub fn wait_any(receivers: &mut [&mut Receiver], deadline: Option<Instant>, other: impl Fn() -> bool) {
+    let Some(participant) = receivers.first().map(|receiver| receiver.participant.clone()) else {
+        return;
+    };
+    assert!(receivers.iter().all(|receiver| Arc::ptr_eq(&receiver.participant, &participant)));
+    let bell = &participant.entry().bell;
+    // ORDERING: Acquire, and before `drowsy`: whatever is published after the looks below rings, and so changes this value.
+    let seen = bell.load(Ordering::Acquire);
+    receivers.iter().for_each(|receiver| receiver.segment.slots().drowsy());
+    step!("wait: drowsy");
+    if !other() && !receivers.iter().any(|receiver| receiver.may_have()) {
+        let left = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        if left != Some(Duration::ZERO) {
+            doorbell::sleep(bell, seen, left);
+        }
+    }
+    receivers.iter().for_each(|receiver| receiver.segment.slots().awake());
+}
+
+/// A package in hand, read where it lies. Dropped, its slot is free.
+pub struct Package<'a> {
+    segment: &'a Segment,
+    taken: Taken,
+    head: Head,
+    published_ns: u64,
+}
+
+impl<'a> Package<'a> {
+    fn new(receiver: &'a Receiver, taken: Taken) -> Self {
+        // SAFETY: taken, and freed only when this guard drops.
+        let (published_ns, mut head, _) = unsafe { receiver.segment.read(taken.slot) };
+        if taken.word.is_redelivered() {
+            head.options = head.options.with(Options::REDELIVERED);
+        }
+        Self { segment: &receiver.segment, taken, head, published_ns }
+    }
+
+    /// Its head; the option `redelivered` tells that an earlier receiver died with it in hand.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Its body.
+    pub fn body(&self) -> &[u8] {
+        // SAFETY: taken, and freed only when `self` drops.
+        unsafe { self.segment.read(self.taken.slot) }.2
+    }
+
+    /// When it was published, on the monotonic clock.
+    pub fn published_ns(&self) -> u64 {
+        self.published_ns
+    }
+}
+
+impl Drop for Package<'_> {
+    fn drop(&mut self) {
+        self.segment.slots().release(self.taken);
+    }
+}

@@ -1,0 +1,268 @@
+//! Making, adopting, replacing, listing and removing mailboxes: the files of a node's directory are the registry.
+//!
+//! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A file
+//! gets its name last, whole; so nobody ever opens half a mailbox.
+
+use crate::counters::{ClassTraffic, Loss};
+use crate::layout::{Shape, ShapeError};
+use crate::lock;
+use crate::name::Name;
+use crate::node::{Node, NodeError, RegistryLock, allocate, open_shared};
+use crate::participant::Participant;
+use crate::queue::Queue;
+use crate::receiver::Receiver;
+use crate::segment::{BadSegment, Segment, name_of, path_of};
+use crate::step::step;
+use std::fs::{self, File};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// The byte of a segment's file that its owner locks.
+const OWNER_BYTE: u64 = 0;
+
+/// Why a mailbox could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum CreateError {
+    /// Reserved parts.
+    #[error("mailbox {0}: system and class 0 and system 255 are reserved")]
+    Reserved(Name),
+    /// Impossible shape.
+    #[error("mailbox {0}: {1}")]
+    Shape(Name, ShapeError),
+    /// Somebody receives there.
+    #[error(
+        "mailbox {0} is owned by process {1}; one mailbox has one receiver: stop that process, or use another instance"
+    )]
+    Owned(Name, u32),
+    /// The node cannot be used.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// No memory, most likely.
+    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is /dev/shm full (df /dev/shm)?")]
+    Memory {
+        /// Which mailbox.
+        name: Name,
+        /// How much it needs.
+        bytes: usize,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl Participant {
+    /// Makes this participant the receiver of a mailbox. What an earlier receiver left there is adopted if the shape is the
+    /// same; else the old mailbox is given up and replaced.
+    ///
+    /// # Errors
+    /// See [`CreateError`].
+    pub fn receiver(self: &Arc<Self>, name: Name, shape: Shape) -> Result<Receiver, CreateError> {
+        if !name.is_mailbox() {
+            return Err(CreateError::Reserved(name));
+        }
+        shape.check().map_err(|error| CreateError::Shape(name, error))?;
+        let _registry = RegistryLock::take(self.node().path())?;
+        let (segment, lock) = match self.take_over(name, shape)? {
+            Predecessor::Same(segment, lock) => (segment, lock),
+            Predecessor::Other(old) => self.make(name, shape, Some(&old))?,
+            Predecessor::None => self.make(name, shape, None)?,
+        };
+        step!("create: owned");
+        let owner = &segment.page().owner;
+        owner.pid.store(std::process::id(), Ordering::Relaxed);
+        // ORDERING: Release; a sender that sees `sleeping` set by this owner sees whose bell to ring.
+        owner.participant.store(u32::from(self.claimant().participant), Ordering::Release);
+        // Refused when the memlock limit is small; the pages are present all the same.
+        let _ = segment.lock_in_memory();
+        Ok(Receiver::new(self.clone(), segment, lock))
+    }
+
+    /// Looks at what is there, as its owner.
+    fn take_over(&self, name: Name, shape: Shape) -> Result<Predecessor, CreateError> {
+        let path = path_of(self.node().path(), name);
+        let memory = |source| CreateError::Memory { name, bytes: shape.segment_bytes(), source };
+        let file = match open_shared(&path, false) {
+            Ok(file) => file,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
+            Err(error) => return Err(memory(error)),
+        };
+        let owned = !lock::try_lock(&file, OWNER_BYTE).map_err(memory)?;
+        let old = match Segment::check(&file, name, true) {
+            Ok(old) => old,
+            Err(BadSegment::Foreign) => return Ok(Predecessor::None),
+            Err(BadSegment::Io(error)) => return Err(memory(error)),
+        };
+        if owned {
+            return Err(CreateError::Owned(name, old.page().owner.pid.load(Ordering::Relaxed)));
+        }
+        if old.shape != shape || old.slots().is_retired() {
+            retire(&old);
+            return Ok(Predecessor::Other(old));
+        }
+        step!("adopt: before");
+        let page = old.page();
+        old.slots().adopt(|priority| page.counters.lost(priority, Loss::Poison, 1));
+        page.owner.adoptions.fetch_add(1, Ordering::Relaxed);
+        Ok(Predecessor::Same(old, file))
+    }
+
+    /// Makes the file, whole, then gives it its name.
+    fn make(&self, name: Name, shape: Shape, old: Option<&Segment>) -> Result<(Segment, File), CreateError> {
+        let node = self.node();
+        let path = path_of(node.path(), name);
+        // One maker at a time (the registry's lock), so one temporary name will do; a dead maker's leftover is overwritten.
+        let unfinished = node.path().join("unfinished");
+        let made = || {
+            let _ = fs::remove_file(&unfinished);
+            let file = open_shared(&unfinished, true)?;
+            step!("create: file");
+            allocate(&file, shape.segment_bytes())?;
+            step!("create: allocated");
+            let segment = Segment::format(&file, name, shape)?;
+            if let Some(old) = old {
+                segment.page().counters.carry_over(&old.page().counters);
+                segment.page().hot.ticket.store(old.page().hot.ticket.load(Ordering::Relaxed), Ordering::Relaxed);
+            }
+            lock::try_lock(&file, OWNER_BYTE)?;
+            step!("create: formatted");
+            fs::rename(&unfinished, &path)?;
+            step!("create: named");
+            Ok((segment, file))
+        };
+        let result = made().map_err(|source| {
+            let _ = fs::remove_file(&unfinished);
+            CreateError::Memory { name, bytes: shape.segment_bytes(), source }
+        })?;
+        node.page().registry_epoch.fetch_add(1, Ordering::AcqRel);
+        Ok(result)
+    }
+}
+
+/// What stood under a name before.
+enum Predecessor {
+    None,
+    /// Of the same shape: adopted.
+    Same(Segment, File),
+    /// Given up; its counters go on in the next.
+    Other(Segment),
+}
+
+/// Gives a mailbox without owner up, and counts what it still held.
+fn retire(old: &Segment) {
+    let slots = old.slots();
+    slots.retire();
+    step!("retire: retired");
+    slots.adopt(|priority| old.page().counters.lost(priority, Loss::Poison, 1));
+    let mut queue = Queue::new(slots.count());
+    queue.rescan(&slots);
+    while let Some(taken) = queue.take(&slots) {
+        old.page().counters.lost(taken.word.priority(), Loss::Closed, 1);
+        slots.release(taken);
+    }
+}
+
+/// Takes a mailbox's name away; the caller owns it.
+pub(crate) fn remove(node: &Node, name: Name) -> Result<(), NodeError> {
+    unlink(node, name, &RegistryLock::take(node.path())?)
+}
+
+fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeError> {
+    fs::remove_file(path_of(node.path(), name)).map_err(|error| NodeError::Io(path_of(node.path(), name), error))?;
+    step!("unlink: gone");
+    node.page().registry_epoch.fetch_add(1, Ordering::AcqRel);
+    Ok(())
+}
+
+/// A mailbox seen from outside. Looking changes nothing.
+#[derive(Clone, Debug)]
+pub struct MailboxInfo {
+    /// Its name.
+    pub name: Name,
+    /// Its shape.
+    pub shape: Shape,
+    /// Process that receives, if one does now.
+    pub owner: Option<u32>,
+    /// Times a new owner took over.
+    pub adoptions: u32,
+    /// Packages that wait or are in hand now.
+    pub depth: u32,
+    /// Most that its receiver ever found waiting.
+    pub depth_max: u32,
+    /// Packages ever accepted.
+    pub sent: u64,
+    /// By class: received, lost, latency.
+    pub classes: Vec<ClassTraffic>,
+}
+
+impl Node {
+    /// Names of all mailboxes of this node, in order.
+    ///
+    /// # Errors
+    /// When its directory cannot be read.
+    pub fn mailboxes(&self) -> Result<Vec<Name>, NodeError> {
+        let failed = |error| NodeError::Io(self.path().into(), error);
+        let entries = fs::read_dir(self.path()).map_err(failed)?;
+        let mut names: Vec<Name> = entries.filter_map(|entry| name_of(&entry.ok()?.path())).collect();
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    /// A mailbox as it is now; none when it does not exist (any more).
+    pub fn look_at(&self, name: Name) -> Option<MailboxInfo> {
+        let (segment, file) = Segment::open(self.path(), name, false).ok()?;
+        let page = segment.page();
+        let slots = segment.slots();
+        let waits = |slot: &usize| {
+            use crate::word::State;
+            matches!(slots.load(*slot).state(), State::Ready | State::Taken)
+        };
+        let owned = lock::is_locked(&file, OWNER_BYTE).unwrap_or(false);
+        Some(MailboxInfo {
+            name,
+            shape: segment.shape,
+            owner: owned.then(|| page.owner.pid.load(Ordering::Relaxed)),
+            adoptions: page.owner.adoptions.load(Ordering::Relaxed),
+            depth: (0..slots.count()).filter(waits).count() as u32,
+            depth_max: page.owner.depth_max.load(Ordering::Relaxed),
+            sent: page.hot.ticket.load(Ordering::Relaxed),
+            classes: page.counters.read(),
+        })
+    }
+
+    /// Removes a mailbox that nobody owns; false when somebody does, or it is gone.
+    ///
+    /// # Errors
+    /// When the node's directory cannot be changed.
+    pub fn remove_orphan(&self, name: Name) -> Result<bool, NodeError> {
+        let path = path_of(self.path(), name);
+        let failed = |error| NodeError::Io(path.clone(), error);
+        let registry = RegistryLock::take(self.path())?;
+        let Ok(file) = open_shared(&path, false) else { return Ok(false) };
+        if !lock::try_lock(&file, OWNER_BYTE).map_err(failed)? {
+            return Ok(false);
+        }
+        if let Ok(old) = Segment::check(&file, name, true) {
+            retire(&old);
+        }
+        unlink(self, name, &registry)?;
+        Ok(true)
+    }
+
+    /// Removes the whole directory if nothing lives in it: no launch, no participant. Mailboxes without owner go first.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn remove_if_dead(&self) -> Result<bool, NodeError> {
+        if self.launcher().is_some() || !self.participants().is_empty() {
+            return Ok(false);
+        }
+        for name in self.mailboxes()? {
+            if !self.remove_orphan(name)? {
+                return Ok(false);
+            }
+        }
+        let failed = |error| NodeError::Io(self.path().into(), error);
+        fs::remove_dir_all(self.path()).map_err(failed)?;
+        Ok(true)
+    }
+}

@@ -1,0 +1,272 @@
+//! The sending side of a mailbox: copy a package in, or write it in place.
+
+use crate::counters::Loss;
+use crate::doorbell;
+use crate::name::{Name, Priority};
+use crate::package::{Head, Options, Type};
+use crate::participant::Participant;
+use crate::segment::{BadSegment, Segment};
+use crate::slots::{Claim, NoSlot, Published};
+use crate::step::step;
+use std::sync::Arc;
+
+/// A mailbox that is replaced over and over while one package is sent: give up after so many.
+const REOPEN_MAX: usize = 3;
+
+/// Why a package could not be sent. It was not accepted; nothing is lost that its sender does not know of.
+#[derive(Debug, thiserror::Error)]
+pub enum SendError {
+    /// Nobody on this node has made such a mailbox, and no router takes it further.
+    #[error("mailbox {0}: not on this node, and no router leads to it; is its module launched?")]
+    NoMailbox(Name),
+    /// All slots are in use by packages as important or more.
+    #[error("mailbox {0} is full; its receiver is slow or stopped, or it has too few slots")]
+    Full(Name),
+    /// Larger than the mailbox's slots.
+    #[error(
+        "mailbox {name} takes bodies of at most {max} bytes, this one has {len}; raise its `size` in the configuration"
+    )]
+    TooLarge {
+        /// Where it should go.
+        name: Name,
+        /// Bytes of the body.
+        len: usize,
+        /// Bytes that fit.
+        max: usize,
+    },
+    /// This participant sends to that mailbox already and may not hold more claims there.
+    #[error("mailbox {0}: this participant has as many senders there as the mailbox's `claims` allows; share one")]
+    InUse(Name),
+    /// This process looked dead to the receiver, which took the slot back.
+    #[error("mailbox {0}: its receiver held this process for dead; was the node's directory removed?")]
+    Reclaimed(Name),
+    /// The segment cannot be used.
+    #[error("mailbox {0}: {1}")]
+    Bad(Name, String),
+}
+
+/// What a sender says of a package besides its body; the mailbox's name and the length are filled in.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Label {
+    /// Mailbox that answers go to.
+    pub from: Name,
+    /// What it is.
+    pub kind: Type,
+    /// Tells packages of one type apart.
+    pub id: u16,
+    /// How urgent.
+    pub priority: Priority,
+    /// Option bits.
+    pub options: Options,
+}
+
+impl Label {
+    fn head(&self, to: Name, len: usize) -> Head {
+        let Self { from, kind, id, priority, options } = *self;
+        Head { to, from, len: len as u16, kind, id, priority, options }
+    }
+}
+
+/// One participant's way into one mailbox.
+pub struct Sender {
+    participant: Arc<Participant>,
+    segment: Segment,
+    cursor: usize,
+}
+
+impl Participant {
+    /// Opens a mailbox of this node for sending. One map; afterwards sending needs no system call unless the receiver
+    /// sleeps, no heap and no lock.
+    ///
+    /// # Errors
+    /// [`SendError::NoMailbox`], [`SendError::InUse`] when all its claims are spoken for, or [`SendError::Bad`].
+    pub fn sender(self: &Arc<Self>, name: Name) -> Result<Sender, SendError> {
+        let segment = open(self, name)?;
+        let mut sending = self.sending();
+        if sending.iter().filter(|n| **n == name).count() >= usize::from(segment.shape.claims) {
+            return Err(SendError::InUse(name));
+        }
+        sending.push(name);
+        drop(sending);
+        // Senders start at different slots, so that they meet less.
+        let cursor = usize::from(self.claimant().participant) * 7;
+        Ok(Sender { participant: self.clone(), segment, cursor })
+    }
+}
+
+fn open(participant: &Participant, name: Name) -> Result<Segment, SendError> {
+    match Segment::open(participant.node().path(), name, true) {
+        Ok((segment, _)) => Ok(segment),
+        Err(BadSegment::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => Err(SendError::NoMailbox(name)),
+        Err(error) => Err(SendError::Bad(name, error.to_string())),
+    }
+}
+
+impl Sender {
+    /// The mailbox it leads to.
+    pub fn name(&self) -> Name {
+        self.segment.name
+    }
+
+    /// Largest body it takes.
+    pub fn body_bytes_max(&self) -> usize {
+        usize::from(self.segment.shape.body_bytes_max)
+    }
+
+    /// Sends a package whose body is these parts, one after the other.
+    ///
+    /// # Errors
+    /// When it was not accepted.
+    pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
+        let len: usize = parts.iter().map(|part| part.len()).sum();
+        let mut loan = self.loan(label.priority)?;
+        if len > loan.body().len() {
+            let max = loan.body().len();
+            return Err(SendError::TooLarge { name: loan.sender.name(), len, max });
+        }
+        let mut body = loan.body();
+        for part in parts {
+            let (here, rest) = body.split_at_mut(part.len());
+            here.copy_from_slice(part);
+            body = rest;
+        }
+        loan.send(label, len)
+    }
+
+    /// Borrows a slot to write a package in place. Dropped unsent, the slot is free again.
+    ///
+    /// # Errors
+    /// [`SendError::Full`], or what reopening a replaced mailbox brings.
+    pub fn loan(&mut self, priority: Priority) -> Result<Loan<'_>, SendError> {
+        let claim = self.claim(priority)?;
+        Ok(Loan { sender: self, claim: Some(claim), priority })
+    }
+
+    fn claim(&mut self, priority: Priority) -> Result<Claim, SendError> {
+        for _ in 0..REOPEN_MAX {
+            let me = self.participant.claimant();
+            match self.segment.slots().claim(me, &mut self.cursor, priority, self.segment.shape.full) {
+                Ok(claim) => return Ok(claim),
+                Err(NoSlot::Full) => {
+                    self.segment.page().counters.lost(priority, Loss::Refused, 1);
+                    return Err(SendError::Full(self.name()));
+                }
+                Err(NoSlot::Retired) => self.segment = open(&self.participant, self.name())?,
+            }
+        }
+        Err(SendError::NoMailbox(self.name()))
+    }
+
+    /// Publishes a filled claim; on a retired mailbox moves it to the one that took its place.
+    fn publish(&mut self, mut claim: Claim, label: &Label, len: usize) -> Result<(), SendError> {
+        let name = self.name();
+        for _ in 0..REOPEN_MAX {
+            // SAFETY: `claim` is ours, and the loan that could reach its bytes has been consumed.
+            unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
+            self.count_displaced(&claim);
+            match self.segment.slots().publish(claim, label.priority) {
+                Published::Accepted { wake } => {
+                    if wake {
+                        self.wake();
+                    }
+                    return Ok(());
+                }
+                Published::Reclaimed => return Err(SendError::Reclaimed(name)),
+                Published::Retired => claim = self.move_on(claim, label.priority, len)?,
+            }
+        }
+        self.segment.slots().abandon(claim);
+        Err(SendError::NoMailbox(name))
+    }
+
+    /// Copies a claim of a retired mailbox into one of its successor.
+    fn move_on(&mut self, old: Claim, priority: Priority, len: usize) -> Result<Claim, SendError> {
+        let successor = open(&self.participant, self.name());
+        let retired = match successor {
+            Ok(successor) => std::mem::replace(&mut self.segment, successor),
+            Err(error) => {
+                self.segment.slots().abandon(old);
+                return Err(error);
+            }
+        };
+        let result = self.claim(priority).and_then(|claim| {
+            let max = self.body_bytes_max();
+            if len > max {
+                self.segment.slots().abandon(claim);
+                return Err(SendError::TooLarge { name: self.name(), len, max });
+            }
+            // SAFETY: both claims are ours, on different segments.
+            let (from, to) = unsafe { (retired.body_mut(old.slot), self.segment.body_mut(claim.slot)) };
+            to[..len].copy_from_slice(&from[..len]);
+            Ok(claim)
+        });
+        retired.slots().abandon(old);
+        result
+    }
+
+    fn count_displaced(&self, claim: &Claim) {
+        if let Some(priority) = claim.displaced() {
+            self.segment.page().counters.lost(priority, Loss::Displaced, 1);
+        }
+    }
+
+    #[cold]
+    fn wake(&self) {
+        step!("send: before bell");
+        let owner = self.segment.page().owner.participant.load(std::sync::atomic::Ordering::Relaxed);
+        doorbell::ring(&self.participant.node().entry(owner as u16).bell);
+        step!("send: rung");
+    }
+}
+
+impl Drop for Sender {
+    fn drop(&mut self) {
+        let mut sending = self.participant.sending();
+        if let Some(at) = sending.iter().position(|name| *name == self.segment.name) {
+            sending.swap_remove(at);
+        }
+    }
+}
+
+/// A slot to write a package in.
+pub struct Loan<'a> {
+    sender: &'a mut Sender,
+    /// None once it was sent.
+    claim: Option<Claim>,
+    priority: Priority,
+}
+
+impl Loan<'_> {
+    /// Room for the body; what was there before is somebody else's old package.
+    pub fn body(&mut self) -> &mut [u8] {
+        match &self.claim {
+            // SAFETY: the claim is ours, and the borrow of `self` is the only way to these bytes.
+            Some(claim) => unsafe { self.sender.segment.body_mut(claim.slot) },
+            None => &mut [],
+        }
+    }
+
+    /// Sends the first `len` bytes of the body. The label's priority is replaced by the one the slot was lent for.
+    ///
+    /// # Errors
+    /// When it was not accepted.
+    pub fn send(mut self, label: &Label, len: usize) -> Result<(), SendError> {
+        let max = self.sender.body_bytes_max();
+        if len > max {
+            return Err(SendError::TooLarge { name: self.sender.name(), len, max });
+        }
+        match self.claim.take() {
+            Some(claim) => self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for Loan<'_> {
+    fn drop(&mut self) {
+        if let Some(claim) = self.claim.take() {
+            self.sender.count_displaced(&claim);
+            self.sender.segment.slots().abandon(claim);
+        }
+    }
+}

@@ -1,0 +1,300 @@
+//! The slot core: how senders and one receiver share the slots of a mailbox, with atomics alone.
+//!
+//! Nothing here maps memory, sleeps, or touches a body (see `segment`, `doorbell`, `sender`, `receiver`), so that loom
+//! can check it as it stands. Each operation takes a number of steps bounded by the slot count and never waits for
+//! another process; a process that dies between any two steps leaves a state that the others mend:
+//!
+//! | died | left behind | who mends it, and how |
+//! | --- | --- | --- |
+//! | sender, claimed, not published | Filling | receiver's `reclaim`: Free again; the package was never accepted |
+//! | sender, published, hint not set | Ready without hint | receiver's rescan: found and delivered |
+//! | sender, displacing | Filling with the lost priority | `reclaim` counts that loss |
+//! | receiver, package in hand | Taken | the next owner's `adopt`: Ready, redelivered; the second time dropped as poison |
+//!
+//! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
+//! Release (C), claiming an Acquire (D). Hints, `sleeping` and `retired` are settled by the fences (E), (F), (G).
+
+use crate::name::Priority;
+use crate::step::step;
+use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
+use crate::word::{Claimant, FREE, State, Word};
+
+/// Most slots that a mailbox can have.
+pub const SLOTS_MAX: usize = 1024;
+/// Words of ready hints, one bit a slot.
+pub(crate) const HINT_WORDS: usize = SLOTS_MAX / 64;
+/// A sender looks through a full mailbox this often for somebody to displace before it calls it full: each further look
+/// is owed to another process that was quicker, and n looks at n slots would be n².
+const DISPLACE_LOOKS_MAX: usize = 4;
+
+/// What senders and receiver touch with every package, together in as few cache lines as can be.
+#[repr(C, align(64))]
+pub(crate) struct Hot {
+    /// Next ticket: the order of publishing. Also the count of all packages ever sent here.
+    pub(crate) ticket: AtomicU64,
+    /// Not 0: the receiver sleeps or is about to; ring its bell. Written by the receiver alone.
+    pub(crate) sleeping: AtomicU32,
+    /// Not 0: this mailbox has been given up; what is sent here is not received.
+    pub(crate) retired: AtomicU32,
+    /// Slots that may have become ready. Hints: each is set after its word changed, and may be late or stale.
+    pub(crate) ready: [AtomicU64; HINT_WORDS],
+}
+
+/// What happens to a package that finds no free slot.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Full {
+    /// It takes the place of the newest of the least important packages, if it is more important; else it is refused.
+    #[default]
+    Displace,
+    /// It is refused (seed 002, 3.2).
+    Reject,
+}
+
+/// Why a slot was not to be had.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum NoSlot {
+    /// All are in use by packages as important or more.
+    Full,
+    /// The mailbox has been given up.
+    Retired,
+}
+
+/// A slot being filled; its owner alone may write the body.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Claim {
+    pub(crate) slot: usize,
+    word: Word,
+}
+
+impl Claim {
+    /// Priority of the accepted package that lost its place to this one.
+    pub(crate) fn displaced(&self) -> Option<Priority> {
+        match self.word.state() {
+            State::Filling { displaced, .. } => displaced,
+            _ => None,
+        }
+    }
+}
+
+/// How publishing ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Published {
+    /// Accepted. `wake`: the receiver sleeps, ring its bell.
+    Accepted { wake: bool },
+    /// The mailbox was given up meanwhile; the slot is the filler's again, send its package anew.
+    Retired,
+    /// The receiver held the filler for dead and took the slot back: the package is not accepted.
+    Reclaimed,
+}
+
+/// A taken package; its receiver alone may read the body.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Taken {
+    pub(crate) slot: usize,
+    pub(crate) word: Word,
+}
+
+/// The shared part of a mailbox's slots, as every process sees it.
+#[derive(Clone, Copy)]
+pub(crate) struct Slots<'a> {
+    pub(crate) hot: &'a Hot,
+    words: &'a [AtomicU64],
+    /// Words from one slot's to the next: 8 keeps each in a cache line of its own.
+    stride: usize,
+    count: usize,
+}
+
+impl<'a> Slots<'a> {
+    /// # Panics
+    /// When `words` are too few for `count` at `stride`; both come from a checked layout.
+    pub(crate) fn new(hot: &'a Hot, words: &'a [AtomicU64], stride: usize, count: usize) -> Self {
+        assert!(count > 0 && count <= SLOTS_MAX && words.len() > (count - 1) * stride);
+        Self { hot, words, stride, count }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    fn word(&self, slot: usize) -> &'a AtomicU64 {
+        &self.words[slot * self.stride]
+    }
+
+    pub(crate) fn load(&self, slot: usize) -> Word {
+        Word(self.word(slot).load(Ordering::Acquire))
+    }
+
+    /// ORDERING: Acquire and Release at once, (A) to (D): every change both takes over what the last one left and hands on.
+    fn change(&self, slot: usize, from: Word, to: Word) -> bool {
+        self.word(slot).compare_exchange(from.0, to.0, Ordering::AcqRel, Ordering::Relaxed).is_ok()
+    }
+
+    fn hint(&self, slot: usize) {
+        // ORDERING: Release; pairs with the receiver's swap, which then sees the word this hint speaks of.
+        self.hot.ready[slot / 64].fetch_or(1 << (slot % 64), Ordering::Release);
+    }
+
+    // ---- senders ----
+
+    /// A slot to fill. `cursor` is the sender's own: the search goes on where the last one ended.
+    pub(crate) fn claim(
+        &self,
+        by: Claimant,
+        cursor: &mut usize,
+        priority: Priority,
+        full: Full,
+    ) -> Result<Claim, NoSlot> {
+        if self.is_retired() {
+            return Err(NoSlot::Retired);
+        }
+        let word = Word::filling(by, None);
+        for _ in 0..self.count {
+            let slot = *cursor % self.count;
+            *cursor = slot + 1;
+            step!("claim: before");
+            if Word(self.word(slot).load(Ordering::Relaxed)) == FREE && self.change(slot, FREE, word) {
+                step!("claim: claimed");
+                return Ok(Claim { slot, word });
+            }
+        }
+        match full {
+            Full::Displace => self.displace(by, priority).ok_or(NoSlot::Full),
+            Full::Reject => Err(NoSlot::Full),
+        }
+    }
+
+    /// Takes the slot of the newest of the least important packages, if `priority` outranks it.
+    fn displace(&self, by: Claimant, priority: Priority) -> Option<Claim> {
+        for _ in 0..DISPLACE_LOOKS_MAX {
+            let words = (0..self.count).map(|slot| (slot, self.load(slot)));
+            let ready = words.filter(|(_, word)| word.is_ready() && priority.outranks(word.priority()));
+            let (slot, last) = ready.min_by_key(|(_, word)| word.rank())?;
+            let word = Word::filling(by, Some(last.priority()));
+            step!("displace: chosen");
+            if self.change(slot, last, word) {
+                step!("displace: claimed");
+                return Some(Claim { slot, word });
+            }
+        }
+        None
+    }
+
+    /// Makes a filled slot a package. The caller has counted the displaced one, if there was one.
+    pub(crate) fn publish(&self, claim: Claim, priority: Priority) -> Published {
+        let slot = claim.slot;
+        // ORDERING: AcqRel, so that whoever reads the counter sees what came before the tickets it counts. A receiver that
+        // reads T sees the hints of all packages that one sender published before its package T.
+        let ticket = self.hot.ticket.fetch_add(1, Ordering::AcqRel);
+        step!("publish: ticket");
+        let word = Word::ready(priority, ticket);
+        if !self.change(slot, claim.word, word) {
+            return Published::Reclaimed;
+        }
+        step!("publish: ready");
+        self.hint(slot);
+        step!("publish: hint");
+        // ORDERING (E): the hint before the looks at `sleeping` and `retired`. Pairs with (F): of a sender and a receiver
+        // that goes to sleep at least one sees the other; and with (G): of a sender and a new owner likewise.
+        fence(Ordering::SeqCst);
+        if self.is_retired() && self.change(slot, word, claim.word) {
+            step!("publish: taken back");
+            return Published::Retired;
+        }
+        // A retired mailbox whose word is no longer ours: somebody received it before it retired, so it was accepted.
+        Published::Accepted { wake: self.hot.sleeping.load(Ordering::Acquire) != 0 }
+    }
+
+    /// Gives a claimed slot back unpublished.
+    pub(crate) fn abandon(&self, claim: Claim) {
+        step!("abandon: before");
+        self.change(claim.slot, claim.word, FREE);
+        step!("abandon: freed");
+    }
+
+    /// Whether this mailbox has been given up.
+    pub(crate) fn is_retired(&self) -> bool {
+        self.hot.retired.load(Ordering::Relaxed) != 0
+    }
+
+    // ---- the receiver ----
+
+    /// Ready becomes Taken, if it still is the package that was seen.
+    pub(crate) fn take(&self, slot: usize, seen: Word) -> Option<Taken> {
+        step!("take: chosen");
+        let word = seen.taken();
+        let taken = self.change(slot, seen, word).then_some(Taken { slot, word });
+        step!("take: taken");
+        taken
+    }
+
+    /// Frees a taken slot.
+    pub(crate) fn release(&self, taken: Taken) {
+        step!("release: before");
+        let freed = self.change(taken.slot, taken.word, FREE);
+        debug_assert!(freed, "only its receiver frees a taken slot");
+        step!("release: freed");
+    }
+
+    /// Says that the receiver is about to sleep. Look at the hints after this, then sleep, then [`Slots::awake`].
+    pub(crate) fn drowsy(&self) {
+        self.hot.sleeping.store(1, Ordering::Relaxed);
+        // ORDERING (F): `sleeping` before the last look at the hints. Pairs with (E).
+        fence(Ordering::SeqCst);
+    }
+
+    /// Says that the receiver does not sleep. It alone says so: a sender that did would swallow the next one's wake-up.
+    pub(crate) fn awake(&self) {
+        self.hot.sleeping.store(0, Ordering::Relaxed);
+    }
+
+    /// Whether a hint is set.
+    pub(crate) fn any_hint(&self) -> bool {
+        (0..self.count.div_ceil(64)).any(|i| self.hot.ready[i].load(Ordering::Acquire) != 0)
+    }
+
+    /// Frees slots whose filler is dead, and tells `lost` the priorities of accepted packages they had displaced.
+    ///
+    /// `dead` must never hold a living one for dead. It may hold a dead one for living: this is repeated.
+    pub(crate) fn reclaim(&self, mut dead: impl FnMut(Claimant) -> bool, mut lost: impl FnMut(Priority)) -> usize {
+        let mut freed = 0;
+        for slot in 0..self.count {
+            let word = self.load(slot);
+            let State::Filling { by, displaced } = word.state() else { continue };
+            if dead(by) {
+                displaced.into_iter().for_each(&mut lost);
+                step!("reclaim: counted");
+                freed += usize::from(self.change(slot, word, FREE));
+                step!("reclaim: freed");
+            }
+        }
+        freed
+    }
+
+    // ---- a new owner, before it receives ----
+
+    /// Takes over what a dead receiver left: what it had in hand is handed out once more, then dropped (`poison`).
+    pub(crate) fn adopt(&self, mut poison: impl FnMut(Priority)) {
+        self.awake();
+        for slot in 0..self.count {
+            let word = self.load(slot);
+            if word.state() != State::Taken {
+                continue;
+            }
+            step!("adopt: found");
+            if word.is_redelivered() {
+                poison(word.priority());
+                self.change(slot, word, FREE);
+            } else {
+                self.change(slot, word, word.redelivered());
+            }
+            step!("adopt: changed");
+        }
+    }
+
+    /// Gives the mailbox up for good. Senders see it after publishing and send anew elsewhere.
+    pub(crate) fn retire(&self) {
+        self.hot.retired.store(1, Ordering::Relaxed);
+        // ORDERING (G): `retired` before the owner's last look at the words. Pairs with (E).
+        fence(Ordering::SeqCst);
+    }
+}

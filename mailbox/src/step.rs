@@ -1,0 +1,41 @@
+//! Crash points: named steps at which a process can be told to die, so that a test can visit every instruction boundary
+//! that matters. Without the feature `crash-points` they are nothing at all.
+
+/// A step of an operation on shared memory: with the feature `crash-points`, the armed one aborts the process here.
+macro_rules! step {
+    ($what:literal) => {
+        #[cfg(feature = "crash-points")]
+        $crate::step::reached($what);
+    };
+}
+pub(crate) use step;
+
+#[cfg(feature = "crash-points")]
+pub use armed::{arm, reached, reached_count};
+
+#[cfg(feature = "crash-points")]
+mod armed {
+    use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
+
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    static FATAL: AtomicU64 = AtomicU64::new(u64::MAX);
+
+    /// Counts from here on; the `fatal`-th step (1 is the first) kills the process as SIGKILL would.
+    pub fn arm(fatal: u64) {
+        COUNT.store(0, SeqCst);
+        FATAL.store(fatal, SeqCst);
+    }
+
+    /// Steps passed since [`arm`].
+    pub fn reached_count() -> u64 {
+        COUNT.load(SeqCst)
+    }
+
+    /// Called by each step.
+    pub fn reached(what: &str) {
+        if COUNT.fetch_add(1, SeqCst) + 1 == FATAL.load(SeqCst) {
+            eprintln!("{what}");
+            std::process::abort();
+        }
+    }
+}

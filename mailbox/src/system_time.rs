@@ -1,0 +1,259 @@
+//! System time: what every node of a system takes for now, and how sure it is (seed 002, 2.2.3).
+//!
+//! The page has two records and an index. Its writer fills the record that the index does not name, then turns the index:
+//! readers always find a whole record, also when the writer died at any line. System time is nanoseconds since 1970. Within
+//! an *epoch* it only moves forward; a step is a new epoch, which readers can see. Timeouts and leases never use it: they
+//! are measured by the monotonic clock.
+
+use crate::clock::{monotonic_ns, realtime_ns};
+use crate::memory::Mapping;
+use crate::node::{Node, NodeError, allocate, open_shared};
+use crate::step::step;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+use std::time::Duration;
+
+/// A reader that was overtaken twice by the writer tries again, so often: the writer writes at most some thousand times a
+/// second, a reading takes less than a microsecond.
+const READ_TRIES: usize = 8;
+const BILLION: i128 = 1_000_000_000;
+
+/// Where system time comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u64)]
+pub enum TimeSource {
+    /// This computer's own clocks.
+    Local = 1,
+    /// A simulation, which may run faster or slower than the world.
+    Simulation = 2,
+    /// A log that is played.
+    Log = 3,
+}
+
+impl TimeSource {
+    fn from_code(code: u64) -> Option<Self> {
+        [Self::Local, Self::Simulation, Self::Log].into_iter().find(|source| *source as u64 == code)
+    }
+
+    /// One word for tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Local => "local",
+            Self::Simulation => "simulation",
+            Self::Log => "log",
+        }
+    }
+}
+
+/// How system time follows from the monotonic clock.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TimeRecord {
+    /// Raised with every step.
+    pub epoch: u64,
+    /// Where it comes from.
+    pub source: TimeSource,
+    /// Monotonic clock at which this record begins, ns.
+    pub monotonic_ns: u64,
+    /// System time then, ns since 1970.
+    pub system_ns: u64,
+    /// System nanoseconds in a billion monotonic ones; 1 000 000 000 is the pace of this computer's clock.
+    pub pace_ppb: u64,
+    /// How far off it was at most when the record was written, ns.
+    pub error_ns: u64,
+    /// How much that grows, ns a second.
+    pub drift_ns_s: u64,
+}
+
+impl TimeRecord {
+    /// System time at this moment of the monotonic clock.
+    pub fn at(&self, monotonic_ns: u64) -> SystemTime {
+        let since = i128::from(monotonic_ns) - i128::from(self.monotonic_ns);
+        let system = i128::from(self.system_ns) + since * i128::from(self.pace_ppb) / BILLION;
+        let age_ns = monotonic_ns.saturating_sub(self.monotonic_ns);
+        let drift = u128::from(age_ns) * u128::from(self.drift_ns_s) / BILLION as u128;
+        SystemTime {
+            ns: u64::try_from(system.max(0)).unwrap_or(u64::MAX),
+            epoch: self.epoch,
+            error: Duration::from_nanos(self.error_ns.saturating_add(drift as u64)),
+            age: Duration::from_nanos(age_ns),
+        }
+    }
+}
+
+/// System time as one reader computed it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SystemTime {
+    /// Nanoseconds since 1970.
+    pub ns: u64,
+    /// Times of different epochs cannot be subtracted.
+    pub epoch: u64,
+    /// How far off it is at most.
+    pub error: Duration,
+    /// How long ago its source was last heard.
+    pub age: Duration,
+}
+
+#[repr(C, align(64))]
+struct SharedRecord {
+    epoch: AtomicU64,
+    source: AtomicU64,
+    monotonic_ns: AtomicU64,
+    system_ns: AtomicU64,
+    pace_ppb: AtomicU64,
+    error_ns: AtomicU64,
+    drift_ns_s: AtomicU64,
+}
+
+/// The file `time`.
+#[repr(C)]
+pub(crate) struct TimePage {
+    /// Records written so far; the last is in place `index % 2`. 0: none yet.
+    index: AtomicU64,
+    writer_pid: AtomicU32,
+    padding: [AtomicU32; 13],
+    records: [SharedRecord; 2],
+}
+const _: () = assert!(size_of::<TimePage>() == 192);
+
+impl SharedRecord {
+    fn load(&self) -> Option<TimeRecord> {
+        let load = |field: &AtomicU64| field.load(Ordering::Relaxed);
+        Some(TimeRecord {
+            epoch: load(&self.epoch),
+            source: TimeSource::from_code(load(&self.source))?,
+            monotonic_ns: load(&self.monotonic_ns),
+            system_ns: load(&self.system_ns),
+            pace_ppb: load(&self.pace_ppb),
+            error_ns: load(&self.error_ns),
+            drift_ns_s: load(&self.drift_ns_s),
+        })
+    }
+
+    fn store(&self, record: &TimeRecord) {
+        let store = |field: &AtomicU64, value| {
+            field.store(value, Ordering::Relaxed);
+            step!("time: field");
+        };
+        store(&self.epoch, record.epoch);
+        store(&self.source, record.source as u64);
+        store(&self.monotonic_ns, record.monotonic_ns);
+        store(&self.system_ns, record.system_ns);
+        store(&self.pace_ppb, record.pace_ppb);
+        store(&self.error_ns, record.error_ns);
+        store(&self.drift_ns_s, record.drift_ns_s);
+    }
+}
+
+impl TimePage {
+    fn read(&self) -> Option<TimeRecord> {
+        for _ in 0..READ_TRIES {
+            // ORDERING: Acquire (A); pairs with (B): the record that the index names is whole.
+            let index = self.index.load(Ordering::Acquire);
+            if index == 0 {
+                return None;
+            }
+            let record = self.records[(index % 2) as usize].load();
+            // ORDERING (C): the fields before the second look; pairs with (D). While the index stands, the writer is at most
+            // in the other record.
+            fence(Ordering::Acquire);
+            if self.index.load(Ordering::Relaxed) == index {
+                return record;
+            }
+        }
+        None
+    }
+
+    fn write(&self, record: &TimeRecord) {
+        let next = self.index.load(Ordering::Relaxed) + 1;
+        // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
+        fence(Ordering::Release);
+        self.records[(next % 2) as usize].store(record);
+        // ORDERING: Release (B); pairs with (A).
+        self.index.store(next, Ordering::Release);
+        step!("time: turned");
+    }
+}
+
+fn map(node: &Path, create: bool) -> std::io::Result<Mapping> {
+    let file = open_shared(&node.join("time"), create)?;
+    let bytes = size_of::<TimePage>();
+    if create && file.metadata()?.len() < bytes as u64 {
+        allocate(&file, bytes)?;
+    }
+    Mapping::new(&file, bytes, create)
+}
+
+/// Reads a node's system time; without a time page, this computer's wall clock is taken.
+pub struct SystemClock {
+    mapping: Option<Mapping>,
+}
+
+impl SystemClock {
+    /// Opens the node's time page, if there is one.
+    pub fn open(node: &Node) -> Self {
+        Self { mapping: map(node.path(), false).ok() }
+    }
+
+    /// System time now. No system call, lock or heap.
+    pub fn now(&self) -> SystemTime {
+        self.at(monotonic_ns())
+    }
+
+    /// System time at a moment of the monotonic clock.
+    pub fn at(&self, monotonic: u64) -> SystemTime {
+        match self.record() {
+            Some(record) => record.at(monotonic),
+            None => {
+                let behind = monotonic_ns().saturating_sub(monotonic);
+                let ns = realtime_ns().saturating_sub(behind);
+                SystemTime { ns, epoch: 0, error: Duration::ZERO, age: Duration::ZERO }
+            }
+        }
+    }
+
+    /// What the page says; none without one.
+    pub fn record(&self) -> Option<TimeRecord> {
+        self.mapping.as_ref()?.at::<TimePage>(0).read()
+    }
+}
+
+/// Writes a node's system time. There is one: the launch of the node, or the router that hears the master.
+pub struct TimeKeeper {
+    mapping: Mapping,
+}
+
+impl TimeKeeper {
+    /// Opens the page, making it if need be, and begins a new epoch at this system time.
+    ///
+    /// # Errors
+    /// When the page cannot be made.
+    pub fn begin(node: &Arc<Node>, source: TimeSource, system_ns: u64, pace: f64) -> Result<Self, NodeError> {
+        let failed = |error| NodeError::Io(node.path().join("time"), error);
+        let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
+        let page: &TimePage = keeper.mapping.at(0);
+        page.writer_pid.store(std::process::id(), Ordering::Relaxed);
+        let epoch = page.read().map_or(1, |last| last.epoch + 1);
+        page.write(&TimeRecord {
+            epoch,
+            source,
+            monotonic_ns: monotonic_ns(),
+            system_ns,
+            pace_ppb: (pace.clamp(0.0, 1000.0) * 1e9) as u64,
+            error_ns: 0,
+            drift_ns_s: 0,
+        });
+        Ok(keeper)
+    }
+
+    /// Goes on in the same epoch with another pace, never back.
+    pub fn set_pace(&mut self, pace: f64) {
+        let page: &TimePage = self.mapping.at(0);
+        if let Some(last) = page.read() {
+            let now = monotonic_ns();
+            let time = last.at(now);
+            let pace_ppb = (pace.clamp(0.0, 1000.0) * 1e9) as u64;
+            page.write(&TimeRecord { monotonic_ns: now, system_ns: time.ns, pace_ppb, ..last });
+        }
+    }
+}
