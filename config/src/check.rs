@@ -17,15 +17,16 @@ pub(crate) fn claims(installation: &Installation, lines: &[MailboxLines], reader
             let (senders, tools) = if key == "commands" { (&callers, TOOLS) } else { (&called, 0) };
             let claims = (senders.count() + tools) * usize::from(spec.claims);
             if usize::from(spec.slots) <= claims {
-                let tools = if tools > 0 { format!(" and {tools} tools") } else { String::new() };
                 reader.report(
                     line,
                     format!(
-                        "module `{}`, mailbox `{key}`: {senders}{tools} may hold {claims} slots unfinished, so that \
-                         `slots = {}` could be closed by senders that stopped midway; write at least `slots = {}`",
+                        "module `{}`, mailbox `{key}`: {} may hold {claims} unfinished at once, so that \
+                         `slots = {}` could be closed by senders that stopped midway; write at least `slots = {}`{}",
                         installation.classes.format(module.name),
+                        senders.text(tools),
                         spec.slots,
-                        claims + 1
+                        claims + 1,
+                        if spec.claims > 1 { ", or fewer `claims`" } else { "" }
                     ),
                 );
             }
@@ -55,12 +56,15 @@ impl Senders {
     fn count(&self) -> usize {
         self.local + usize::from(self.router)
     }
-}
 
-impl std::fmt::Display for Senders {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let plural = if self.local == 1 { "" } else { "s" };
-        let router = if self.router { ", the router" } else { "" };
-        write!(f, "{} module{plural}{router}", self.local)
+    fn text(&self, tools: usize) -> String {
+        let modules = match self.local {
+            0 => None,
+            1 => Some("1 module".into()),
+            local => Some(format!("{local} modules")),
+        };
+        let router = self.router.then(|| String::from("the router"));
+        let tools = (tools > 0).then(|| format!("{tools} tools"));
+        modules.into_iter().chain(router).chain(tools).collect::<Vec<_>>().join(" + ")
     }
 }

@@ -184,6 +184,11 @@ impl ClassTable {
     }
 }
 
+/// The part of a module's name that names its class.
+pub(crate) fn class_of(text: &str) -> &str {
+    text.split('.').next().unwrap_or(text)
+}
+
 /// Whether a text can name a class or a node. A letter comes first, so that a number is never a name.
 pub(crate) fn is_word(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_lowercase())
@@ -191,9 +196,8 @@ pub(crate) fn is_word(text: &str) -> bool {
 }
 
 fn byte(text: &str, part: &'static str, digits: &str) -> Result<u8, NameTextError> {
-    // `parse` alone would take "+1".
-    let plain = digits.chars().all(|c| c.is_ascii_digit());
-    let number = digits.parse().ok().filter(|_| plain);
+    // `parse` alone would take "+1" and "01": two spellings of one name.
+    let number = digits.parse().ok().filter(|number: &u8| number.to_string() == digits);
     number.ok_or_else(|| NameTextError::Byte(text.into(), part, digits.into()))
 }
 
@@ -235,6 +239,7 @@ mod tests {
             ("pump.0", "`pump.0`: there is no class `pump`; the classes are motor, laser, tool"),
             ("laser.256", "`laser.256`: instance `256` is not a number from 0 to 255"),
             ("laser.+1", "`laser.+1`: instance `+1` is not a number from 0 to 255"),
+            ("laser.00", "`laser.00`: instance `00` is not a number from 0 to 255"),
             ("laser.0.x", "`laser.0.x`: local id `x` is not a number from 0 to 255"),
             ("300.laser.0.0", "`300.laser.0.0`: system `300` is not a number from 0 to 255"),
             ("0.laser.0.0", "`0.laser.0.0`: system 0 is reserved; write 1 to 255"),

@@ -1,6 +1,6 @@
 //! Who owns which module name: collected in a first pass, so that what a module refers to may stand below it.
 
-use crate::classes::{ClassTable, TOOL};
+use crate::classes::{ClassTable, TOOL, class_of};
 use crate::reader::{Section, nearest};
 use rohrpost_mailbox::Name;
 use std::collections::BTreeMap;
@@ -56,7 +56,7 @@ impl<'d> Directory<'d> {
         if let Err(error) = &name {
             module.reader.report(line, error.to_string());
         }
-        if text.split('.').next() == Some(TOOL) {
+        if class_of(text) == TOOL {
             module.reader.report(
                 line,
                 format!(
@@ -71,12 +71,12 @@ impl<'d> Directory<'d> {
     pub(crate) fn find(&self, text: &str) -> Result<Name, Unknown> {
         self.owners.get(text).copied().ok_or_else(|| {
             // By class alone: `laser.0` and `mapper.0` are alike only in what every name has.
-            let class_of = |text: &'d str| text.split('.').next().unwrap_or(text);
-            let class = nearest(text.split('.').next().unwrap_or(text), self.owners.keys().copied().map(class_of));
-            let mut like = self.owners.keys().filter(|owner| Some(class_of(owner)) == class);
-            let same_instance = |owner: &&&str| owner.split_once('.').map(|o| o.1) == text.split_once('.').map(|t| t.1);
-            let nearest = like.clone().find(same_instance).or_else(|| like.next());
-            Unknown { nearest: nearest.map(|owner| (*owner).into()) }
+            let owners = || self.owners.keys().copied();
+            let class = nearest(class_of(text), owners().map(class_of));
+            let like = owners().filter(|owner| Some(class_of(owner)) == class);
+            // Among several of that class, the one with the instance meant.
+            let nearest = like.min_by_key(|owner| owner[class_of(owner).len()..] != text[class_of(text).len()..]);
+            Unknown { nearest: nearest.map(Into::into) }
         })
     }
 }

@@ -34,11 +34,16 @@ pub fn find_program(program: &str, folder: &Path, beside: &Path) -> Option<PathB
 
 fn find(program: &str, folder: &Path, beside: &Path, search: Option<&OsStr>) -> Option<PathBuf> {
     if program.contains('/') {
-        return Some(folder.join(program)).filter(|path| is_program(path));
+        return Some(below(folder, program)).filter(|path| is_program(path));
     }
-    let on_path = search.map(|search| std::env::split_paths(search).collect()).unwrap_or_else(Vec::new);
+    let on_path: Vec<PathBuf> = search.map(|search| std::env::split_paths(search).collect()).unwrap_or_default();
     let folders = std::iter::once(beside.to_owned()).chain(on_path);
     folders.map(|folder| folder.join(program)).find(|path| is_program(path))
+}
+
+/// Without the `./` that only says "not on PATH".
+fn below(folder: &Path, program: &str) -> PathBuf {
+    folder.join(program.strip_prefix("./").unwrap_or(program))
 }
 
 fn is_program(path: &Path) -> bool {
@@ -57,7 +62,7 @@ impl Installation {
                 continue;
             }
             let place = if program.contains('/') {
-                format!("is no program at {}", self.folder.join(program).display())
+                format!("is no program at {}", below(&self.folder, program).display())
             } else {
                 format!("is neither in {} nor on PATH", beside.display())
             };
@@ -99,7 +104,7 @@ mod tests {
             fs::set_permissions(at(path), fs::Permissions::from_mode(mode)).unwrap();
         }
         for (program, found, why) in [
-            ("./own", Some("conf/./own"), "with a slash: from the file's folder"),
+            ("./own", Some("conf/own"), "with a slash: from the file's folder"),
             ("../path/far", Some("conf/../path/far"), "and out of it"),
             ("own", None, "a bare name is not looked for in the file's folder"),
             ("both", Some("bin/both"), "beside our executable comes first"),

@@ -14,7 +14,7 @@ fn folder() -> &'static Path {
 fn check(golden: &Path, said: &str) -> Option<String> {
     let said = format!("{}\n", said.trim_end());
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
-        fs::write(golden, &said).unwrap();
+        fs::write(golden, &said).expect("golden files can be written");
         return None;
     }
     let expected = fs::read_to_string(golden).unwrap_or_default();
@@ -52,4 +52,18 @@ fn files_that_ship_load_and_explain_themselves() {
             panic!("{difference}");
         }
     }
+}
+
+/// `full.toml` has every key there is (`every_key_arrives`), so a key that it has and the manual has not was forgotten.
+#[test]
+fn manual_names_every_key_and_its_example_loads() {
+    let manual = fs::read_to_string(folder().join("../docs/src/configuration.md")).unwrap();
+    let full = fs::read_to_string(folder().join("tests/full.toml")).unwrap();
+    let modules = full.split_once("[[module]]").unwrap().1;
+    let keys = modules.lines().filter(|line| !line.starts_with("settings")).filter_map(|line| line.split_once(" = "));
+    for (key, _) in keys {
+        assert!(manual.contains(&format!("`{key}`")) || manual.contains(&format!(".{key}]`")), "no word on `{key}`");
+    }
+    let example = manual.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    Installation::parse(example, Path::new("configuration.md")).unwrap_or_else(|errors| panic!("{errors}"));
 }
