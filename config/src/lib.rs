@@ -1,1 +1,72 @@
-//! Reads, checks and explains the configuration of an installation.
+//! Reads, checks and explains the configuration of an installation: one TOML file that says which modules run where,
+//! with which priority, mailboxes and settings.
+//!
+//! [`Installation::load`] gives an installation in which everything holds, or [`Errors`]: everything that is wrong with
+//! the file, each with its line and with what would be right. Nothing falls back silently, an unknown key is an error.
+//! [`explain`] says in words what a file means, as `rohrpost check` prints it.
+//!
+//! ```
+//! use rohrpost_config::Installation;
+//! let text = r#"
+//! installation = "small"
+//! [system]
+//! name = "robot"
+//! id = 1
+//! [classes]
+//! mapper = { id = 96, text = "Draws the map" }
+//! tool = { id = 16 }
+//! [nodes.main]
+//! [[module]]
+//! name = "mapper.0"
+//! builtin = "mapper"
+//! calls = ["laser.0"]
+//! "#;
+//! let errors = Installation::parse(text, "small.toml".as_ref()).unwrap_err();
+//! assert_eq!(
+//!     errors.to_string(),
+//!     "small.toml:13: module `mapper.0` calls `laser.0`, which no [[module]] defines; add one, or drop it from `calls`"
+//! );
+//! ```
+//!
+//! Every key of the file is described in [`manual`].
+#![forbid(unsafe_code)]
+
+mod check;
+mod classes;
+mod digest;
+mod directory;
+mod errors;
+mod explain;
+mod flow;
+mod gui;
+mod installation;
+mod mailbox;
+mod module;
+mod node;
+mod output;
+mod program;
+mod reader;
+mod scheduling;
+mod settings;
+mod time;
+mod units;
+
+pub use classes::{ClassEntry, ClassTable, NameTextError, TOOL};
+pub use digest::Digest;
+pub use errors::{Errors, Problem};
+pub use explain::explain;
+pub use flow::Flow;
+pub use gui::{Gui, Show};
+pub use installation::Installation;
+pub use mailbox::{CLAIMS_MAX, Full, MailboxSpec, Mailboxes, SLOTS_MAX};
+pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, Start};
+pub use node::{Node, System};
+pub use output::{Level, Output};
+pub use program::{MissingProgram, find_program};
+pub use scheduling::{FIFO_MAX, Scheduling};
+pub use settings::SettingsError;
+pub use time::TimeSource;
+pub use units::{UnitError, duration_text, parse_duration, parse_size, size_text};
+
+#[doc = include_str!("../../docs/src/configuration.md")]
+pub mod manual {}

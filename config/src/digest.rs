@@ -1,0 +1,62 @@
+//! Digests by which routers and modules notice that they were started from different files.
+//!
+//! What is hashed is a canonical text of what must be equal, not the file: comments, order and spelling do not count.
+//! SipHash-2-4 under a fixed key gives the same on every node, compiler and release, which std's hasher does not promise.
+
+use crate::installation::Installation;
+use siphasher::sip::SipHasher24;
+use std::fmt::Write;
+use std::hash::Hasher;
+
+/// Digests of an installation. A difference is a mistake to report, naming both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Digest {
+    /// Equal wherever packages are exchanged: the classes, by id and name.
+    pub common: u64,
+    /// Equal inside a system: its nodes, their tool instances, and which module is where.
+    pub system: u64,
+}
+
+impl std::fmt::Display for Digest {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:016x}-{:016x}", self.common, self.system)
+    }
+}
+
+impl Installation {
+    /// The digests of what must be equal elsewhere.
+    pub fn digest(&self) -> Digest {
+        Digest { common: hash(&self.common_text()), system: hash(&self.system_text()) }
+    }
+
+    fn common_text(&self) -> String {
+        let mut text = String::from("rohrpost common 1\n");
+        for entry in self.classes.iter() {
+            // Writing into a String cannot fail.
+            let _ = writeln!(text, "class {} {}", entry.class.0, entry.name);
+        }
+        text
+    }
+
+    fn system_text(&self) -> String {
+        let mut lines = Vec::new();
+        for node in &self.nodes {
+            let address = node.address.as_deref().unwrap_or("-");
+            lines.push(format!("node {} {address:?} {} {}", node.name, node.tools.start(), node.tools.end()));
+        }
+        for module in &self.modules {
+            let mut names: Vec<String> = module.names().skip(1).map(|name| name.to_string()).collect();
+            names.sort();
+            lines.push(format!("module {} on {} faces {}", module.name, module.node, names.join(" ")));
+        }
+        lines.sort();
+        format!("rohrpost system 1\nsystem {} {:?}\n{}\n", self.system.id, self.system.name, lines.join("\n"))
+    }
+}
+
+fn hash(text: &str) -> u64 {
+    // `write`, not `Hash`: how `str` feeds a hasher may change with the compiler.
+    let mut hasher = SipHasher24::new();
+    hasher.write(text.as_bytes());
+    hasher.finish()
+}

@@ -1,0 +1,82 @@
+//! Who owns which module name: collected in a first pass, so that what a module refers to may stand below it.
+
+use crate::classes::{ClassTable, TOOL, class_of};
+use crate::reader::{Section, nearest};
+use rohrpost_mailbox::Name;
+use std::collections::BTreeMap;
+
+/// The names of all modules and faces of a file.
+pub(crate) struct Directory<'d> {
+    pub(crate) classes: &'d ClassTable,
+    /// By the text in the file. A name that is wrong in itself stays known: its own message is enough.
+    owners: BTreeMap<&'d str, Name>,
+}
+
+/// A text that names no module.
+pub(crate) struct Unknown {
+    nearest: Option<String>,
+}
+
+impl Unknown {
+    /// What would be right: the nearest name, or a new module, or what the caller says.
+    pub(crate) fn or(&self, otherwise: &str) -> String {
+        match &self.nearest {
+            Some(name) => format!("did you mean `{name}`? Otherwise add one, or {otherwise}"),
+            None => format!("add one, or {otherwise}"),
+        }
+    }
+}
+
+impl<'d> Directory<'d> {
+    pub(crate) fn read(modules: &[Section<'d>], classes: &'d ClassTable) -> Self {
+        let mut directory = Self { classes, owners: BTreeMap::new() };
+        let mut lines: BTreeMap<&str, usize> = BTreeMap::new();
+        for module in modules {
+            let name = module.required("name", "name = \"laser.0\"");
+            let name = name.and_then(|item| Some((item.text("laser.0")?, item.line)));
+            let faces = module.get("faces").map(|item| item.texts("odometry.0")).unwrap_or_default();
+            for (text, line) in name.into_iter().chain(faces) {
+                match lines.get(text) {
+                    Some(first) => module.reader.report(
+                        line,
+                        format!(
+                            "module `{text}` is defined in line {first} already; give one of them another instance"
+                        ),
+                    ),
+                    None => directory.add(module, text, line),
+                }
+                lines.entry(text).or_insert(line);
+            }
+        }
+        directory
+    }
+
+    fn add(&mut self, module: &Section<'d>, text: &'d str, line: usize) {
+        let name = self.classes.parse_module(text);
+        if let Err(error) = &name {
+            module.reader.report(line, error.to_string());
+        }
+        if class_of(text) == TOOL {
+            module.reader.report(
+                line,
+                format!(
+                    "module `{text}`: class `tool` is for programs run by hand; give the module a class of its own"
+                ),
+            );
+        }
+        self.owners.insert(text, name.unwrap_or_default());
+    }
+
+    /// The module or face that a text names.
+    pub(crate) fn find(&self, text: &str) -> Result<Name, Unknown> {
+        self.owners.get(text).copied().ok_or_else(|| {
+            // By class alone: `laser.0` and `mapper.0` are alike only in what every name has.
+            let owners = || self.owners.keys().copied();
+            let class = nearest(class_of(text), owners().map(class_of));
+            let like = owners().filter(|owner| Some(class_of(owner)) == class);
+            // Among several of that class, the one with the instance meant.
+            let nearest = like.min_by_key(|owner| owner[class_of(owner).len()..] != text[class_of(text).len()..]);
+            Unknown { nearest: nearest.map(Into::into) }
+        })
+    }
+}

@@ -1,0 +1,55 @@
+//! What is wrong with a configuration file: all of it at once, each with its line and what would be right.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// One mistake in a configuration file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Line in the file, counted from 1; none if the file could not be read at all.
+    pub line: Option<usize>,
+    /// What is wrong and what would be right.
+    pub message: String,
+}
+
+/// Everything that is wrong with one configuration file, by line.
+///
+/// Printed, each problem is one line: `demo.toml:41: module ...`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Errors {
+    path: PathBuf,
+    problems: Vec<Problem>,
+}
+
+impl Errors {
+    pub(crate) fn new(path: &Path, mut problems: Vec<Problem>) -> Self {
+        problems.sort_by_key(|problem| problem.line);
+        problems.dedup();
+        Self { path: path.to_owned(), problems }
+    }
+
+    /// The file, as it was named to [`Installation::load`](crate::Installation::load).
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The problems, sorted by line; never empty.
+    pub fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+}
+
+impl fmt::Display for Errors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, problem) in self.problems.iter().enumerate() {
+            let end_of_last = if index == 0 { "" } else { "\n" };
+            match problem.line {
+                Some(line) => write!(f, "{end_of_last}{}:{line}: {}", self.path.display(), problem.message)?,
+                None => write!(f, "{end_of_last}{}: {}", self.path.display(), problem.message)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Errors {}

@@ -1,0 +1,258 @@
+//! Says in words what an installation means: the page that `rohrpost check` prints, readable at 100 columns.
+
+use crate::installation::Installation;
+use crate::mailbox::{Full, MailboxSpec};
+use crate::module::{Module, Program, Restart, RestartPolicy, Start};
+use crate::node::Node;
+use crate::time::TimeSource;
+use crate::units::{duration_text, size_text};
+use rohrpost_mailbox::Name;
+use std::fmt::Write;
+
+const COLUMNS: usize = 100;
+/// Where the right-hand sides under a module begin.
+const INDENT: usize = 16;
+
+/// Explains an installation, or one node of it: what runs where, how urgent it is, what its mailboxes hold and do when
+/// full, and what happens when it ends.
+pub fn explain(installation: &Installation, node: Option<&str>) -> String {
+    let mut page = Page { installation, text: String::new() };
+    page.head();
+    page.classes();
+    for shown in installation.nodes.iter().filter(|shown| node.is_none_or(|name| name == shown.name)) {
+        page.node(shown);
+    }
+    if let Some(name) = node.filter(|name| installation.node(name).is_none()) {
+        let nodes: Vec<&str> = installation.nodes.iter().map(|node| node.name.as_str()).collect();
+        page.line("");
+        page.line(format!("There is no node `{name}`; the nodes are {}.", nodes.join(", ")));
+    }
+    page.output();
+    page.gui();
+    page.flows();
+    page.text
+}
+
+struct Page<'i> {
+    installation: &'i Installation,
+    text: String,
+}
+
+impl Page<'_> {
+    fn line(&mut self, line: impl AsRef<str>) {
+        self.text.push_str(line.as_ref().trim_end());
+        self.text.push('\n');
+    }
+
+    /// A line of a label and words, which go on below each other.
+    fn entry(&mut self, label: &str, words: &str) {
+        let mut line = format!("  {label:<width$}", width = INDENT - 2);
+        let mut first = true;
+        for word in words.split(' ') {
+            if !first && line.chars().count() + 1 + word.chars().count() > COLUMNS {
+                self.line(&line);
+                line = " ".repeat(INDENT);
+                first = true;
+            }
+            if !first {
+                line.push(' ');
+            }
+            line.push_str(word);
+            first = false;
+        }
+        self.line(line);
+    }
+
+    fn name(&self, name: Name) -> String {
+        self.installation.classes.format(name)
+    }
+
+    fn names(&self, names: impl Iterator<Item = Name>) -> String {
+        let names: Vec<String> = names.map(|name| self.name(name)).collect();
+        if names.is_empty() { "nobody".into() } else { names.join(", ") }
+    }
+
+    fn head(&mut self) {
+        let Installation { name, path, system, time, .. } = self.installation;
+        self.line(format!("Installation `{name}` ({})", path.display()));
+        self.line("");
+        self.entry("system", &format!("{} `{}`: the first byte of its mailbox names", system.id, system.name));
+        let time = match time {
+            TimeSource::Local => "the computer's clock".into(),
+            TimeSource::Simulation { speed } if *speed == 1.0 => "the simulation, as fast as real time".into(),
+            TimeSource::Simulation { speed } => format!("the simulation, {speed} times as fast as real time"),
+            TimeSource::Log => "the log that is replayed".into(),
+        };
+        self.entry("time", &time);
+        self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
+    }
+
+    fn classes(&mut self) {
+        let classes = &self.installation.classes;
+        let width = classes.iter().map(|entry| entry.name.len()).max().unwrap_or(0).max(5);
+        self.line("");
+        self.line("Classes. The id is the priority of all that a class sends; higher goes first, everywhere.");
+        self.line("");
+        self.line(format!("  {:>3}  {:width$}  {:13}  does", "id", "class", "runs as"));
+        for entry in classes.iter() {
+            let scheduling = self.installation.scheduling(entry.class);
+            self.line(format!("  {:>3}  {:width$}  {scheduling:13}  {}", entry.class.0, entry.name, entry.text));
+        }
+        self.line("");
+        self.line("SCHED_FIFO: real time, a higher number runs first. nice: not real time, a higher number gives way.");
+        self.line("Modules are started in the order below, and stopped in reverse.");
+    }
+
+    fn node(&mut self, node: &Node) {
+        let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
+        let memory = modules.iter().map(|module| memory(module)).sum();
+        self.line("");
+        self.line(format!("Node `{}`: {}, {} of mailboxes", node.name, count(modules.len(), "module"), about(memory)));
+        self.line("");
+        if let Some(address) = &node.address {
+            self.entry("address", address);
+        }
+        self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
+        let (first, last) = (node.tools.start(), node.tools.end());
+        self.entry("tools", &format!("programs run by hand are tool.{first} to tool.{last}"));
+        for module in modules {
+            self.module(module);
+        }
+    }
+
+    fn module(&mut self, module: &Module) {
+        let class = module.name.class();
+        self.line("");
+        self.line(format!("{}  priority {}, {}", self.name(module.name), class.0, self.installation.scheduling(class)));
+        if !module.faces.is_empty() {
+            self.entry("is also", &self.names(module.faces.iter().copied()));
+        }
+        self.entry("runs", &runs(module));
+        self.entry("starts", &starts(module));
+        self.entry("when it ends", &restart(&module.restart));
+        self.entry("calls", &self.names(module.calls.iter().copied()));
+        let callers =
+            self.installation.modules.iter().filter(|other| module.names().any(|own| other.calls.contains(&own)));
+        self.entry("called by", &self.names(callers.map(|caller| caller.name)));
+        if !module.settings.is_empty() {
+            let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+            self.entry("settings", &settings.join(", "));
+        }
+        for (key, spec) in module.mailboxes.each() {
+            self.entry(key, &mailbox(spec));
+        }
+    }
+
+    fn output(&mut self) {
+        let output = &self.installation.output;
+        self.line("");
+        let mut words =
+            format!("lines of level {} and above; the last {} are kept", output.level.as_str(), output.ring);
+        for (module, level) in &output.levels {
+            let _ = write!(words, "; {} from {}", self.name(*module), level.as_str());
+        }
+        if let Some(file) = &output.file {
+            let _ = write!(words, "; written to {} as well", file.display());
+        }
+        self.line("Output");
+        self.line("");
+        self.entry("keeps", &words);
+    }
+
+    fn gui(&mut self) {
+        let show = &self.installation.gui.show;
+        if show.is_empty() {
+            return;
+        }
+        self.line("");
+        self.line("GUI");
+        self.line("");
+        for show in show {
+            let rate = show.rate.map_or("each that comes".into(), |rate| format!("at most {rate} a second"));
+            self.entry("shows", &format!("{} of {}, {rate}", show.data, self.name(show.from)));
+        }
+    }
+
+    fn flows(&mut self) {
+        let flows = &self.installation.flows;
+        if flows.is_empty() {
+            return;
+        }
+        self.line("");
+        self.line("Flows");
+        self.line("");
+        for flow in flows {
+            let words = format!(
+                "{} to {}: {} every {}, there within {}",
+                self.name(flow.from),
+                self.name(flow.to),
+                size_text(flow.size.into()),
+                duration_text(flow.period),
+                duration_text(flow.deadline)
+            );
+            self.entry("plans", &words);
+        }
+    }
+}
+
+fn runs(module: &Module) -> String {
+    let what = match &module.program {
+        Program::Builtin(name) => format!("builtin `{name}`"),
+        Program::Command(words) => format!("program `{}`", words.join(" ")),
+    };
+    if module.optional { format!("{what}; left out with a notice, if there is no such program") } else { what }
+}
+
+fn starts(module: &Module) -> String {
+    let state = match module.start {
+        Start::On => "on",
+        Start::Off => "off, until it is switched on",
+    };
+    let (ready, stop) = (duration_text(module.ready_within), duration_text(module.stop_within));
+    format!("{state}; must be ready within {ready}, has {stop} to stop")
+}
+
+fn restart(restart: &Restart) -> String {
+    let (backoff, within) = (duration_text(restart.backoff), duration_text(restart.within));
+    let again = format!("starts again after {backoff}, at most {} times in {within}", restart.at_most);
+    match restart.policy {
+        RestartPolicy::Never => "stays ended".into(),
+        RestartPolicy::OnFailure => format!("{again}; stays ended when it meant to end"),
+        RestartPolicy::Always => again,
+    }
+}
+
+fn mailbox(spec: &MailboxSpec) -> String {
+    let full = match spec.full {
+        Full::Displace => "full: the least important gives way",
+        Full::Reject => "full: new ones are refused",
+    };
+    let (size, memory) = (size_text(spec.size.into()), about(spec.memory()));
+    let mut words = format!("{:>4} x {size:<7} = {memory:<9} {full}", spec.slots);
+    if let Some(age) = spec.max_age {
+        let _ = write!(words, "; stale after {}", duration_text(age));
+    }
+    if spec.claims > 1 {
+        let _ = write!(words, "; {} claims a sender", spec.claims);
+    }
+    words
+}
+
+/// Bytes of a module's mailboxes; each face has a command mailbox like the module's.
+fn memory(module: &Module) -> u64 {
+    let [commands, replies, data] = module.mailboxes.each().map(|(_, spec)| spec.memory());
+    commands * (1 + module.faces.len() as u64) + replies + data
+}
+
+/// A size in at most four digits.
+fn about(bytes: u64) -> String {
+    if bytes < 10 << 20 {
+        format!("{} KiB", bytes.div_ceil(1 << 10))
+    } else {
+        format!("{} MiB", bytes.div_ceil(1 << 20))
+    }
+}
+
+fn count(number: usize, noun: &str) -> String {
+    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
+}

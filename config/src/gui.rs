@@ -1,0 +1,54 @@
+//! What the GUI module draws.
+
+use crate::directory::Directory;
+use crate::reader::{Item, Section};
+use rohrpost_mailbox::Name;
+
+/// The section `[gui]`.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Gui {
+    /// What to draw.
+    pub show: Vec<Show>,
+}
+
+/// One kind of data that the GUI draws.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Show {
+    /// Module that it comes from.
+    pub from: Name,
+    /// Name of the data in the module's interface.
+    pub data: String,
+    /// Times a second at most; none: each one that comes.
+    pub rate: Option<f64>,
+    /// Line in the file.
+    pub line: usize,
+}
+
+impl Gui {
+    pub(crate) fn read(section: Option<Section<'_>>, directory: &Directory<'_>) -> Self {
+        let Some(section) = section else { return Self::default() };
+        let example = "[{ from = \"laser.0\", data = \"scan\", rate = 10.0 }]";
+        let items = section.get("show").and_then(|item| item.list(example)).unwrap_or_default();
+        let show = items.iter().filter_map(|item| Show::read(item, directory)).collect();
+        section.finish();
+        Self { show }
+    }
+}
+
+impl Show {
+    fn read(item: &Item<'_>, directory: &Directory<'_>) -> Option<Self> {
+        let section = item.section("[gui] show")?;
+        let from = section.required("from", "from = \"laser.0\"").and_then(|item| {
+            let text = item.text("laser.0")?;
+            let known = directory.find(text);
+            let missing = |unknown: &crate::directory::Unknown| {
+                item.report(format!("`{text}` is no [[module]]; {}", unknown.or("drop the entry")));
+            };
+            known.inspect_err(missing).ok()
+        });
+        let data = section.required("data", "data = \"scan\"").and_then(|item| item.text("scan"));
+        let rate = section.get("rate").and_then(|item| item.number(0.0..=1000.0, "10.0"));
+        section.finish();
+        Some(Self { from: from?, data: data?.into(), rate: rate.filter(|rate| *rate > 0.0), line: item.line })
+    }
+}

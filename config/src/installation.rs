@@ -1,0 +1,184 @@
+//! An installation as its file describes it, read and checked as a whole.
+
+use crate::check;
+use crate::classes::ClassTable;
+use crate::directory::Directory;
+use crate::errors::{Errors, Problem};
+use crate::flow::Flow;
+use crate::gui::Gui;
+use crate::module::{Context, Module};
+use crate::node::{Node, System};
+use crate::output::Output;
+use crate::reader::{Reader, Section};
+use crate::scheduling::{Scheduling, SchedulingRule};
+use crate::time::TimeSource;
+use rohrpost_mailbox::{Class, Name};
+use std::path::{Path, PathBuf};
+use toml::de::DeTable;
+
+/// What one configuration file describes. It exists only if everything in the file is right.
+#[derive(Clone, Debug)]
+pub struct Installation {
+    /// Its name.
+    pub name: String,
+    /// The file, as it was named to [`load`](Self::load).
+    pub path: PathBuf,
+    /// Folder of the file: relative paths in the file start here.
+    pub folder: PathBuf,
+    /// The file's text.
+    pub text: String,
+    /// The system it describes.
+    pub system: System,
+    /// The classes.
+    pub classes: ClassTable,
+    /// The nodes, in the order of the file; at least one.
+    pub nodes: Vec<Node>,
+    /// The modules, in the order of the file, which is the order of their start.
+    pub modules: Vec<Module>,
+    /// Where system time comes from.
+    pub time: TimeSource,
+    /// What the output service keeps.
+    pub output: Output,
+    /// What the GUI draws.
+    pub gui: Gui,
+    /// What passes regularly between modules.
+    pub flows: Vec<Flow>,
+    pub(crate) scheduling: SchedulingRule,
+}
+
+impl Installation {
+    /// Reads and checks a file.
+    pub fn load(path: &Path) -> Result<Self, Errors> {
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            let message = format!("cannot be read ({error}); name an installation's file, such as config/demo.toml");
+            Errors::new(path, vec![Problem { line: None, message }])
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Checks the text of a file; `path` is its name in messages and the place that relative paths start from.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, Errors> {
+        let reader = Reader::new(text);
+        let (document, syntax) = DeTable::parse_recoverable(text);
+        for error in &syntax {
+            let span = error.span().unwrap_or(0..0);
+            let there = text.get(span.clone()).unwrap_or_default();
+            let message = match error.message() {
+                "duplicate key" => format!("`{there}` is given twice; drop one of them"),
+                message => format!("this is no TOML: {}", message.replace('\n', " ")),
+            };
+            reader.report(reader.line(span), message);
+        }
+        // What the parser made up in place of what it could not read is not worth judging.
+        let read = if syntax.is_empty() { read(&reader, document.get_ref(), text, path) } else { None };
+        let problems = reader.into_problems();
+        match read {
+            Some(installation) if problems.is_empty() => Ok(installation),
+            _ => Err(Errors::new(path, problems)),
+        }
+    }
+
+    /// The module that has a name, as its own or as a face's. The name may be that of any of the module's mailboxes.
+    pub fn module(&self, name: Name) -> Option<&Module> {
+        self.modules.iter().find(|module| module.names().any(|own| own == name.module()))
+    }
+
+    /// The modules of a node, in the order of the file.
+    pub fn modules_on(&self, node: &str) -> impl Iterator<Item = &Module> {
+        self.modules.iter().filter(move |module| module.node == node)
+    }
+
+    /// The node of a name.
+    pub fn node(&self, name: &str) -> Option<&Node> {
+        self.nodes.iter().find(|node| node.name == name)
+    }
+
+    /// How the processes of a class are scheduled.
+    pub fn scheduling(&self, class: Class) -> Scheduling {
+        self.scheduling.of(class)
+    }
+
+    /// A path of the file as the process sees it: relative ones start from the file's folder.
+    pub fn resolve(&self, path: impl AsRef<Path>) -> PathBuf {
+        self.folder.join(path)
+    }
+}
+
+fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &Path) -> Option<Installation> {
+    let file = Section::new(reader, "", 1, table);
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    let name = file.required("installation", "installation = \"demo\"").and_then(|item| item.text("demo"));
+    let system = System::read(required(&file, "system", "`[system]` with `name = \"robot\"` and `id = 1`"));
+    let classes = ClassTable::read(
+        required(&file, "classes", "`[classes]` with lines such as `laser = { id = 150, text = \"Tells distances\" }`"),
+        system.id,
+    );
+    let scheduling = SchedulingRule::read(file.section("scheduling", "[scheduling]"));
+    let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
+    let time = TimeSource::read(file.section("time", "[time]"));
+
+    let sections = sections(&file, "module");
+    if sections.is_empty() {
+        file.report("no module; add one: `[[module]]` with `name` and `builtin` or `program`");
+    }
+    let directory = Directory::read(&sections, &classes);
+    let context = Context { directory: &directory, nodes: &nodes };
+    let read = sections.into_iter().enumerate().filter_map(|(index, section)| context.read(section, index));
+    let (modules, lines): (Vec<Module>, Vec<_>) = read.unzip();
+
+    let output = Output::read(file.section("output", "[output]"), &directory, &folder);
+    let gui = Gui::read(file.section("gui", "[gui]"), &directory);
+    let flow_sections = self::sections(&file, "flow").into_iter();
+    let flows = flow_sections.filter_map(|section| Flow::read(section, &directory)).collect();
+    file.finish();
+
+    let name = name?.into();
+    let (path, text) = (path.to_owned(), text.to_owned());
+    let installation = Installation {
+        name,
+        path,
+        folder,
+        text,
+        system,
+        classes,
+        nodes,
+        modules,
+        time,
+        output,
+        gui,
+        flows,
+        scheduling,
+    };
+    check::claims(&installation, &lines, reader);
+    Some(installation)
+}
+
+fn required<'d>(file: &Section<'d>, key: &'static str, right: &str) -> Option<Section<'d>> {
+    let item = file.get(key);
+    if item.is_none() {
+        file.report(format!("section `[{key}]` is missing; add {right}"));
+    }
+    item?.section(&format!("[{key}]"))
+}
+
+/// The tables of an array: every `[[key]]`.
+fn sections<'d>(file: &Section<'d>, key: &'static str) -> Vec<Section<'d>> {
+    let Some(item) = file.get(key) else { return Vec::new() };
+    let header = format!("[[{key}]]");
+    let Some(tables) = item.value.get_ref().as_array() else {
+        item.report(format!("write `{header}`, with two brackets: there may be several"));
+        return Vec::new();
+    };
+    let section = |value: &'d toml::Spanned<toml::de::DeValue<'d>>| {
+        let line = file.reader.line(value.span());
+        let Some(table) = value.get_ref().as_table() else {
+            file.reader.report(line, format!("`{key}` holds something that is no table; write `{header}`"));
+            return None;
+        };
+        Some(Section::new(file.reader, &header, line, table))
+    };
+    tables.iter().filter_map(section).collect()
+}

@@ -1,0 +1,105 @@
+//! How large the mailboxes of a module are and what they do when full.
+
+use crate::reader::Section;
+use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES};
+use std::time::Duration;
+
+/// Most slots of one mailbox.
+pub const SLOTS_MAX: u16 = 1024;
+/// Most unfinished claims of one participant.
+pub const CLAIMS_MAX: u8 = 16;
+
+/// What happens when a package comes to a full mailbox.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Full {
+    /// The newest of the least important gives way to a more important one.
+    Displace,
+    /// The package that comes is refused.
+    Reject,
+}
+
+/// One mailbox of a module.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MailboxSpec {
+    /// Packages it holds, 1..=[`SLOTS_MAX`].
+    pub slots: u16,
+    /// Largest body in bytes, 1..=65519.
+    pub size: u32,
+    /// What happens when it is full.
+    pub full: Full,
+    /// Older packages are dropped when the module receives.
+    pub max_age: Option<Duration>,
+    /// Unfinished claims that one participant may hold, 1..=[`CLAIMS_MAX`].
+    pub claims: u8,
+}
+
+impl MailboxSpec {
+    /// Bytes that the slots take: each a head and a body, in whole cache lines. The mailbox's own bookkeeping comes on
+    /// top, a page or two.
+    pub fn memory(&self) -> u64 {
+        u64::from(self.slots) * (u64::from(self.size) + HEAD_BYTES as u64).next_multiple_of(64)
+    }
+}
+
+/// The mailboxes that every module has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mailboxes {
+    /// Takes commands (local id 0).
+    pub commands: MailboxSpec,
+    /// Takes the replies to the module's own commands (local id 1).
+    pub replies: MailboxSpec,
+    /// Takes what the module subscribed to (local id 2).
+    pub data: MailboxSpec,
+}
+
+impl Default for Mailboxes {
+    fn default() -> Self {
+        let spec = |slots, size| MailboxSpec { slots, size, full: Full::Displace, max_age: None, claims: 1 };
+        Self { commands: spec(32, 1024), replies: spec(32, 4096), data: spec(64, 4096) }
+    }
+}
+
+/// Lines at which the mailboxes of a module stand, for checks across modules.
+#[derive(Clone, Copy)]
+pub(crate) struct MailboxLines(pub(crate) [usize; 3]);
+
+impl Mailboxes {
+    /// The three, with the names that the file gives them.
+    pub fn each(&self) -> [(&'static str, &MailboxSpec); 3] {
+        [("commands", &self.commands), ("replies", &self.replies), ("data", &self.data)]
+    }
+
+    pub(crate) fn read(section: Option<Section<'_>>, module: &str, module_line: usize) -> (Self, MailboxLines) {
+        let mut mailboxes = Self::default();
+        let mut lines = MailboxLines([module_line; 3]);
+        let Some(section) = section else { return (mailboxes, lines) };
+        let specs = [&mut mailboxes.commands, &mut mailboxes.replies, &mut mailboxes.data];
+        for ((key, spec), line) in ["commands", "replies", "data"].into_iter().zip(specs).zip(&mut lines.0) {
+            if let Some(section) = section.section(key, &format!("{module}, mailbox `{key}`")) {
+                *line = section.line;
+                spec.read(section, line);
+            }
+        }
+        section.finish();
+        (mailboxes, lines)
+    }
+}
+
+impl MailboxSpec {
+    /// Changes what the section says and keeps the rest.
+    fn read(&mut self, section: Section<'_>, line: &mut usize) {
+        if let Some(item) = section.get("slots") {
+            *line = item.line;
+            self.slots = item.whole(1..=SLOTS_MAX.into(), self.slots.into()).map_or(self.slots, |slots| slots as u16);
+        }
+        let size = section.get("size").and_then(|item| item.size(1..=BODY_BYTES_MAX as u64, "1 KiB"));
+        self.size = size.map_or(self.size, |size| size as u32);
+        let full =
+            section.get("full").and_then(|item| item.choice(&[("displace", Full::Displace), ("reject", Full::Reject)]));
+        self.full = full.unwrap_or(self.full);
+        self.max_age = section.get("max-age").and_then(|item| item.duration_above_zero("2 s"));
+        let claims = section.get("claims").and_then(|item| item.whole(1..=CLAIMS_MAX.into(), 1));
+        self.claims = claims.map_or(self.claims, |claims| claims as u8);
+        section.finish();
+    }
+}

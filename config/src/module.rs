@@ -1,0 +1,291 @@
+//! Modules: what runs where, with which settings, and what happens when it ends.
+
+use crate::directory::Directory;
+use crate::mailbox::{MailboxLines, Mailboxes};
+use crate::node::Node;
+use crate::reader::{Item, Section, nearest};
+use rohrpost_mailbox::Name;
+use serde::Deserialize;
+use std::time::Duration;
+
+/// The modules that the `rohrpost` program itself contains.
+pub const BUILTINS: [&str; 5] = ["sim", "carmen", "mapper", "pilot", "output"];
+
+/// What runs as a module.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Program {
+    /// One of [`BUILTINS`].
+    Builtin(String),
+    /// A program and its arguments.
+    Command(Vec<String>),
+}
+
+/// Whether a module works after launch, or waits to be switched on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Start {
+    /// Works at once.
+    #[default]
+    On,
+    /// Waits for the command `on`.
+    Off,
+}
+
+/// When an ended module is started again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RestartPolicy {
+    /// It stays ended.
+    Never,
+    /// When it failed: a signal, or an exit code that is not 0.
+    OnFailure,
+    /// However it ended.
+    Always,
+}
+
+/// When, how soon and how often a module is started again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Restart {
+    /// After which end.
+    pub policy: RestartPolicy,
+    /// Wait before it.
+    pub backoff: Duration,
+    /// Restarts within [`within`](Self::within) before launch gives the module up.
+    pub at_most: u32,
+    /// Time in which restarts are counted.
+    pub within: Duration,
+}
+
+impl Default for Restart {
+    fn default() -> Self {
+        Self {
+            policy: RestartPolicy::OnFailure,
+            backoff: Duration::from_millis(200),
+            at_most: 5,
+            within: Duration::from_secs(60),
+        }
+    }
+}
+
+/// One `[[module]]`.
+#[derive(Clone, Debug)]
+pub struct Module {
+    /// Its name.
+    pub name: Name,
+    /// Further names that its process hosts.
+    pub faces: Vec<Name>,
+    /// Node that it runs on.
+    pub node: String,
+    /// What runs.
+    pub program: Program,
+    /// Whether it is left out with a notice when its program does not exist.
+    pub optional: bool,
+    /// Modules and faces it sends commands to; subscribing is a command too.
+    pub calls: Vec<Name>,
+    /// Settings of its own; [`Installation::settings_as`](crate::Installation::settings_as) gives them a type.
+    pub settings: toml::Table,
+    /// State after launch.
+    pub start: Start,
+    /// What happens when it ends.
+    pub restart: Restart,
+    /// Time from start to ready, at most.
+    pub ready_within: Duration,
+    /// Time from being told to end until it is killed.
+    pub stop_within: Duration,
+    /// Its mailboxes.
+    pub mailboxes: Mailboxes,
+    /// Line of its `[[module]]` in the file.
+    pub line: usize,
+    /// Which `[[module]]` of the file it is, counted from 0.
+    pub(crate) index: usize,
+}
+
+impl Module {
+    /// Its name and the names of its faces.
+    pub fn names(&self) -> impl Iterator<Item = Name> {
+        std::iter::once(self.name).chain(self.faces.iter().copied())
+    }
+}
+
+/// What a module refers to, looked up.
+pub(crate) struct Context<'d> {
+    pub(crate) directory: &'d Directory<'d>,
+    pub(crate) nodes: &'d [Node],
+}
+
+impl Context<'_> {
+    /// Reads a module; none if what no default can stand in for is missing. The reader knows why then.
+    pub(crate) fn read(&self, section: Section<'_>, index: usize) -> Option<(Module, MailboxLines)> {
+        let name_text = section.get("name").and_then(|item| item.value.get_ref().as_str());
+        let what = name_text.map_or("[[module]]".into(), |name| format!("module `{name}`"));
+        let section = section.called(&what);
+        let name = name_text.and_then(|text| self.directory.find(text).ok());
+        let faces = section.get("faces").map(|item| self.faces(&item)).unwrap_or_default();
+        let node = self.node(&section);
+        let program = program(&section);
+        let optional = section.get("optional").and_then(|item| item.flag()).unwrap_or(false);
+        let calls = section.get("calls").map(|item| self.calls(&item, &what)).unwrap_or_default();
+        let settings = settings(&section).unwrap_or_default();
+        let start = section.get("start").and_then(|item| item.choice(&[("on", Start::On), ("off", Start::Off)]));
+        let restart = section.get("restart").map(|item| Restart::read(&item, &what)).unwrap_or_default();
+        let ready_within = section.get("ready-within").and_then(|item| item.duration_above_zero("10 s"));
+        let stop_within = section.get("stop-within").and_then(|item| item.duration_above_zero("2 s"));
+        let boxes = section.section("mailbox", &format!("{what}, mailbox"));
+        let (mailboxes, lines) = Mailboxes::read(boxes, &what, section.line);
+        let line = section.line;
+        section.finish();
+        let module = Module {
+            name: name?,
+            faces,
+            node: node?,
+            program: program?,
+            optional,
+            calls,
+            settings,
+            start: start.unwrap_or_default(),
+            restart,
+            ready_within: ready_within.unwrap_or(Duration::from_secs(10)),
+            stop_within: stop_within.unwrap_or(Duration::from_secs(2)),
+            mailboxes,
+            line,
+            index,
+        };
+        Some((module, lines))
+    }
+
+    /// The directory has read and judged the texts already.
+    fn faces(&self, item: &Item<'_>) -> Vec<Name> {
+        let texts = item.value.get_ref().as_array().into_iter().flatten().filter_map(|face| face.get_ref().as_str());
+        texts.filter_map(|text| self.directory.find(text).ok()).collect()
+    }
+
+    fn node(&self, section: &Section<'_>) -> Option<String> {
+        let names = || self.nodes.iter().map(|node| node.name.as_str());
+        let Some(item) = section.get("node") else {
+            return match self.nodes {
+                [only] => Some(only.name.clone()),
+                [] => None,
+                _ => {
+                    let names: Vec<String> = names().map(|name| format!("\"{name}\"")).collect();
+                    section.report(format!(
+                        "`node` is missing, and there are several; write `node = ` and one of {}",
+                        names.join(", ")
+                    ));
+                    None
+                }
+            };
+        };
+        let name = item.text("main")?;
+        if !names().any(|known| known == name) {
+            let right = match nearest(name, names()) {
+                Some(known) => format!("did you mean `{known}`? Otherwise add `[nodes.{name}]`"),
+                None => format!("the nodes are {}; or add `[nodes.{name}]`", names().collect::<Vec<_>>().join(", ")),
+            };
+            item.report(format!("there is no node `{name}`; {right}"));
+            return None;
+        }
+        Some(name.into())
+    }
+
+    fn calls(&self, item: &Item<'_>, what: &str) -> Vec<Name> {
+        let mut calls = Vec::new();
+        for (text, line) in item.texts("motor.0") {
+            match self.directory.find(text) {
+                Ok(name) if calls.contains(&name) && name != Name::NONE => {
+                    item.reader.report(line, format!("{what} names `{text}` twice in `calls`; drop one"));
+                }
+                Ok(name) => calls.push(name),
+                Err(unknown) => item.reader.report(
+                    line,
+                    format!(
+                        "{what} calls `{text}`, which no [[module]] defines; {}",
+                        unknown.or("drop it from `calls`")
+                    ),
+                ),
+            }
+        }
+        calls
+    }
+}
+
+fn program(section: &Section<'_>) -> Option<Program> {
+    match (section.get("builtin"), section.get("program")) {
+        (Some(item), None) => {
+            let text = item.text("sim")?;
+            if BUILTINS.contains(&text) {
+                return Some(Program::Builtin(text.into()));
+            }
+            let right = match nearest(text, BUILTINS) {
+                Some(name) => format!("did you mean `{name}`?"),
+                None => format!("there are {}; a program of your own goes into `program`", BUILTINS.join(", ")),
+            };
+            item.report(format!("there is no builtin `{text}`; {right}"));
+            None
+        }
+        (None, Some(item)) => command(&item).map(Program::Command),
+        (Some(_), Some(item)) => {
+            item.report("`builtin` and `program` are both given; a module runs as one of them, drop the other");
+            None
+        }
+        (None, None) => {
+            section
+                .report("neither `builtin` nor `program` is given; write what runs, such as `program = \"./compass\"`");
+            None
+        }
+    }
+}
+
+fn command(item: &Item<'_>) -> Option<Vec<String>> {
+    let example = "[\"./compass\", \"--port\", \"/dev/ttyS0\"]";
+    if let Some(text) = item.value.get_ref().as_str() {
+        // No shell reads it, so that nobody has to know which quotes it would take.
+        if text.trim().is_empty() || text.contains(char::is_whitespace) {
+            item.report(format!(
+                "`program` \"{text}\" is no single program; write program and arguments as a list, `program = {example}`"
+            ));
+            return None;
+        }
+        return Some(vec![text.into()]);
+    }
+    let words = item.list(example)?;
+    let words: Option<Vec<String>> = words.iter().map(|word| Some(word.value.get_ref().as_str()?.into())).collect();
+    let words = words.filter(|words| words.first().is_some_and(|program| !program.is_empty()));
+    if words.is_none() {
+        item.report(format!("`program` is a list of texts, the program first; write `program = {example}`"));
+    }
+    words
+}
+
+fn settings(section: &Section<'_>) -> Option<toml::Table> {
+    let item = section.get("settings")?;
+    item.section("")?;
+    let settings = toml::Table::deserialize(toml::de::ValueDeserializer::from(item.value.clone()));
+    let wrong = |error: &toml::de::Error| {
+        let line = error.span().map_or(item.line, |span| item.reader.line(span));
+        item.reader.report(line, format!("{}: settings: {}", section.what, error.message()));
+    };
+    settings.inspect_err(wrong).ok()
+}
+
+impl Restart {
+    fn read(item: &Item<'_>, what: &str) -> Self {
+        let mut restart = Self::default();
+        let words = [
+            ("never", RestartPolicy::Never),
+            ("on-failure", RestartPolicy::OnFailure),
+            ("always", RestartPolicy::Always),
+        ];
+        if !item.is_table() {
+            restart.policy = item.choice(&words).unwrap_or(restart.policy);
+            return restart;
+        }
+        let Some(section) = item.section(&format!("{what}, restart")) else { return restart };
+        restart.policy = section.get("policy").and_then(|item| item.choice(&words)).unwrap_or(restart.policy);
+        let backoff = section.get("backoff").and_then(|item| item.duration("200 ms"));
+        restart.backoff = backoff.unwrap_or(restart.backoff);
+        let at_most = section.get("at-most").and_then(|item| item.whole(1..=1000, 5));
+        restart.at_most = at_most.map_or(restart.at_most, |at_most| at_most as u32);
+        let within = section.get("within").and_then(|item| item.duration_above_zero("60 s"));
+        restart.within = within.unwrap_or(restart.within);
+        section.finish();
+        restart
+    }
+}

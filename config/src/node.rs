@@ -1,0 +1,132 @@
+//! The system and its nodes: which computers there are, and which tool instances each may hand out.
+
+use crate::classes::is_word;
+use crate::reader::{Item, Section};
+use std::ops::RangeInclusive;
+
+/// One robot or station.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct System {
+    /// Its name.
+    pub name: String,
+    /// First byte of the names of its mailboxes, 1..=254.
+    pub id: u8,
+}
+
+/// One computer of a system.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// Its name: `main` of `[nodes.main]`.
+    pub name: String,
+    /// Where other nodes reach it; routers use it.
+    pub address: Option<String>,
+    /// Permission bits of its shared-memory directory.
+    pub mode: u32,
+    /// Instances of class `tool` that programs run by hand on this node may take.
+    pub tools: RangeInclusive<u8>,
+    /// Line in the file.
+    pub line: usize,
+}
+
+impl System {
+    pub(crate) fn read(section: Option<Section<'_>>) -> Self {
+        let mut system = Self { name: "robot".into(), id: 1 };
+        let Some(section) = section else { return system };
+        if let Some(name) = section.required("name", "name = \"robot\"").and_then(|item| item.text("robot")) {
+            system.name = name.into();
+        }
+        // 0 means one's own system, 255 all systems.
+        if let Some(id) = section.required("id", "id = 1").and_then(|item| item.whole(1..=254, 1)) {
+            system.id = id as u8;
+        }
+        section.finish();
+        system
+    }
+}
+
+impl Node {
+    pub(crate) fn read_all(section: Option<Section<'_>>) -> Vec<Self> {
+        let Some(section) = section else { return Vec::new() };
+        let items = section.entries();
+        if items.is_empty() {
+            section.report("no node; add one, such as `[nodes.main]`");
+        }
+        let mut nodes: Vec<Self> = Vec::new();
+        for item in &items {
+            let node = Self::read(item, items.len() == 1, &nodes);
+            nodes.extend(node);
+        }
+        nodes
+    }
+
+    fn read(item: &Item<'_>, alone: bool, earlier: &[Self]) -> Option<Self> {
+        let name = item.key.clone();
+        if !is_word(&name) {
+            item.report(format!("`{name}` is no node name; use lower-case letters, digits and `-`, a letter first"));
+        }
+        let section = item.section(&format!("node `{name}`"))?;
+        let address = section.get("address").and_then(|item| item.text("192.168.0.1")).map(Into::into);
+        let mode = section.get("mode").and_then(|item| read_mode(&item)).unwrap_or(0o700);
+        let tools = match section.get("tools") {
+            Some(item) => read_tools(&item, earlier),
+            None if alone => Some(0..=63),
+            None => {
+                section.report(format!(
+                    "`tools` is missing: with several nodes each needs tool instances of its own; write `tools = {}`",
+                    free_tools(earlier)
+                ));
+                None
+            }
+        };
+        section.finish();
+        Some(Self { name, address, mode, tools: tools.unwrap_or(0..=63), line: item.line })
+    }
+}
+
+fn read_mode(item: &Item<'_>) -> Option<u32> {
+    let text = item.text("0700")?;
+    let mode = u32::from_str_radix(text, 8).ok().filter(|mode| *mode <= 0o777 && mode & 0o700 == 0o700);
+    if mode.is_none() {
+        item.report(format!(
+            "`mode` \"{text}\" would lock its owner out or is not octal; write \"0700\" (only this user) or \"0770\" (its group)"
+        ));
+    }
+    mode
+}
+
+fn read_tools(item: &Item<'_>, earlier: &[Node]) -> Option<RangeInclusive<u8>> {
+    let bounds = item.list("[0, 63]")?;
+    let [first, last] = &bounds[..] else {
+        item.report(format!(
+            "`tools` has {} numbers; write the first and the last instance, `tools = [0, 63]`",
+            bounds.len()
+        ));
+        return None;
+    };
+    let (first, last) = (first.whole(0..=255, 0)? as u8, last.whole(0..=255, 63)? as u8);
+    if first > last {
+        item.report(format!("`tools` ends before it begins; write `tools = [{last}, {first}]`"));
+        return None;
+    }
+    if let Some(other) = earlier.iter().find(|node| *node.tools.start() <= last && first <= *node.tools.end()) {
+        item.report(format!(
+            "`tools` [{first}, {last}] overlaps those of node `{}`, [{}, {}], and a tool instance is on one node; \
+             write for example `tools = {}`",
+            other.name,
+            other.tools.start(),
+            other.tools.end(),
+            free_tools(earlier)
+        ));
+    }
+    Some(first..=last)
+}
+
+/// A range that no earlier node has, as the file writes it.
+fn free_tools(earlier: &[Node]) -> String {
+    let last = earlier.iter().map(|node| *node.tools.end()).max();
+    match last {
+        Some(255) => "[...]` and take smaller ranges on the others, such as `[0, 63]".into(),
+        Some(last) => format!("[{}, {}]", last + 1, last.saturating_add(64)),
+        None => "[0, 63]".into(),
+    }
+}

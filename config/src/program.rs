@@ -1,0 +1,119 @@
+//! Where the program of a module is on this computer. Only the node that runs a module asks.
+
+use crate::installation::Installation;
+use crate::module::Program;
+use rohrpost_mailbox::Name;
+use std::ffi::OsStr;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+/// A module whose program is not on this computer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MissingProgram {
+    /// The module.
+    pub module: Name,
+    /// Whether the module may be left out.
+    pub optional: bool,
+    /// The program, as the file names it.
+    pub program: String,
+    /// What to tell the user, with file and line.
+    pub message: String,
+}
+
+impl std::fmt::Display for MissingProgram {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+/// Finds a module's program: with a slash it is a path from `folder`, the configuration file's; a bare name is looked for
+/// in `beside`, the folder of our own executable, and then on PATH.
+pub fn find_program(program: &str, folder: &Path, beside: &Path) -> Option<PathBuf> {
+    find(program, folder, beside, std::env::var_os("PATH").as_deref())
+}
+
+fn find(program: &str, folder: &Path, beside: &Path, search: Option<&OsStr>) -> Option<PathBuf> {
+    if program.contains('/') {
+        return Some(below(folder, program)).filter(|path| is_program(path));
+    }
+    let on_path: Vec<PathBuf> = search.map(|search| std::env::split_paths(search).collect()).unwrap_or_default();
+    let folders = std::iter::once(beside.to_owned()).chain(on_path);
+    folders.map(|folder| folder.join(program)).find(|path| is_program(path))
+}
+
+/// Without the `./` that only says "not on PATH".
+fn below(folder: &Path, program: &str) -> PathBuf {
+    folder.join(program.strip_prefix("./").unwrap_or(program))
+}
+
+fn is_program(path: &Path) -> bool {
+    path.metadata().is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
+}
+
+impl Installation {
+    /// The modules of a node whose programs are not on this computer, in the order of the file. `beside` is the folder of
+    /// our own executable.
+    pub fn missing_programs(&self, node: &str, beside: &Path) -> Vec<MissingProgram> {
+        let mut missing = Vec::new();
+        for module in self.modules_on(node) {
+            let Program::Command(words) = &module.program else { continue };
+            let Some(program) = words.first() else { continue };
+            if find_program(program, &self.folder, beside).is_some() {
+                continue;
+            }
+            let place = if program.contains('/') {
+                format!("is no program at {}", below(&self.folder, program).display())
+            } else {
+                format!("is neither in {} nor on PATH", beside.display())
+            };
+            let right = if module.optional {
+                "the module is left out, since it is optional"
+            } else {
+                "build or install it, or correct `program`"
+            };
+            missing.push(MissingProgram {
+                module: module.name,
+                optional: module.optional,
+                program: program.clone(),
+                message: format!(
+                    "{}:{}: module `{}`: `{program}` {place}; {right}",
+                    self.path.display(),
+                    module.line,
+                    self.classes.format(module.name)
+                ),
+            });
+        }
+        missing
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn programs_are_found_where_the_file_says() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |path: &str| root.path().join(path);
+        for (path, mode) in
+            [("conf/own", 0o755), ("bin/both", 0o755), ("path/both", 0o755), ("path/far", 0o755), ("bin/text", 0o644)]
+        {
+            fs::create_dir_all(at(path).parent().unwrap()).unwrap();
+            fs::write(at(path), "").unwrap();
+            fs::set_permissions(at(path), fs::Permissions::from_mode(mode)).unwrap();
+        }
+        for (program, found, why) in [
+            ("./own", Some("conf/own"), "with a slash: from the file's folder"),
+            ("../path/far", Some("conf/../path/far"), "and out of it"),
+            ("own", None, "a bare name is not looked for in the file's folder"),
+            ("both", Some("bin/both"), "beside our executable comes first"),
+            ("far", Some("path/far"), "then PATH"),
+            ("text", None, "what cannot be executed is no program"),
+            ("./", None, "nor is a folder"),
+        ] {
+            let result = find(program, &at("conf"), &at("bin"), Some(at("path").as_os_str()));
+            assert_eq!(result, found.map(at), "{why}");
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! Walks the parsed TOML with its places in the file, and collects every problem instead of stopping at the first.
+//!
+//! A [`Section`] is asked for its keys one by one; the keys asked for are the known ones, so that [`Section::finish`] can
+//! name any other. A wrong value is reported and read as missing: the defaults that then stand in never leave this
+//! crate, since a file with problems gives no installation.
+
+use crate::errors::Problem;
+use crate::units;
+use std::cell::RefCell;
+use std::ops::{Range, RangeInclusive};
+use std::time::Duration;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// No duration in a file is longer: past it, somebody has mistaken the unit.
+const DURATION_MAX: Duration = Duration::from_secs(24 * 3600);
+
+/// The file being read and what was found wrong so far.
+pub(crate) struct Reader<'d> {
+    text: &'d str,
+    problems: RefCell<Vec<Problem>>,
+}
+
+impl<'d> Reader<'d> {
+    pub(crate) fn new(text: &'d str) -> Self {
+        Self { text, problems: RefCell::default() }
+    }
+
+    /// Line of a place in the text, counted from 1.
+    pub(crate) fn line(&self, span: Range<usize>) -> usize {
+        line_of(self.text, span.start)
+    }
+
+    pub(crate) fn report(&self, line: usize, message: impl Into<String>) {
+        self.problems.borrow_mut().push(Problem { line: Some(line), message: message.into() });
+    }
+
+    pub(crate) fn into_problems(self) -> Vec<Problem> {
+        self.problems.into_inner()
+    }
+}
+
+/// Line of a byte of the text, counted from 1. A place past the end is the last line that says something.
+pub(crate) fn line_of(text: &str, offset: usize) -> usize {
+    let text = text.trim_end();
+    let before = &text.as_bytes()[..offset.min(text.len())];
+    1 + before.iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// A table of the file.
+pub(crate) struct Section<'d> {
+    pub(crate) reader: &'d Reader<'d>,
+    /// How messages call it: `[system]`, "module `arm.0`". Empty for the file itself.
+    pub(crate) what: String,
+    pub(crate) line: usize,
+    table: &'d DeTable<'d>,
+    asked: RefCell<Vec<&'static str>>,
+}
+
+impl<'d> Section<'d> {
+    pub(crate) fn new(reader: &'d Reader<'d>, what: &str, line: usize, table: &'d DeTable<'d>) -> Self {
+        Self { reader, what: what.into(), line, table, asked: RefCell::default() }
+    }
+
+    /// The same section under the name that messages should call it from now on.
+    pub(crate) fn called(self, what: &str) -> Self {
+        Self { what: what.into(), ..self }
+    }
+
+    /// The value of a key. Whoever asks for a key makes it known.
+    pub(crate) fn get(&self, key: &'static str) -> Option<Item<'d>> {
+        if !self.asked.borrow().contains(&key) {
+            self.asked.borrow_mut().push(key);
+        }
+        let (key, value) = self.table.get_key_value(key)?;
+        Some(self.item(key.get_ref(), self.reader.line(key.span()), value))
+    }
+
+    /// The value of a key that may not be missing; `example` is what to write.
+    pub(crate) fn required(&self, key: &'static str, example: &str) -> Option<Item<'d>> {
+        let item = self.get(key);
+        if item.is_none() {
+            self.report(format!("`{key}` is missing; write for example `{example}`"));
+        }
+        item
+    }
+
+    /// All entries of a table whose keys are free, in the order of the file.
+    pub(crate) fn entries(&self) -> Vec<Item<'d>> {
+        let mut entries: Vec<_> = self.table.iter().collect();
+        entries.sort_by_key(|(key, _)| key.span().start);
+        entries.iter().map(|(key, value)| self.item(key.get_ref(), self.reader.line(key.span()), value)).collect()
+    }
+
+    /// A table below this one, if it is there.
+    pub(crate) fn section(&self, key: &'static str, what: &str) -> Option<Self> {
+        self.get(key)?.section(what)
+    }
+
+    /// Names every key that was not asked for.
+    pub(crate) fn finish(self) {
+        let asked = self.asked.borrow();
+        for item in self.entries() {
+            if !asked.iter().any(|key| *key == item.key) {
+                item.report(match nearest(&item.key, asked.iter().copied()) {
+                    Some(key) => format!("unknown key `{}`; did you mean `{key}`?", item.key),
+                    None => format!("unknown key `{}`; the keys are {}", item.key, asked.join(", ")),
+                });
+            }
+        }
+    }
+
+    pub(crate) fn report(&self, message: impl AsRef<str>) {
+        self.reader.report(self.line, prefixed(&self.what, message.as_ref()));
+    }
+
+    fn item(&self, key: &str, line: usize, value: &'d Spanned<DeValue<'d>>) -> Item<'d> {
+        Item { reader: self.reader, what: self.what.clone(), key: key.into(), line, value }
+    }
+}
+
+/// The value of a key, or one element of a list.
+pub(crate) struct Item<'d> {
+    pub(crate) reader: &'d Reader<'d>,
+    pub(crate) what: String,
+    pub(crate) key: String,
+    pub(crate) line: usize,
+    pub(crate) value: &'d Spanned<DeValue<'d>>,
+}
+
+impl<'d> Item<'d> {
+    pub(crate) fn report(&self, message: impl AsRef<str>) {
+        self.reader.report(self.line, prefixed(&self.what, message.as_ref()));
+    }
+
+    /// Reports a value of the wrong kind or out of its range; returns nothing, for `?` and tails.
+    fn wrong<T>(&self, right: &str) -> Option<T> {
+        self.report(format!("`{}` is {}; write {right}", self.key, shown(self.value.get_ref())));
+        None
+    }
+
+    pub(crate) fn text(&self, example: &str) -> Option<&'d str> {
+        match self.value.get_ref().as_str() {
+            Some("") => self.wrong(&format!("for example `{} = \"{example}\"`", self.key)),
+            Some(text) => Some(text),
+            None => self.wrong(&format!("text in quotes, such as `{} = \"{example}\"`", self.key)),
+        }
+    }
+
+    pub(crate) fn flag(&self) -> Option<bool> {
+        self.value.get_ref().as_bool().or_else(|| self.wrong("true or false"))
+    }
+
+    pub(crate) fn whole(&self, range: RangeInclusive<i64>, example: i64) -> Option<i64> {
+        let number = self.value.get_ref().as_integer().and_then(|i| i64::from_str_radix(i.as_str(), i.radix()).ok());
+        number.filter(|number| range.contains(number)).or_else(|| {
+            let (first, last) = (range.start(), range.end());
+            self.wrong(&format!("a whole number from {first} to {last}, such as `{} = {example}`", self.key))
+        })
+    }
+
+    pub(crate) fn number(&self, range: RangeInclusive<f64>, example: &str) -> Option<f64> {
+        let number: Option<f64> = match self.value.get_ref() {
+            DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok().map(|i| i as f64),
+            DeValue::Float(f) => f.as_str().parse().ok(),
+            _ => None,
+        };
+        number.filter(|number| range.contains(number)).or_else(|| {
+            let (first, last) = (range.start(), range.end());
+            self.wrong(&format!("a number from {first} to {last}, such as `{} = {example}`", self.key))
+        })
+    }
+
+    /// One of a few words.
+    pub(crate) fn choice<T: Copy>(&self, words: &[(&str, T)]) -> Option<T> {
+        let text = self.value.get_ref().as_str();
+        let found = words.iter().find(|(word, _)| Some(*word) == text).map(|(_, meaning)| *meaning);
+        found.or_else(|| {
+            let words: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+            self.wrong(&match &words[..] {
+                [all_but_last @ .., last] if !all_but_last.is_empty() => {
+                    format!("{} or {last}", all_but_last.join(", "))
+                }
+                _ => words.concat(),
+            })
+        })
+    }
+
+    pub(crate) fn duration(&self, example: &str) -> Option<Duration> {
+        let Some(text) = self.value.get_ref().as_str() else {
+            return self.wrong(&format!("a duration with its unit, such as `{} = \"{example}\"`", self.key));
+        };
+        match units::parse_duration(text) {
+            Ok(duration) if duration <= DURATION_MAX => Some(duration),
+            Ok(_) => self.wrong("at most a day, \"24 h\""),
+            Err(error) => {
+                self.report(format!("`{}`: {error}", self.key));
+                None
+            }
+        }
+    }
+
+    /// A duration of at least a microsecond.
+    pub(crate) fn duration_above_zero(&self, example: &str) -> Option<Duration> {
+        let duration = self.duration(example)?;
+        if duration < Duration::from_micros(1) {
+            return self.wrong(&format!("at least \"1 us\", for example `{} = \"{example}\"`", self.key));
+        }
+        Some(duration)
+    }
+
+    pub(crate) fn size(&self, range: RangeInclusive<u64>, example: &str) -> Option<u64> {
+        let Some(text) = self.value.get_ref().as_str() else {
+            return self.wrong(&format!("a size with its unit, such as `{} = \"{example}\"`", self.key));
+        };
+        match units::parse_size(text) {
+            Ok(size) if range.contains(&size) => Some(size),
+            Ok(_) => self.wrong(&format!("{} to {} B, such as \"{example}\"", range.start(), range.end())),
+            Err(error) => {
+                self.report(format!("`{}`: {error}", self.key));
+                None
+            }
+        }
+    }
+
+    /// The elements of a list.
+    pub(crate) fn list(&self, example: &str) -> Option<Vec<Self>> {
+        let Some(array) = self.value.get_ref().as_array() else {
+            return self.wrong(&format!("a list, such as `{} = {example}`", self.key));
+        };
+        let element = |value: &'d Spanned<DeValue<'d>>| Self {
+            reader: self.reader,
+            what: self.what.clone(),
+            key: self.key.clone(),
+            line: self.reader.line(value.span()),
+            value,
+        };
+        Some(array.iter().map(element).collect())
+    }
+
+    /// The texts of a list, with the lines they stand in.
+    pub(crate) fn texts(&self, example: &str) -> Vec<(&'d str, usize)> {
+        let list = self.list(&format!("[\"{example}\"]")).unwrap_or_default();
+        list.iter()
+            .filter_map(|item| match item.value.get_ref().as_str() {
+                Some(text) if !text.is_empty() => Some((text, item.line)),
+                _ => item.wrong(&format!("a list of texts, such as `{} = [\"{example}\"]`", self.key)),
+            })
+            .collect()
+    }
+
+    pub(crate) fn is_table(&self) -> bool {
+        self.value.get_ref().is_table()
+    }
+
+    /// The table that the value is.
+    pub(crate) fn section(&self, what: &str) -> Option<Section<'d>> {
+        match self.value.get_ref().as_table() {
+            Some(table) => Some(Section::new(self.reader, what, self.line, table)),
+            None => self.wrong(&format!("a table: `{} = {{ ... }}` or `[{}]`", self.key, self.key)),
+        }
+    }
+}
+
+fn prefixed(what: &str, message: &str) -> String {
+    if what.is_empty() { message.into() } else { format!("{what}: {message}") }
+}
+
+/// A value as a message shows it.
+fn shown(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) if text.is_empty() => "empty".into(),
+        DeValue::String(text) => format!("\"{text}\""),
+        DeValue::Integer(number) => number.to_string(),
+        DeValue::Float(number) => number.to_string(),
+        DeValue::Boolean(flag) => flag.to_string(),
+        DeValue::Datetime(_) => "a date".into(),
+        DeValue::Array(_) => "a list".into(),
+        DeValue::Table(_) => "a table".into(),
+    }
+}
+
+/// The candidate that is most like `word`, if one is like it at all.
+pub(crate) fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+    // Both measures: edits for slips of the finger, Jaro-Winkler for words begun right (`max` for `max-age`).
+    let likeness = |candidate: &str| {
+        let edits = strsim::normalized_damerau_levenshtein(word, candidate);
+        edits.max(strsim::jaro_winkler(word, candidate) - 0.2)
+    };
+    let best = candidates.into_iter().map(|candidate| (likeness(candidate), candidate));
+    best.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(likeness, _)| *likeness >= 0.6).map(|(_, candidate)| candidate)
+}

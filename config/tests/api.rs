@@ -1,0 +1,178 @@
+//! What other crates rely on when they use an installation.
+
+use rohrpost_config::{
+    Full, Installation, Level, Node, Program, RestartPolicy, Scheduling, Start, TimeSource, explain,
+};
+use rohrpost_mailbox::{Class, Name};
+use serde::Deserialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+const FULL: &str = include_str!("full.toml");
+const DEMO: &str = include_str!("../demo.toml");
+
+fn parse(text: &str) -> Installation {
+    Installation::parse(text, Path::new("conf/full.toml")).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+#[test]
+fn every_key_arrives() {
+    let full = parse(FULL);
+    assert_eq!((full.name.as_str(), full.system.name.as_str(), full.system.id), ("two computers", "ottfried", 7));
+    assert_eq!(full.folder, Path::new("conf"));
+    assert_eq!(full.scheduling(Class(159)), Scheduling::Normal { nice: 0 });
+    assert_eq!(full.scheduling(Class(160)), Scheduling::Fifo { priority: 1 });
+    let base = Node { name: "base".into(), address: Some("10.0.0.1".into()), mode: 0o770, tools: 0..=15, line: 19 };
+    assert_eq!(full.node("base"), Some(&base));
+    assert_eq!(full.time, TimeSource::Local);
+    assert_eq!(full.output.file, Some(PathBuf::from("conf/robot.log")));
+
+    let motor = full.module(Name::new(7, 200, 0, 0)).unwrap();
+    let words = ["./drivers/base", "--port", "/dev/ttyS0"].map(String::from);
+    assert_eq!(motor.program, Program::Command(words.into()));
+    assert_eq!((motor.start, motor.restart.policy), (Start::Off, RestartPolicy::Always));
+    assert_eq!((motor.restart.at_most, motor.restart.within), (3, Duration::from_secs(300)));
+    assert_eq!((motor.ready_within, motor.stop_within), (Duration::from_secs(3), Duration::from_millis(500)));
+    let commands = motor.mailboxes.commands;
+    assert_eq!((commands.slots, commands.size, commands.full, commands.claims), (16, 200, Full::Reject, 2));
+    assert_eq!(commands.max_age, Some(Duration::from_millis(300)));
+
+    assert_eq!(full.flows[0].deadline, Duration::from_millis(50));
+    assert_eq!(full.flows[1].deadline, full.flows[1].period, "without a deadline, the next package's time");
+    assert_eq!(full.gui.show[0].rate, None);
+    assert_eq!(full.gui.show[1].rate, Some(0.5));
+}
+
+#[test]
+fn modules_are_found_by_every_name_they_answer_to() {
+    let full = parse(FULL);
+    let found = |text: &str| {
+        let name = full.classes.parse_name(text).unwrap();
+        full.module(name).map(|module| full.classes.format(module.name))
+    };
+    for (text, module) in [
+        ("motor.0", Some("motor.0")),
+        ("laser.0", Some("motor.0")),
+        ("7.laser.0.2", Some("motor.0")),
+        ("laser.1", None),
+        ("1.laser.0.2", None),
+    ] {
+        assert_eq!(found(text).as_deref(), module, "{text}");
+    }
+    assert_eq!(full.modules_on("desk").count(), 2);
+    assert_eq!(full.output.level_of(Name::new(7, 150, 0, 2)), Level::Trace, "by a mailbox of a face");
+    assert_eq!(full.output.level_of(Name::new(7, 200, 0, 0)), Level::Warn);
+}
+
+#[derive(Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+struct MapperSettings {
+    laser: String,
+    odometry: String,
+    resolution_m: f64,
+}
+
+#[test]
+fn settings_become_types_or_name_their_line() {
+    let settings = |text: &str| {
+        let demo = parse(text);
+        let name = demo.classes.parse_module("mapper.0").unwrap();
+        demo.settings_as::<MapperSettings>(demo.module(name).unwrap()).map_err(|error| error.to_string())
+    };
+    let right = MapperSettings { laser: "laser.0".into(), odometry: "odometry.0".into(), resolution_m: 0.05 };
+    assert_eq!(settings(DEMO), Ok(right));
+    let with = |settings: &str| {
+        let old = "settings = { laser = \"laser.0\", odometry = \"odometry.0\", resolution-m = 0.05 }\n";
+        assert!(DEMO.contains(old));
+        DEMO.replace(old, settings)
+    };
+    let line = 1 + DEMO.lines().position(|line| line.contains("resolution-m")).unwrap();
+    for (text, at, why) in [
+        ("settings = {\n    laser = 3,\n}\n", line + 1, "invalid type: integer `3`, expected a string"),
+        ("settings = { resolution = 1 }\n", line, "unknown field `resolution`, expected one of `laser`, "),
+        ("settings = { laser = \"laser.0\" }\n", line, "missing field `odometry`"),
+        ("", line - 4, "missing field `laser`"),
+    ] {
+        let error = settings(&with(text)).unwrap_err();
+        let expected = format!("conf/full.toml:{at}: settings of module `mapper.0`: {why}");
+        assert!(error.starts_with(&expected), "{error}\nis not {expected}");
+    }
+}
+
+#[test]
+fn digest_counts_what_must_be_equal_and_nothing_else() {
+    let digest = |text: &str| parse(text).digest();
+    let full = digest(FULL);
+    // Written down: a change here means that robots with older programs refuse the new ones.
+    assert_eq!(full.to_string(), "cf27ca9f59dc833a-6d110eefbe05cb43");
+    for (old, new, common, system, why) in [
+        ("# Every key", "# Other words", true, true, "a comment"),
+        ("Drives the wheels", "Turns the wheels", true, true, "a text"),
+        ("stop-within = \"500 ms\"", "stop-within = \"0.5 s\"", true, true, "a spelling"),
+        ("size = \"60 KiB\"", "size = \"50 KiB\"", true, true, "a node's own mailbox"),
+        ("id = 150", "id = 151", false, false, "another priority, and with it other names"),
+        ("10.0.0.2", "10.0.0.3", true, false, "another address"),
+        ("tools = [16, 31]", "tools = [16, 32]", true, false, "other tool instances"),
+        ("faces = [\"laser.0\"]", "faces = [\"laser.0\", \"laser.1\"]", true, false, "another face"),
+    ] {
+        assert!(FULL.contains(old), "{old}");
+        let changed = digest(&FULL.replacen(old, new, 1));
+        assert_eq!((changed.common == full.common, changed.system == full.system), (common, system), "{why}");
+    }
+}
+
+#[test]
+fn missing_programs_matter_where_they_should_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("full.toml");
+    fs::write(&path, FULL).unwrap();
+    let full = Installation::load(&path).unwrap();
+    assert_eq!(full.missing_programs("desk", folder.path()), []);
+    let missing = full.missing_programs("base", folder.path());
+    assert_eq!(missing.len(), 1);
+    assert!(!missing[0].optional);
+    let expected = format!(
+        "{}:40: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
+         `program`",
+        path.display(),
+        folder.path().display()
+    );
+    assert_eq!(missing[0].to_string(), expected);
+}
+
+#[test]
+fn a_file_that_is_not_there_says_so() {
+    let errors = Installation::load(Path::new("no/such.toml")).unwrap_err();
+    assert_eq!(
+        errors.to_string(),
+        "no/such.toml: cannot be read (No such file or directory (os error 2)); name an installation's file, such as \
+         config/demo.toml"
+    );
+}
+
+#[test]
+fn one_node_is_explained_alone() {
+    let full = parse(FULL);
+    let page = explain(&full, Some("desk"));
+    assert!(page.contains("Node `desk`") && !page.contains("Node `base`"));
+    assert!(explain(&full, Some("roof")).contains("There is no node `roof`; the nodes are base, desk."));
+}
+
+/// Half a file, a file without one of its lines, and a file with two lines in one: errors perhaps, but no panic, and each
+/// error in a line that exists.
+#[test]
+fn damaged_files_give_errors_and_nothing_worse() {
+    let lines: Vec<&str> = FULL.lines().collect();
+    for cut in 0..lines.len() {
+        let joined = |parts: &[&[&str]]| parts.concat().join("\n");
+        let (before, after) = lines.split_at(cut);
+        for text in [joined(&[before]), joined(&[before, &after[1..]]), joined(&[before, &after[..1], after])] {
+            if let Err(errors) = Installation::parse(&text, Path::new("damaged.toml")) {
+                let last = text.lines().count().max(1);
+                assert!(!errors.problems().is_empty(), "{text}");
+                assert!(errors.problems().iter().all(|p| p.line.is_some_and(|line| line <= last)), "{errors}\n{text}");
+            }
+        }
+    }
+}
