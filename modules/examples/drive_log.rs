@@ -1,5 +1,6 @@
 //! Drives the simulated robot through a map and writes what a CARMEN logger would have, with true poses for the scans:
-//! `cargo run -p rohrpost-modules --example drive_log -- MAP SECONDS SEED OUT.log`. `tests/data/small.log` began so.
+//! `cargo run -p rohrpost-modules --example drive_log -- MAP SECONDS SEED OUT.log`. Squares of
+//! a benchmark's map count as 0.5 m. `tests/data/small.log` began so.
 
 use rohrpost_modules::robot::{pilot, simulator, world};
 use std::error::Error;
@@ -17,7 +18,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: drive_log MAP SECONDS SEED OUT.log".into());
     };
     let (seed, ticks) = (seed.parse()?, seconds.parse::<u64>()? * 10);
-    let world = world::World::parse(&std::fs::read_to_string(map)?)?;
+    let map = std::fs::read_to_string(map)?;
+    let octile = map.starts_with("type octile");
+    let world = if octile { world::World::parse_octile(&map, 0.5, None)? } else { world::World::parse(&map)? };
     let mut robot = simulator::Simulator::new(world, simulator::Settings { seed, ..Default::default() });
     let mut pilot = pilot::Pilot::new(pilot::Settings { seed, ..Default::default() });
     let mut out = std::io::BufWriter::new(std::fs::File::create(log)?);
@@ -44,5 +47,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     out.flush()?;
+    println!("{} bumps, at {:?}", robot.bumps(), robot.true_pose());
     Ok(())
 }

@@ -3,7 +3,7 @@
 use rohrpost_modules::robot::{carmen, grid, playback};
 use std::error::Error;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut map = grid::Mapper::new(settings);
     let mut log = playback::Playback::new(carmen::open(Path::new(log), carmen::Settings::default())?, 1.0)?;
-    let start = Instant::now();
+    let (start, mut mapping) = (Instant::now(), Duration::ZERO);
     let mut last_due_ns = 0;
     for item in log.by_ref() {
         let due = item?;
@@ -24,10 +24,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         if let carmen::Record::Scan { scan, .. } = due.record
             && let Some(pose) = scan.pose
         {
+            let before = Instant::now();
             map.integrate(&scan, &pose)?;
+            mapping += before.elapsed();
         }
     }
     println!("{:?}, {:.1} s of log in {:?}", log.counters(), last_due_ns as f64 / 1e9, start.elapsed());
+    println!("{:?} for a scan", mapping / u32::try_from(log.counters().scans)?.max(1));
     println!("{:?} in {} tiles", map.counts(), map.tiles().count());
     std::fs::write(picture, map.to_pgm())?;
     Ok(())

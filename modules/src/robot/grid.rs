@@ -70,7 +70,8 @@ pub struct Counts {
 /// map.integrate(&scan, &Pose::default()).unwrap();
 /// assert_eq!(map.occupancy(1.01, 0.01), Some(70)); // percent, after one hit
 /// assert!(map.occupancy(0.5, 0.01).unwrap() < 50 && map.occupancy(2.0, 0.01).is_none());
-/// let grid = map.tile(map.take_changed()[0]).unwrap();
+/// let changed = map.take_changed();
+/// let grid = map.tile(changed[0]).unwrap();
 /// assert_eq!(grid.cells.len(), 128 * 128);
 /// ```
 #[derive(Clone, Debug)]
