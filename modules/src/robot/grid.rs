@@ -93,7 +93,13 @@ struct Cursor {
 
 impl Mapper {
     /// An empty map.
+    ///
+    /// # Panics
+    /// If a length in the settings is not a positive number: beams would never end.
     pub fn new(settings: Settings) -> Self {
+        for length_m in [settings.resolution_m, settings.clear_max_m, settings.hit_max_m] {
+            assert!(length_m.is_finite() && length_m > 0.0, "a map with a length of {length_m} m in its settings");
+        }
         Self { settings, places: BTreeMap::new(), tiles: Vec::new(), counts: Counts::default(), scan: 0 }
     }
 

@@ -146,7 +146,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Stands where the world says; odometry begins at zero.
+    /// Stands where the world says, which should have room for it: it can't drive out of a wall. Odometry begins at zero.
     pub fn new(world: World, settings: Settings) -> Self {
         let mut wheel_random = ChaCha8Rng::seed_from_u64(settings.seed);
         let mut scan_random = wheel_random.clone();

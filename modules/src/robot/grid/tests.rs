@@ -116,6 +116,12 @@ fn tiles_are_told_when_they_change_and_placed_by_their_corner() {
 }
 
 #[test]
+#[should_panic(expected = "a length of 0 m")]
+fn squares_have_a_size() {
+    Mapper::new(Settings { resolution_m: 0.0, ..Settings::default() });
+}
+
+#[test]
 fn growth_is_bounded_and_counted() {
     let mut map = Mapper::new(Settings { tiles_max: 2, ..Settings::default() });
     map.integrate(&ring(360, 7.0, 8.0), &at(0.0, 0.0)).unwrap();
