@@ -1,1 +1,67 @@
-//! Rohrpost.
+//! Prioritised, real-time-style mailboxes for robots: what the author of a module needs.
+//!
+//! A module is a struct with an interface; the attribute makes a proxy for others from the interface's trait.
+//!
+//! ```
+//! use rohrpost::{Context, Module, ModuleError};
+//!
+//! /// Tells where north is.
+//! #[rohrpost::interface(class = "compass")]
+//! pub trait Compass {
+//!     /// Takes the present heading for this one (radians).
+//!     #[command(16)]
+//!     fn calibrate(&mut self, heading_rad: f64);
+//!
+//!     /// Heading, radians, counter-clockwise from east.
+//!     #[data(1)]
+//!     fn heading() -> f64;
+//! }
+//!
+//! #[derive(rohrpost::serde::Deserialize)]
+//! #[serde(crate = "rohrpost::serde", deny_unknown_fields)]
+//! struct Settings {}
+//!
+//! struct Needle { offset_rad: f64 }
+//!
+//! impl Compass for Needle {
+//!     fn calibrate(&mut self, heading_rad: f64) {
+//!         self.offset_rad = heading_rad;
+//!     }
+//! }
+//!
+//! impl Module for Needle {
+//!     type Settings = Settings;
+//!     type Interfaces = CompassInterface;
+//!
+//!     fn new(_: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+//!         context.set_period(std::time::Duration::from_millis(100));
+//!         Ok(Self { offset_rad: 0.0 })
+//!     }
+//!
+//!     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+//!         Ok(context.publish_now(CompassInterface::HEADING, &self.offset_rad)?)
+//!     }
+//! }
+//!
+//! fn main() -> std::process::ExitCode {
+//!     # if true { return std::process::ExitCode::SUCCESS }
+//!     rohrpost::run::<Needle>()
+//! }
+//! ```
+
+#![forbid(unsafe_code)]
+
+pub use rohrpost_config as config;
+pub use rohrpost_mailbox as mailbox;
+pub use rohrpost_mailbox::{Class, Name, Priority, SystemTime};
+#[doc(hidden)]
+pub use rohrpost_modules::macro_support;
+pub use rohrpost_modules::macro_support::serde;
+pub use rohrpost_modules::call::{CallError, Fault, Pending};
+pub use rohrpost_modules::runtime::{Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink};
+pub use rohrpost_modules::{
+    Module, ModuleError, common, data, description, interface, interfaces, launch, output, run, survey, types, value,
+};
+
+/// The tools of the field that our interfaces and types speak: spans and events become output lines.
+pub use tracing;

@@ -185,14 +185,15 @@ fn map(node: &Path, create: bool) -> std::io::Result<Mapping> {
 }
 
 /// Reads a node's system time; without a time page, this computer's wall clock is taken.
+#[derive(Clone)]
 pub struct SystemClock {
-    mapping: Option<Mapping>,
+    mapping: Option<Arc<Mapping>>,
 }
 
 impl SystemClock {
     /// Opens the node's time page, if there is one.
     pub fn open(node: &Node) -> Self {
-        Self { mapping: map(node.path(), false).ok() }
+        Self { mapping: map(node.path(), false).ok().map(Arc::new) }
     }
 
     /// System time now. No system call, lock or heap.

@@ -1,4 +1,36 @@
-//! Module template, interfaces, launch and built-in modules.
+//! What modules are made of: the template, interfaces and proxies, subscriptions, output, and the modules that come with it.
+//!
+//! ```text
+//! types, interfaces   what modules exchange            robot, builtin   modules that come with Rohrpost
+//! call                commands, once, and replies      runtime          the loop of a module's thread
+//! publish             who wants which data             launch           starts, watches and stops a node's modules
+//! value, description  data without its types           output           what modules say
+//! ```
+//!
+//! Module authors use it through the crate `rohrpost`.
 
+#![forbid(unsafe_code)]
+
+#[cfg(feature = "builtin")]
+pub mod builtin;
+pub mod call;
+pub mod common;
+pub mod description;
+pub mod interface;
+pub mod interfaces;
+pub mod launch;
+#[doc(hidden)]
+pub mod macro_support;
+mod module;
+pub mod output;
+mod publish;
+#[cfg(feature = "builtin")]
 pub mod robot;
+pub mod runtime;
+pub mod survey;
 pub mod types;
+pub mod value;
+
+pub use module::{Module, ModuleError};
+pub use rohrpost_macros::{data, interface};
+pub use runtime::run;

@@ -1,0 +1,346 @@
+//! From a trait to an interface, a dispatcher, a description and a proxy.
+
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+use syn::parse::{Parse, ParseStream};
+use syn::spanned::Spanned;
+use syn::{
+    Attribute, Error, Expr, ExprLit, FnArg, GenericArgument, Ident, ItemTrait, Lit, LitInt, LitStr, Meta, Pat,
+    PathArguments, Result, ReturnType, Token, TraitItem, TraitItemFn, Type,
+};
+
+const ARGUMENTS_MAX: usize = 8;
+
+/// `class = "motor"`, and for our own crates `crate = crate`.
+struct Options {
+    class: LitStr,
+    krate: TokenStream,
+}
+
+impl Parse for Options {
+    fn parse(input: ParseStream<'_>) -> Result<Self> {
+        let (mut class, mut krate) = (None, quote!(::rohrpost::macro_support));
+        while !input.is_empty() {
+            if input.peek(Token![crate]) {
+                input.parse::<Token![crate]>()?;
+                input.parse::<Token![=]>()?;
+                let path: syn::Path = input.parse()?;
+                krate = quote!(#path);
+            } else {
+                let key: Ident = input.parse()?;
+                if key != "class" {
+                    return Err(Error::new(key.span(), "unknown key; write `class = \"motor\"`"));
+                }
+                input.parse::<Token![=]>()?;
+                class = Some(input.parse()?);
+            }
+            if !input.is_empty() {
+                input.parse::<Token![,]>()?;
+            }
+        }
+        let class = class.ok_or_else(|| input.error("which class? write `#[interface(class = \"motor\")]`"))?;
+        Ok(Self { class, krate })
+    }
+}
+
+/// `16` or `16, idempotent`.
+struct Number {
+    number: LitInt,
+    idempotent: bool,
+}
+
+impl Parse for Number {
+    fn parse(input: ParseStream<'_>) -> Result<Self> {
+        let number = input.parse()?;
+        let mut idempotent = false;
+        if input.parse::<Option<Token![,]>>()?.is_some() && !input.is_empty() {
+            let word: Ident = input.parse()?;
+            if word != "idempotent" {
+                return Err(Error::new(word.span(), "unknown word; `idempotent` is the only one"));
+            }
+            idempotent = true;
+        }
+        Ok(Self { number, idempotent })
+    }
+}
+
+struct Command {
+    number: Number,
+    name: Ident,
+    text: String,
+    names: Vec<Ident>,
+    types: Vec<Type>,
+    result: Type,
+}
+
+struct Data {
+    number: u16,
+    name: Ident,
+    text: String,
+    ty: Type,
+}
+
+pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
+    let Options { class, krate } = syn::parse2(attributes)?;
+    let mut item: ItemTrait = syn::parse2(item)?;
+    let (mut commands, mut data) = (Vec::new(), Vec::new());
+    let mut kept = Vec::new();
+    for member in std::mem::take(&mut item.items) {
+        let TraitItem::Fn(mut function) = member else {
+            return Err(Error::new(member.span(), "an interface has functions only: #[command(n)] and #[data(n)]"));
+        };
+        if let Some(number) = take_attribute(&mut function, "command") {
+            commands.push(command(number?, &function)?);
+            kept.push(TraitItem::Fn(function));
+        } else if let Some(number) = take_attribute(&mut function, "data") {
+            data.push(data_item(&number?, &function)?);
+        } else {
+            return Err(Error::new(function.span(), "write #[command(16)] or #[data(1)] before it"));
+        }
+    }
+    item.items = kept;
+    distinct(commands.iter().map(|command| &command.number.number))?;
+    let interface = interface(&item, &class, &krate, &commands, &data)?;
+    let proxy = proxy(&item, &krate, &commands, &data);
+    Ok(quote! { #item #interface #proxy })
+}
+
+/// Takes `#[command(…)]` or `#[data(…)]` off a function.
+fn take_attribute(function: &mut TraitItemFn, name: &str) -> Option<Result<Number>> {
+    let at = function.attrs.iter().position(|attribute| attribute.path().is_ident(name))?;
+    Some(function.attrs.remove(at).parse_args())
+}
+
+fn command(number: Number, function: &TraitItemFn) -> Result<Command> {
+    let value: u16 = number.number.base10_parse()?;
+    if !(16..=16383).contains(&value) {
+        return Err(Error::new(number.number.span(), "own functions have numbers from 16 to 16383"));
+    }
+    if let Some(body) = &function.default {
+        return Err(Error::new(body.span(), "functions of an interface have no body here; the module gives it"));
+    }
+    let signature = &function.sig;
+    let mut arguments = signature.inputs.iter();
+    match arguments.next() {
+        Some(FnArg::Receiver(receiver)) if receiver.mutability.is_some() && receiver.reference.is_some() => {}
+        _ => return Err(Error::new(signature.span(), "functions take `&mut self` first")),
+    }
+    let (mut names, mut types) = (Vec::new(), Vec::new());
+    for argument in arguments {
+        let FnArg::Typed(argument) = argument else { continue };
+        let Pat::Ident(name) = &*argument.pat else {
+            return Err(Error::new(argument.pat.span(), "write a plain name"));
+        };
+        if let Type::Reference(reference) = &*argument.ty {
+            return Err(Error::new(reference.span(), "arguments travel to another process; take an owned value"));
+        }
+        names.push(name.ident.clone());
+        types.push((*argument.ty).clone());
+    }
+    if names.len() > ARGUMENTS_MAX {
+        return Err(Error::new(signature.span(), "at most eight arguments; put them into a struct"));
+    }
+    let result = match &signature.output {
+        ReturnType::Default => syn::parse_quote!(()),
+        ReturnType::Type(_, ty) => (**ty).clone(),
+    };
+    Ok(Command { number, name: signature.ident.clone(), text: text_of(&function.attrs), names, types, result })
+}
+
+fn data_item(number: &Number, function: &TraitItemFn) -> Result<Data> {
+    let value: u16 = number.number.base10_parse()?;
+    if value == 0 || value > 16384 {
+        return Err(Error::new(number.number.span(), "data have numbers from 1 to 16384"));
+    }
+    let (true, ReturnType::Type(_, ty)) = (function.sig.inputs.is_empty(), &function.sig.output) else {
+        return Err(Error::new(function.sig.span(), "data are declared as `fn name() -> Type;`"));
+    };
+    let text = text_of(&function.attrs);
+    Ok(Data { number: value, name: function.sig.ident.clone(), text, ty: (**ty).clone() })
+}
+
+fn distinct<'a>(numbers: impl Iterator<Item = &'a LitInt>) -> Result<()> {
+    let mut seen = Vec::new();
+    for number in numbers {
+        let value: u16 = number.base10_parse()?;
+        if seen.contains(&value) {
+            return Err(Error::new(number.span(), "this number is taken"));
+        }
+        seen.push(value);
+    }
+    Ok(())
+}
+
+/// The doc comment, joined to one text.
+fn text_of(attributes: &[Attribute]) -> String {
+    let lines = attributes.iter().filter_map(|attribute| match &attribute.meta {
+        Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
+            Expr::Lit(ExprLit { lit: Lit::Str(line), .. }) => Some(line.value().trim().to_owned()),
+            _ => None,
+        },
+        _ => None,
+    });
+    lines.collect::<Vec<_>>().join(" ").trim().to_owned()
+}
+
+fn interface(
+    item: &ItemTrait,
+    class: &LitStr,
+    krate: &TokenStream,
+    commands: &[Command],
+    data: &[Data],
+) -> Result<TokenStream> {
+    let (vis, name) = (&item.vis, &item.ident);
+    let interface = format_ident!("{name}Interface");
+    let (trait_name, trait_text) = (name.to_string(), text_of(&item.attrs));
+    let doc = format!("The interface [`{name}`]: what a module names as its own. Its constants are the data it publishes.");
+    let functions = commands.iter().map(|command| {
+        let Command { number: Number { number, idempotent }, name, text, names, types, result } = command;
+        let (name, names) = (name.to_string(), names.iter().map(Ident::to_string));
+        quote! {
+            #krate::Function {
+                number: #number, name: #name.into(), text: #text.into(), idempotent: #idempotent,
+                arguments: vec![#(#krate::Argument { name: #names.into(), ty: <#types as #krate::Data>::schema() }),*],
+                result: <#result as #krate::Data>::schema(),
+            }
+        }
+    });
+    let items = data.iter().map(|Data { number, name, text, ty }| {
+        let name = name.to_string();
+        quote!(#krate::DataItem { number: #number, name: #name.into(), text: #text.into(), ty: <#ty as #krate::Data>::schema() })
+    });
+    let ports = data.iter().map(|Data { number, name, text, ty }| {
+        let constant = Ident::new(&name.to_string().to_uppercase(), name.span());
+        let name = name.to_string();
+        quote! {
+            #[doc = #text]
+            pub const #constant: #krate::DataPort<#ty> = #krate::DataPort::new(#class, #number, #name, Self::hash);
+        }
+    });
+    let arms = commands.iter().map(|command| {
+        let Command { number: Number { number, .. }, name, names, types, .. } = command;
+        quote! {
+            #number => {
+                let (#(#names,)*): (#(#types,)*) = #krate::read_arguments(arguments)?;
+                #krate::write_result(reply, &module.#name(#(#names),*))
+            }
+        }
+    });
+    Ok(quote! {
+        #[doc = #doc]
+        #vis struct #interface;
+
+        impl #interface {
+            #(#ports)*
+
+            /// Tells this interface from others.
+            pub fn hash() -> u32 {
+                static HASH: ::std::sync::OnceLock<u32> = ::std::sync::OnceLock::new();
+                *HASH.get_or_init(|| <Self as #krate::Interface>::description().hash())
+            }
+        }
+
+        impl #krate::Interface for #interface {
+            const CLASS: &'static str = #class;
+
+            fn description() -> #krate::Description {
+                #krate::Description {
+                    name: #trait_name.into(), class: #class.into(), text: #trait_text.into(),
+                    functions: vec![#(#functions),*],
+                    data: vec![#(#items),*],
+                }
+            }
+        }
+
+        impl<M: #name> #krate::Serve<M> for #interface {
+            #[allow(unused_variables)]
+            fn serve(
+                module: &mut M, function: u16, arguments: &[u8], reply: &mut ::std::vec::Vec<u8>,
+            ) -> ::std::result::Result<(), #krate::Fault> {
+                match function {
+                    #(#arms)*
+                    other => ::std::result::Result::Err(#krate::Fault::Unknown(other)),
+                }
+            }
+        }
+    })
+}
+
+/// `Result<T, E>` as it is written in a signature.
+fn result_of(ty: &Type) -> Option<(&Type, &Type)> {
+    let Type::Path(path) = ty else { return None };
+    let last = path.path.segments.last().filter(|segment| segment.ident == "Result")?;
+    let PathArguments::AngleBracketed(arguments) = &last.arguments else { return None };
+    let mut types = arguments.args.iter().filter_map(|argument| match argument {
+        GenericArgument::Type(ty) => Some(ty),
+        _ => None,
+    });
+    Some((types.next()?, types.next()?))
+}
+
+fn proxy(item: &ItemTrait, krate: &TokenStream, commands: &[Command], data: &[Data]) -> TokenStream {
+    let (vis, name) = (&item.vis, &item.ident);
+    let (interface, proxy) = (format_ident!("{name}Interface"), format_ident!("{name}Proxy"));
+    let doc = format!("Calls the functions of [`{name}`] in another module.");
+    let calls = commands.iter().map(|command| {
+        let Command { number: Number { number, .. }, name, text, names, types, result } = command;
+        let begin = format_ident!("begin_{name}");
+        let begin_text = format!("Begins [`Self::{name}`] and returns at once; wait for its result later.");
+        let (returns, wait) = match result_of(result) {
+            Some((value, error)) => {
+                (quote!(::std::result::Result<#value, #krate::CallError<#error>>), quote!(wait_result()))
+            }
+            None => (quote!(::std::result::Result<#result, #krate::CallError>), quote!(wait())),
+        };
+        let widen = result_of(result).map(|_| quote!(.map_err(#krate::CallError::widen)));
+        quote! {
+            #[doc = #text]
+            pub fn #name(&self, #(#names: #types),*) -> #returns {
+                self.#begin(#(#names),*) #widen ?.#wait
+            }
+
+            #[doc = #begin_text]
+            pub fn #begin(
+                &self, #(#names: #types),*
+            ) -> ::std::result::Result<#krate::Pending<#result>, #krate::CallError> {
+                self.core.begin(#number, #interface::hash(), &(#(#names,)*))
+            }
+        }
+    });
+    let gets = data.iter().map(|Data { name, ty, .. }| {
+        let constant = Ident::new(&name.to_string().to_uppercase(), name.span());
+        let text = format!("Asks for the newest `{name}`: its system time (ns since 1970) and itself.");
+        quote! {
+            #[doc = #text]
+            pub fn #name(&self) -> ::std::result::Result<(u64, #ty), #krate::CallError> {
+                self.core.get(#interface::#constant)
+            }
+        }
+    });
+    quote! {
+        #[doc = #doc]
+        #vis struct #proxy {
+            core: #krate::ProxyCore,
+        }
+
+        impl #krate::Proxy for #proxy {
+            const CLASS: &'static str = <#interface as #krate::Interface>::CLASS;
+
+            fn new(link: &#krate::Caller, module: #krate::Name) -> Self {
+                Self { core: #krate::ProxyCore::new(link, module) }
+            }
+        }
+
+        impl #proxy {
+            /// The same, with another time in which an answer must come.
+            #[must_use]
+            pub fn with_timeout(mut self, timeout: ::std::time::Duration) -> Self {
+                self.core.timeout = timeout;
+                self
+            }
+
+            #(#calls)*
+            #(#gets)*
+        }
+    }
+}

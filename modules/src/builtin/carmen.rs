@@ -1,0 +1,114 @@
+//! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed.
+
+use crate::interfaces::{Laser, LaserInterface, Player, PlayerInterface, Progress, Wheels, WheelsInterface};
+use crate::module::{Module, ModuleError};
+use crate::robot::carmen::{self, Record};
+use crate::robot::playback::{Due, Playback};
+use crate::runtime::Context;
+use serde::Deserialize;
+use std::io::BufRead;
+use std::time::Duration;
+
+/// Records are played so exactly; their stamps are exact.
+const TICK: Duration = Duration::from_millis(2);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct Settings {
+    /// The log; may be compressed by gzip.
+    file: String,
+    /// Times the speed at which it was recorded.
+    #[serde(default = "one")]
+    speed: f64,
+    /// Readings of this length and more mean that nothing came back.
+    range_max_m: Option<f32>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+pub(super) struct Carmen {
+    playback: Playback<Box<dyn BufRead + Send>>,
+    speed: f64,
+    /// Read from the log and not yet due.
+    next: Option<Due>,
+    /// System time at which the log began, ns; none before the module was first on.
+    start_ns: Option<u64>,
+    progress: Progress,
+}
+
+impl Module for Carmen {
+    type Settings = Settings;
+    type Interfaces = (PlayerInterface, WheelsInterface, LaserInterface);
+
+    fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+        let mut reading = carmen::Settings::default();
+        reading.range_max_m = settings.range_max_m.unwrap_or(reading.range_max_m);
+        let reader = carmen::open(&context.path(&settings.file), reading)?;
+        let playback = Playback::new(reader, settings.speed)?;
+        context.set_period(TICK);
+        tracing::info!("plays {} at {} times its speed", settings.file, settings.speed);
+        let (speed, progress) = (settings.speed, Progress::default());
+        Ok(Self { playback, speed, next: None, start_ns: None, progress })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        let now_ns = context.now().ns;
+        let start_ns = *self.start_ns.get_or_insert(now_ns);
+        while !self.progress.finished {
+            let Some(due) = self.next.take().map(Ok).or_else(|| self.playback.next()).transpose()? else {
+                self.finish();
+                break;
+            };
+            if start_ns + due.due_ns > now_ns {
+                self.next = Some(due);
+                break;
+            }
+            self.play(start_ns + due.due_ns, due, context)?;
+        }
+        let counters = self.playback.counters();
+        self.progress.discarded = counters.discarded;
+        self.progress.malformed = counters.malformed;
+        self.progress.skipped = counters.skipped;
+        Ok(())
+    }
+}
+
+impl Carmen {
+    fn play(&mut self, stamp_ns: u64, due: Due, context: &mut Context) -> Result<(), ModuleError> {
+        self.progress.played_s = due.due_ns as f64 * self.speed / 1e9;
+        match due.record {
+            Record::Odometry { odometry, .. } => {
+                context.publish(WheelsInterface::ODOMETRY, stamp_ns, &odometry)?;
+                self.progress.odometries += 1;
+            }
+            Record::Scan { scan, .. } => {
+                context.publish(LaserInterface::SCAN, stamp_ns, &scan)?;
+                self.progress.scans += 1;
+            }
+            Record::Param { .. } => {}
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) {
+        self.progress.finished = true;
+        let Progress { scans, odometries, .. } = self.progress;
+        let counters = self.playback.counters();
+        tracing::info!(
+            "the log is over: {scans} scans and {odometries} odometries played, {} discarded for their stamps, {} broken",
+            counters.discarded,
+            counters.malformed
+        );
+    }
+}
+
+impl Player for Carmen {
+    fn progress(&mut self) -> Progress {
+        self.progress
+    }
+}
+
+impl Wheels for Carmen {}
+impl Laser for Carmen {}

@@ -1,0 +1,145 @@
+//! `sim`: a robot in a text map stands in for the drivers of motor, wheels and scanner.
+
+use crate::interfaces::{DriveError, LaserInterface, Motor, MotorInterface, WheelsInterface};
+use crate::module::{Module, ModuleError};
+use crate::robot::simulator::{STEP_NS, Scanner, Settings as RobotSettings, Simulator};
+use crate::robot::world::World;
+use crate::runtime::Context;
+use crate::types::Twist;
+use rohrpost_mailbox::SystemClock;
+use serde::Deserialize;
+use std::time::Duration;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub(super) struct Settings {
+    /// A text map, see `robot::world`.
+    map: String,
+    /// Side of a cell of an octile map, which does not say it.
+    cell_m: f64,
+    seed: u64,
+    laser_rate_hz: f64,
+    odometry_rate_hz: f64,
+    beams: usize,
+    range_max_m: f64,
+    dead_man_ms: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            map: String::new(),
+            cell_m: 0.5,
+            seed: 1,
+            laser_rate_hz: 10.0,
+            odometry_rate_hz: 20.0,
+            beams: 181,
+            range_max_m: 8.0,
+            dead_man_ms: 500,
+        }
+    }
+}
+
+pub(super) struct Sim {
+    simulator: Simulator,
+    clock: SystemClock,
+    odometry: Every,
+    laser: Every,
+    bumps: u64,
+}
+
+/// Something that happens once a period of system time.
+struct Every {
+    period_ns: u64,
+    next_ns: u64,
+}
+
+impl Every {
+    fn hz(rate_hz: f64) -> Self {
+        Self { period_ns: (1e9 / rate_hz.clamp(0.01, 100.0)) as u64, next_ns: 0 }
+    }
+
+    /// Whether it is time again.
+    fn is_due(&mut self, now_ns: u64) -> bool {
+        if now_ns < self.next_ns {
+            return false;
+        }
+        self.next_ns = (self.next_ns + self.period_ns).max(now_ns.saturating_sub(self.period_ns));
+        true
+    }
+}
+
+fn world(settings: &Settings, context: &Context) -> Result<World, ModuleError> {
+    let path = context.path(&settings.map);
+    let text = std::fs::read_to_string(&path).map_err(|error| ModuleError::new(format!("{}: {error}", path.display())))?;
+    let world = if text.starts_with("type") {
+        World::parse_octile(&text, settings.cell_m, None)
+    } else {
+        World::parse(&text)
+    };
+    world.map_err(|error| ModuleError::new(format!("{}: {error}", path.display())))
+}
+
+impl Module for Sim {
+    type Settings = Settings;
+    type Interfaces = (MotorInterface, WheelsInterface, LaserInterface);
+
+    fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+        let world = world(&settings, context)?;
+        let (width_m, height_m) = world.size_m();
+        tracing::info!("simulates a robot in {}, {width_m:.0} m by {height_m:.0} m", settings.map);
+        let scanner = Scanner { beams: settings.beams, range_max_m: settings.range_max_m, ..Scanner::default() };
+        let dead_man_ns = settings.dead_man_ms * 1_000_000;
+        let robot = RobotSettings { seed: settings.seed, scanner, dead_man_ns, ..RobotSettings::default() };
+        // A simulation that runs faster than the world looks at its clock more often.
+        let pace = context.clock().record().map_or(1.0, |record| record.pace_ppb as f64 / 1e9);
+        context.set_period(Duration::from_nanos(STEP_NS).div_f64(pace.clamp(1.0, 10.0)));
+        Ok(Self {
+            simulator: Simulator::new(world, robot),
+            clock: context.clock().clone(),
+            odometry: Every::hz(settings.odometry_rate_hz),
+            laser: Every::hz(settings.laser_rate_hz),
+            bumps: 0,
+        })
+    }
+
+    fn off(&mut self, _: &mut Context) {
+        // The safe state: the wheels stand.
+        let _ = self.simulator.command(Twist::default(), self.clock.now().ns);
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        let now_ns = self.clock.now().ns;
+        let stepped = self.simulator.step_to(now_ns);
+        if stepped.skipped > 0 {
+            tracing::warn!("the simulation left out {} steps: this computer was too slow", stepped.skipped);
+        }
+        if self.simulator.bumps() > self.bumps {
+            self.bumps = self.simulator.bumps();
+            tracing::error!("the robot drove against something ({} times so far)", self.bumps);
+        }
+        if self.odometry.is_due(now_ns) {
+            let odometry = self.simulator.odometry();
+            context.publish(WheelsInterface::ODOMETRY, now_ns, &odometry)?;
+            context.publish(MotorInterface::MOTION, now_ns, &odometry.twist)?;
+        }
+        if self.laser.is_due(now_ns) {
+            context.publish(LaserInterface::SCAN, now_ns, &self.simulator.scan())?;
+        }
+        Ok(())
+    }
+}
+
+impl Motor for Sim {
+    fn drive(&mut self, speed_m_s: f64, turn_rate_rad_s: f64) -> Result<(), DriveError> {
+        let twist = Twist { speed_m_s, turn_rate_rad_s };
+        self.simulator.command(twist, self.clock.now().ns).map(drop).map_err(|_| DriveError::NotFinite)
+    }
+
+    fn halt(&mut self) -> Result<(), DriveError> {
+        self.drive(0.0, 0.0)
+    }
+}
+
+impl crate::interfaces::Wheels for Sim {}
+impl crate::interfaces::Laser for Sim {}

@@ -1,0 +1,293 @@
+//! The caller's side: one reply mailbox, the ways into other mailboxes, and the calls under way.
+
+use super::envelope::micros;
+use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope};
+use rohrpost_mailbox::{Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type};
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// A command whose answer does not come is sent again after this share of its time: three tries in all.
+const REPEATS: u32 = 3;
+
+/// A module's or tool's way to all others: sends packages, and matches replies to calls.
+pub struct Link {
+    participant: Arc<Participant>,
+    me: Name,
+    replies: Receiver,
+    senders: Vec<Sender>,
+    calls: Vec<Call>,
+    /// Buffers of calls that are over, to be used again.
+    spare: Vec<Vec<u8>>,
+    next_sequence: u32,
+}
+
+/// Proxies of one thread share its link.
+pub type Caller = Rc<RefCell<Link>>;
+
+/// A call under way.
+struct Call {
+    sequence: u32,
+    to: Name,
+    /// The whole body of the command, to be sent again; then, when the answer has come, the answer.
+    body: Vec<u8>,
+    kind: Type,
+    began: Instant,
+    timeout: Duration,
+    repeat_at: Instant,
+    answer: Option<Head>,
+}
+
+impl Link {
+    /// A link of this module (local id 0), with its reply mailbox.
+    pub fn new(participant: &Arc<Participant>, me: Name, replies: Receiver) -> Self {
+        Self {
+            participant: participant.clone(),
+            me,
+            replies,
+            senders: Vec::new(),
+            calls: Vec::new(),
+            spare: Vec::new(),
+            // Sequence numbers may begin anywhere; from 1 they are easier to read.
+            next_sequence: 1,
+        }
+    }
+
+    /// The module that sends.
+    pub fn me(&self) -> Name {
+        self.me
+    }
+
+    /// Whose bell wakes it.
+    pub fn participant(&self) -> &Arc<Participant> {
+        &self.participant
+    }
+
+    /// Its reply mailbox, to wait on.
+    pub fn replies(&mut self) -> &mut Receiver {
+        &mut self.replies
+    }
+
+    /// Removes the reply mailbox.
+    pub fn close(self) {
+        self.replies.close();
+    }
+
+    /// Numbers the next call from here on: for tests of what happens when numbers wrap.
+    #[doc(hidden)]
+    pub fn set_next_sequence(&mut self, sequence: u32) {
+        self.next_sequence = sequence;
+    }
+
+    /// Sends a package of these parts; opens the mailbox if this is the first.
+    ///
+    /// # Errors
+    /// When it was not accepted.
+    pub fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
+        let sender = match self.senders.iter().position(|sender| sender.name() == to) {
+            Some(at) => &mut self.senders[at],
+            None => {
+                self.senders.push(self.participant.sender(to)?);
+                let last = self.senders.len() - 1;
+                &mut self.senders[last]
+            }
+        };
+        let sent = sender.send(label, parts);
+        if let Err(SendError::NoMailbox(_)) = sent {
+            // Gone for good or to come again: either way this map leads nowhere.
+            self.senders.retain(|sender| sender.name() != to);
+        }
+        sent
+    }
+
+    /// Sends a command and returns at once; [`Link::wait`] fetches the answer. `arguments` are postcard.
+    ///
+    /// # Errors
+    /// [`CallError::NotSent`], or [`CallError::Fault`] with `Busy` when too many calls are under way.
+    pub fn begin(
+        &mut self,
+        to: Name,
+        function: u16,
+        interface: u32,
+        timeout: Duration,
+        arguments: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
+    ) -> Result<u32, CallError> {
+        if self.calls.len() >= REPLIES_KEPT {
+            return Err(CallError::Fault(self.me, Fault::Busy));
+        }
+        let sequence = self.next_sequence;
+        self.next_sequence = self.next_sequence.wrapping_add(1);
+        let mut body = self.spare.pop().unwrap_or_default();
+        let envelope = CallEnvelope {
+            interface,
+            incarnation: self.participant.incarnation(),
+            sequence,
+            valid_for_us: micros(timeout),
+            age_us: 0,
+        };
+        body.clear();
+        body.extend_from_slice(&envelope.to_bytes());
+        arguments(&mut body).map_err(|error| CallError::BadArguments(error.to_string()))?;
+        let began = Instant::now();
+        let kind = Type::command(function);
+        let call =
+            Call { sequence, to, body, kind, began, timeout, repeat_at: began + timeout / REPEATS, answer: None };
+        match self.send(to, &self.label(kind, sequence), &[&call.body]) {
+            Ok(()) => {
+                self.calls.push(call);
+                Ok(sequence)
+            }
+            Err(error) => {
+                self.spare.push(call.body);
+                Err(error.into())
+            }
+        }
+    }
+
+    fn label(&self, kind: Type, sequence: u32) -> Label {
+        Label {
+            from: self.me.with_local(rohrpost_mailbox::local::REPLIES),
+            kind,
+            id: sequence as u16,
+            priority: self.me.class().priority(),
+            options: Options::default(),
+        }
+    }
+
+    /// Waits for the answer to a call, at most until its time is over, and hands its bytes to `read`.
+    ///
+    /// # Errors
+    /// [`CallError::Timeout`], or what the server said instead.
+    pub fn wait<T>(
+        &mut self,
+        sequence: u32,
+        read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
+    ) -> Result<T, CallError> {
+        loop {
+            self.collect();
+            let now = Instant::now();
+            let Some(at) = self.calls.iter().position(|call| call.sequence == sequence) else {
+                return Err(CallError::BadReply(self.me, "the call is not under way".into()));
+            };
+            let call = &self.calls[at];
+            let deadline = call.began + call.timeout;
+            if call.answer.is_some() || now >= deadline {
+                return self.finish(at, read);
+            }
+            if now >= call.repeat_at {
+                self.repeat(at, now);
+            }
+            let wake = self.calls[at].repeat_at.min(deadline);
+            rohrpost_mailbox::wait_any(&mut [&mut self.replies], Some(wake), || false);
+        }
+    }
+
+    /// The outcome of a call without a result, if it is known by now; none while it is under way.
+    pub fn poll(&mut self, sequence: u32) -> Option<Result<(), CallError>> {
+        let at = self.calls.iter().position(|call| call.sequence == sequence)?;
+        let call = &self.calls[at];
+        let over = call.answer.is_some() || call.began.elapsed() >= call.timeout;
+        over.then(|| self.finish(at, |_| Ok(())))
+    }
+
+    fn finish<T>(
+        &mut self,
+        at: usize,
+        read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
+    ) -> Result<T, CallError> {
+        let call = self.calls.swap_remove(at);
+        let result = match call.answer {
+            None => Err(CallError::Timeout(call.to, call.timeout)),
+            Some(head) if head.options.has(Options::ERROR) => match postcard::from_bytes(&call.body) {
+                Ok(fault) => Err(CallError::Fault(call.to, fault)),
+                Err(error) => Err(CallError::BadReply(call.to, error.to_string())),
+            },
+            Some(_) => read(&call.body).map_err(|error| CallError::BadReply(call.to, error.to_string())),
+        };
+        self.spare.push(call.body);
+        result
+    }
+
+    /// Gives a call up; its answer, should it come, is dropped.
+    pub fn forget(&mut self, sequence: u32) {
+        if let Some(at) = self.calls.iter().position(|call| call.sequence == sequence) {
+            self.spare.push(self.calls.swap_remove(at).body);
+        }
+    }
+
+    /// Moves the answers that have come to their calls. Answers to nobody (late, or to an earlier life) are dropped.
+    pub fn collect(&mut self) {
+        let incarnation = self.participant.incarnation();
+        while let Some(package) = self.replies.try_receive() {
+            let Ok((envelope, result)) = ReplyEnvelope::split(package.body()) else { continue };
+            let mine = envelope.incarnation == incarnation;
+            let call = self.calls.iter_mut().find(|call| {
+                // The sequence number, not the 16-bit id, tells calls apart: ids wrap.
+                mine && call.sequence == envelope.sequence && call.to.module() == package.head().from.module()
+            });
+            if let Some(call) = call.filter(|call| call.answer.is_none()) {
+                call.answer = Some(*package.head());
+                call.body.clear();
+                call.body.extend_from_slice(result);
+            }
+        }
+    }
+
+    fn repeat(&mut self, at: usize, now: Instant) {
+        let call = &mut self.calls[at];
+        call.repeat_at = now + call.timeout / REPEATS;
+        // Age 0 means a first try, so a repeat is at least 1 µs old.
+        let age_us = micros(now - call.began).max(1);
+        call.body[CallEnvelope::BYTES - 4..CallEnvelope::BYTES].copy_from_slice(&age_us.to_le_bytes());
+        let (to, kind, sequence) = (call.to, call.kind, call.sequence);
+        let body = std::mem::take(&mut call.body);
+        // A repeat that cannot be sent is as good as one that was lost: the next one, or the timeout, takes care.
+        let _ = self.send(to, &self.label(kind, sequence), &[&body]);
+        self.calls[at].body = body;
+    }
+}
+
+/// A call that was begun: [`Pending::wait`] for its result. Dropped, it is given up (the server may run it all the same).
+#[must_use = "a call that is begun and not waited for is given up"]
+pub struct Pending<T> {
+    link: Caller,
+    sequence: u32,
+    to: Name,
+    result: std::marker::PhantomData<fn() -> T>,
+}
+
+impl<T: serde::de::DeserializeOwned> Pending<T> {
+    /// Of a call that [`Link::begin`] began.
+    pub fn new(link: Caller, sequence: u32, to: Name) -> Self {
+        Self { link, sequence, to, result: std::marker::PhantomData }
+    }
+
+    /// Waits for the result.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn wait(self) -> Result<T, CallError> {
+        self.link.borrow_mut().wait(self.sequence, |bytes| postcard::from_bytes(bytes))
+    }
+}
+
+impl<T: serde::de::DeserializeOwned, E: serde::de::DeserializeOwned> Pending<Result<T, E>> {
+    /// Waits for the result of a function that has an error of its own.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn wait_result(self) -> Result<T, CallError<E>> {
+        let to = self.to;
+        self.wait().map_err(CallError::widen)?.map_err(|error| CallError::Module(to, error))
+    }
+}
+
+impl<T> Drop for Pending<T> {
+    fn drop(&mut self) {
+        // Not while the link waits: then this call is the one it waits for, and it forgets by itself.
+        if let Ok(mut link) = self.link.try_borrow_mut() {
+            link.forget(self.sequence);
+        }
+    }
+}

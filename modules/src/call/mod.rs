@@ -1,0 +1,14 @@
+//! Calls: a command with an envelope, its reply, and what may go wrong between.
+//!
+//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side.
+
+mod envelope;
+mod error;
+mod link;
+mod once;
+
+pub(crate) use envelope::micros;
+pub use envelope::{CallEnvelope, ReplyEnvelope};
+pub use error::{CallError, Fault};
+pub use link::{Caller, Link, Pending};
+pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, Verdict};

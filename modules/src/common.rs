@@ -1,0 +1,163 @@
+//! The functions that every module has (seed 002, 2.2.1), numbers 1 to 15 of the commands.
+
+use crate::value::Data;
+use postcard_schema::Schema;
+use rohrpost_mailbox::ModuleState;
+use serde::{Deserialize, Serialize};
+
+/// Switches the module on. No arguments, no result.
+pub const ON: u16 = 1;
+/// Switches the module off: its safe state.
+pub const OFF: u16 = 2;
+/// Asks for [`Status`].
+pub const STATUS: u16 = 3;
+/// Asks for the newest data of a number (u16): its time (u64 ns since 1970) and itself.
+pub const GET_DATA: u16 = 4;
+/// Subscribes: [`Subscribe`].
+pub const SUBSCRIBE: u16 = 5;
+/// Ends a subscription: its id (u16).
+pub const UNSUBSCRIBE: u16 = 6;
+/// Sets which output lines the module sends: [`OutputLevel`].
+pub const OUTPUT_LEVEL: u16 = 7;
+/// Asks for a part of the description, from a byte on (u32): [`DescriptionPart`].
+pub const DESCRIBE: u16 = 8;
+/// Numbers from here on are the interfaces' own.
+pub const FIRST_OWN: u16 = 16;
+
+/// Hash that commands to the common functions carry: they are of no interface and change with the layout version only.
+pub const HASH: u32 = 1;
+
+/// Bytes of a description that go into one reply, so that it fits every reply mailbox.
+pub const DESCRIPTION_PART: usize = 768;
+
+/// How a module is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Status {
+    /// What it is doing.
+    pub state: State,
+    /// Why, when it is in error; else empty.
+    pub error: String,
+    /// Tells this life of the module from earlier ones.
+    pub incarnation: u32,
+    /// Time since it started, ms.
+    pub uptime_ms: u64,
+    /// Subscriptions to its data at present.
+    pub subscribers: u32,
+    /// Periods of subscriptions in which nothing could be delivered, and packages that found a subscriber's mailbox full.
+    pub missed: u64,
+    /// Packages that it should have received by its own subscriptions and did not (gaps in their numbers).
+    pub lost: u64,
+    /// Output lines that found no room.
+    pub output_lost: u64,
+}
+
+/// What a module is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum State {
+    /// Not ready for commands yet.
+    Starting,
+    /// Ready, and switched off.
+    Off,
+    /// Working.
+    On,
+    /// It has stopped working.
+    Error,
+    /// About to end.
+    Stopping,
+}
+
+impl From<ModuleState> for State {
+    fn from(state: ModuleState) -> Self {
+        match state {
+            ModuleState::Starting => Self::Starting,
+            ModuleState::Off => Self::Off,
+            ModuleState::On => Self::On,
+            ModuleState::Error => Self::Error,
+            ModuleState::Stopping => Self::Stopping,
+        }
+    }
+}
+
+/// Asks for continuous data. Sent again before the lease ends, it renews it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Subscribe {
+    /// Kind of data.
+    pub number: u16,
+    /// Chosen by the subscriber; the packages carry it.
+    pub id: u16,
+    /// 0: each value; else the newest value once a period, µs.
+    pub period_us: u32,
+    /// Without renewal it ends after this time, ms.
+    pub lease_ms: u32,
+}
+
+/// Which output lines a module sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Schema)]
+pub enum OutputLevel {
+    /// Errors alone.
+    Error,
+    /// And warnings.
+    Warn,
+    /// And what a user wants to know.
+    Info,
+    /// And what a developer wants to know.
+    Debug,
+    /// Everything.
+    Trace,
+}
+
+/// A part of a description's bytes (postcard of [`crate::description::Description`]).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct DescriptionPart {
+    /// Bytes of the whole.
+    pub total: u32,
+    /// From the byte that was asked for.
+    pub bytes: Vec<u8>,
+}
+
+/// Before the value in a package of subscribed data, all little-endian:
+/// `system time u64 ns │ sequence u32 │ missed u32 │ value (postcard)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DataHead {
+    /// When the data was true, ns since 1970.
+    pub stamp_ns: u64,
+    /// Counts the packages of this subscription; a gap is a loss.
+    pub sequence: u32,
+    /// Periods so far in which nothing could be delivered.
+    pub missed: u32,
+}
+
+impl DataHead {
+    /// Bytes of it.
+    pub const BYTES: usize = 16;
+
+    /// As it stands in a body.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        bytes[..8].copy_from_slice(&self.stamp_ns.to_le_bytes());
+        bytes[8..12].copy_from_slice(&self.sequence.to_le_bytes());
+        bytes[12..].copy_from_slice(&self.missed.to_le_bytes());
+        bytes
+    }
+
+    /// Splits a body into head and value; none when it is too short.
+    pub fn split(body: &[u8]) -> Option<(Self, &[u8])> {
+        let (stamp, rest) = body.split_first_chunk()?;
+        let (sequence, rest) = rest.split_first_chunk()?;
+        let (missed, value) = rest.split_first_chunk()?;
+        let head = Self {
+            stamp_ns: u64::from_le_bytes(*stamp),
+            sequence: u32::from_le_bytes(*sequence),
+            missed: u32::from_le_bytes(*missed),
+        };
+        Some((head, value))
+    }
+}
+
+const fn _all_common_types_are_data() {
+    const fn data<T: Data>() {}
+    data::<Status>();
+    data::<Subscribe>();
+    data::<OutputLevel>();
+    data::<DescriptionPart>();
+}

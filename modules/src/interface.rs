@@ -1,0 +1,145 @@
+//! What the `interface` attribute makes of a trait: an interface that a module serves and proxies call.
+
+use crate::call::{CallError, Caller, Fault, Pending};
+use crate::description::Description;
+use crate::value::Data;
+use rohrpost_mailbox::Name;
+use std::marker::PhantomData;
+use std::time::Duration;
+
+/// A set of functions and data that modules of a class offer. Implemented by the `interface` attribute.
+pub trait Interface {
+    /// The class, by its name in the configuration.
+    const CLASS: &'static str;
+
+    /// Functions and data.
+    fn description() -> Description;
+}
+
+/// An interface that a module of type `M` serves. Implemented by the `interface` attribute for all that implement the trait.
+pub trait Serve<M>: Interface {
+    /// Runs a function: arguments and result are postcard; the result is appended to `reply`.
+    ///
+    /// # Errors
+    /// [`Fault::Unknown`] and [`Fault::Arguments`].
+    fn serve(module: &mut M, function: u16, arguments: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault>;
+}
+
+/// One kind of data of an interface.
+pub struct DataPort<T> {
+    /// The interface's class.
+    pub class: &'static str,
+    /// Number in the interface.
+    pub number: u16,
+    /// Its name.
+    pub name: &'static str,
+    /// The interface's hash, computed when first needed.
+    pub hash: fn() -> u32,
+    data: PhantomData<fn() -> T>,
+}
+
+impl<T> DataPort<T> {
+    /// For the `interface` attribute.
+    #[doc(hidden)]
+    pub const fn new(class: &'static str, number: u16, name: &'static str, hash: fn() -> u32) -> Self {
+        Self { class, number, name, hash, data: PhantomData }
+    }
+}
+
+impl<T> Clone for DataPort<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for DataPort<T> {}
+
+/// A typed client of another module's interface. Implemented by the `interface` attribute.
+pub trait Proxy {
+    /// The class it speaks to.
+    const CLASS: &'static str;
+
+    /// A proxy of this module.
+    fn new(link: &Caller, module: Name) -> Self;
+}
+
+/// What every proxy is made of.
+#[doc(hidden)]
+pub struct ProxyCore {
+    pub link: Caller,
+    pub module: Name,
+    pub timeout: Duration,
+}
+
+impl ProxyCore {
+    /// A call is given up after a second unless the proxy says otherwise.
+    const TIMEOUT: Duration = Duration::from_secs(1);
+
+    pub fn new(link: &Caller, module: Name) -> Self {
+        Self { link: link.clone(), module: module.module(), timeout: Self::TIMEOUT }
+    }
+
+    /// Begins a call; the arguments are a tuple.
+    pub fn begin<A: serde::Serialize, T: serde::de::DeserializeOwned>(
+        &self,
+        function: u16,
+        hash: u32,
+        arguments: &A,
+    ) -> Result<Pending<T>, CallError> {
+        let write = |body: &mut Vec<u8>| append(body, arguments);
+        let sequence = self.link.borrow_mut().begin(self.module, function, hash, self.timeout, write)?;
+        Ok(Pending::new(self.link.clone(), sequence, self.module))
+    }
+
+    /// Asks for the newest data of a kind: its system time (ns since 1970) and itself.
+    pub fn get<T: Data>(&self, port: DataPort<T>) -> Result<(u64, T), CallError> {
+        let hash = (port.hash)();
+        self.begin::<_, (u64, T)>(crate::common::GET_DATA, hash, &(port.number,))?.wait()
+    }
+}
+
+/// Appends a value as postcard.
+///
+/// # Errors
+/// When the value cannot be written (a map of unknown length, say).
+pub fn append<T: serde::Serialize + ?Sized>(to: &mut Vec<u8>, value: &T) -> Result<(), postcard::Error> {
+    let taken = std::mem::take(to);
+    *to = postcard::to_extend(value, taken)?;
+    Ok(())
+}
+
+/// The interfaces of a module: one, or a tuple of them, one a face.
+pub trait Interfaces<M> {
+    /// A line for each.
+    fn table() -> Vec<Served<M>>;
+}
+
+/// One interface of a module.
+pub struct Served<M> {
+    /// Class of the face that has it.
+    pub class: &'static str,
+    /// Functions and data.
+    pub description: Description,
+    /// Runs a function.
+    pub serve: ServeFunction<M>,
+}
+
+/// See [`Serve::serve`].
+pub type ServeFunction<M> = fn(&mut M, u16, &[u8], &mut Vec<u8>) -> Result<(), Fault>;
+
+impl<M, I: Serve<M>> Interfaces<M> for I {
+    fn table() -> Vec<Served<M>> {
+        vec![Served { class: I::CLASS, description: I::description(), serve: I::serve }]
+    }
+}
+
+macro_rules! interfaces_of_tuples {
+    ($(($($interface:ident),*))*) => {$(
+        impl<M, $($interface: Serve<M>),*> Interfaces<M> for ($($interface,)*) {
+            fn table() -> Vec<Served<M>> {
+                vec![$(Served { class: $interface::CLASS, description: $interface::description(), serve: $interface::serve }),*]
+            }
+        }
+    )*};
+}
+interfaces_of_tuples! { () (A) (A, B) (A, B, C) (A, B, C, D) }

@@ -1,0 +1,279 @@
+//! Launch: starts the modules of one node, watches over them, and stops them.
+//!
+//! ```text
+//!           spawn            state ≠ starting          on
+//! Waiting ─────────▶ Starting ───────────────▶ Ready ──────▶ Running ──▶ ended
+//!    ▲  backoff                                                │           │ policy
+//!    └──────────────────────────────────────────────────────────┴───────────┘──▶ Ended, Failed
+//! ```
+//!
+//! If launch dies, the kernel tells each module (see `runtime::start`), which goes to its safe state and ends; one that
+//! cannot is ended by the next launch.
+
+mod child;
+mod leftovers;
+
+pub use child::Phase;
+pub use leftovers::CONFIG_FILE;
+
+use crate::runtime::{ClientError, ToolLink};
+use crate::survey::Survey;
+use child::Child;
+use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as ConfiguredTime};
+use rohrpost_mailbox::{LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+/// Modules answer launch within this time.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Why a node could not be launched.
+#[derive(Debug, thiserror::Error)]
+pub enum LaunchError {
+    /// Several nodes, or another one.
+    #[error("which node? the configuration has {0}; say --node NAME")]
+    WhichNode(String),
+    /// The node.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// Launch's own mailboxes.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// Signals.
+    #[error("signal handlers: {0}")]
+    Signals(std::io::Error),
+    /// Programs that are not there.
+    #[error("{0}")]
+    Programs(String),
+    /// A module that would not start.
+    #[error("module {0} did not become ready: {1}")]
+    NotReady(String, String),
+}
+
+/// What wakes launch.
+pub enum Event {
+    /// End it all: a signal, or whoever runs launch.
+    Stop,
+    /// A child may have ended.
+    Child,
+}
+
+/// A node that is launched.
+pub struct Launch {
+    installation: Arc<Installation>,
+    node_name: String,
+    node: Arc<Node>,
+    children: Vec<Child>,
+    tool: ToolLink,
+    lock: LaunchLock,
+    _time: TimeKeeper,
+    events: Receiver<Event>,
+    /// What happened, for whoever shows it; oldest first.
+    notes: Vec<String>,
+}
+
+/// The node that is meant: the one named, or the only one.
+///
+/// # Errors
+/// [`LaunchError::WhichNode`].
+pub fn choose_node<'a>(installation: &'a Installation, name: Option<&str>) -> Result<&'a NodeConfig, LaunchError> {
+    let names = || installation.nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(", ");
+    match (name, &installation.nodes[..]) {
+        (Some(name), _) => installation.node(name).ok_or_else(|| LaunchError::WhichNode(names())),
+        (None, [only]) => Ok(only),
+        (None, _) => Err(LaunchError::WhichNode(names())),
+    }
+}
+
+impl Launch {
+    /// Makes the node and starts its modules one after the other, each when the one before is ready; then switches them on.
+    /// `executable` is the `rohrpost` command, which holds the built-in modules.
+    ///
+    /// # Errors
+    /// When the node runs already, a program is missing, or a module does not become ready. Then nothing is left running.
+    pub fn begin(
+        installation: Arc<Installation>,
+        node_name: &str,
+        executable: PathBuf,
+        events: Receiver<Event>,
+    ) -> Result<Self, LaunchError> {
+        let mode = installation.node(node_name).map_or(0o700, |node| node.mode);
+        let node = Node::create(&node_directory(&installation.name, node_name), mode)?;
+        let lock = node.launch_lock()?;
+        let mut notes = leftovers::end(&node, &installation, node_name)?;
+        let beside = executable.parent().map(PathBuf::from).unwrap_or_default();
+        let missing = installation.missing_programs(node_name, &beside);
+        let fatal: Vec<String> = missing.iter().filter(|p| !p.optional).map(ToString::to_string).collect();
+        if !fatal.is_empty() {
+            return Err(LaunchError::Programs(fatal.join("\n")));
+        }
+        notes.extend(missing.iter().map(|program| format!("left out: {program}")));
+        let time = begin_time(&node, &installation)?;
+        leftovers::note_config(&node, &installation, node_name)?;
+        let tool = ToolLink::join(&installation, &node, node_name, PATIENCE)?;
+        let children = installation
+            .modules_on(node_name)
+            .filter(|module| missing.iter().all(|program| program.module != module.name))
+            .map(|module| Child::new(module, &installation, &executable))
+            .collect();
+        let node_name = node_name.to_owned();
+        let mut launch =
+            Self { installation, node_name, node, children, tool, lock, _time: time, events, notes };
+        match launch.start_all() {
+            Ok(()) => Ok(launch),
+            Err(error) => {
+                launch.stop();
+                Err(error)
+            }
+        }
+    }
+
+    fn start_all(&mut self) -> Result<(), LaunchError> {
+        for index in 0..self.children.len() {
+            self.children[index].spawn();
+            loop {
+                let stop = matches!(self.events.recv_timeout(Duration::from_millis(5)), Ok(Event::Stop));
+                self.step(index);
+                let child = &self.children[index];
+                match child.phase() {
+                    Phase::Ready | Phase::Ended => break,
+                    Phase::Failed(why) => return Err(LaunchError::NotReady(child.text().into(), why.clone())),
+                    _ if stop => return Err(LaunchError::NotReady(child.text().into(), "told to stop".into())),
+                    _ => {}
+                }
+            }
+        }
+        for index in 0..self.children.len() {
+            self.switch_on(index);
+        }
+        Ok(())
+    }
+
+    /// Moves one module on.
+    fn step(&mut self, index: usize) {
+        let child = &mut self.children[index];
+        if let Some(note) = child.step(&self.node, Instant::now()) {
+            self.notes.push(note);
+        }
+    }
+
+    fn switch_on(&mut self, index: usize) {
+        let child = &mut self.children[index];
+        if *child.phase() != Phase::Ready {
+            return;
+        }
+        if child.wants_on()
+            && let Err(error) = self.tool.switch(child.name(), true)
+        {
+            self.notes.push(format!("{} could not be switched on: {error}", child.text()));
+        }
+        child.runs();
+    }
+
+    /// Watches for at most `period`, or until something happens; false when it is time to stop.
+    pub fn watch(&mut self, period: Duration) -> bool {
+        let stop = match self.events.recv_timeout(period) {
+            Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => true,
+            Ok(Event::Child) | Err(RecvTimeoutError::Timeout) => false,
+        };
+        for index in 0..self.children.len() {
+            self.step(index);
+            self.switch_on(index);
+        }
+        !stop
+    }
+
+    /// What happened since it was last asked.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// Modules that failed for good, and why.
+    pub fn failures(&self) -> Vec<(String, String)> {
+        let failed = |child: &Child| match child.phase() {
+            Phase::Failed(why) => Some((child.text().to_owned(), why.clone())),
+            _ => None,
+        };
+        self.children.iter().filter_map(failed).collect()
+    }
+
+    /// Where launch stands with a module.
+    pub fn phase(&self, name: Name) -> Option<&Phase> {
+        self.children.iter().find(|child| child.name() == name).map(Child::phase)
+    }
+
+    /// How often a module was started again.
+    pub fn restarts(&self, name: Name) -> u32 {
+        self.children.iter().find(|child| child.name() == name).map_or(0, Child::restarts)
+    }
+
+    /// Looks at the node.
+    ///
+    /// # Errors
+    /// When its directory cannot be read.
+    pub fn survey(&self) -> Result<Survey, NodeError> {
+        Survey::new(&self.node, &self.installation, &self.node_name)
+    }
+
+    /// Launch's own link, for calls.
+    pub fn tool(&mut self) -> &mut ToolLink {
+        &mut self.tool
+    }
+
+    /// The configuration it runs.
+    pub fn installation(&self) -> &Arc<Installation> {
+        &self.installation
+    }
+
+    /// Stops all modules, the last first, and removes the node. What does not stop in its time is killed. Returns what there
+    /// is to say about it.
+    pub fn stop(self) -> Vec<String> {
+        let Self { node, mut children, tool, lock, _time, mut notes, .. } = self;
+        for child in children.iter_mut().rev() {
+            notes.extend(child.stop(&node));
+        }
+        tool.close();
+        drop(lock);
+        match node.remove_if_dead() {
+            Ok(true) => {}
+            Ok(false) => notes.push(format!(
+                "somebody still uses {}; `rohrpost clean` removes it when they have ended",
+                node.path().display()
+            )),
+            Err(error) => notes.push(error.to_string()),
+        }
+        notes
+    }
+}
+
+fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeeper, NodeError> {
+    let (source, pace) = match installation.time {
+        ConfiguredTime::Local => (TimeSource::Local, 1.0),
+        ConfiguredTime::Simulation { speed } => (TimeSource::Simulation, speed),
+        ConfiguredTime::Log => (TimeSource::Log, 1.0),
+    };
+    TimeKeeper::begin(node, source, realtime_ns(), pace)
+}
+
+/// A channel of events: SIGINT and SIGTERM say stop, SIGCHLD says that a child may have ended.
+///
+/// # Errors
+/// [`LaunchError::Signals`].
+pub fn events() -> Result<Receiver<Event>, LaunchError> {
+    use signal_hook::consts::{SIGCHLD, SIGINT, SIGTERM};
+    let mut signals =
+        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGCHLD]).map_err(LaunchError::Signals)?;
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let forward = move || {
+        for signal in signals.forever() {
+            let event = if signal == SIGCHLD { Event::Child } else { Event::Stop };
+            if sender.send(event).is_err() {
+                break;
+            }
+        }
+    };
+    std::thread::Builder::new().name("signals".into()).spawn(forward).map_err(LaunchError::Signals)?;
+    Ok(receiver)
+}

@@ -1,0 +1,87 @@
+//! What a module's author writes: a struct, its interface, and what it does when it is switched on, off, ticked or given data.
+
+use crate::interface::Interfaces;
+use crate::runtime::{Context, Received};
+use serde::de::DeserializeOwned;
+use std::fmt;
+
+/// A program of a class. Implement this for a struct, the interface's trait too, and call [`crate::run`] in `main`.
+///
+/// One thread calls all of it, one thing at a time: commands of the interface, these functions, nothing else.
+pub trait Module: Sized {
+    /// What the configuration says under `settings`; use `#[serde(deny_unknown_fields, rename_all = "kebab-case")]`.
+    type Settings: DeserializeOwned;
+    /// The interface it serves: `MotorInterface`; for a module with faces a tuple, one each; `()` for none.
+    type Interfaces: Interfaces<Self>;
+
+    /// Makes the module, switched off. Subscribe here, and keep the proxies that you need.
+    ///
+    /// # Errors
+    /// Ends the process; launch says why and tries again as the restart policy has it.
+    fn new(settings: Self::Settings, context: &mut Context) -> Result<Self, ModuleError>;
+
+    /// Begins to work.
+    ///
+    /// # Errors
+    /// The module is in error and stays off.
+    fn on(&mut self, _context: &mut Context) -> Result<(), ModuleError> {
+        Ok(())
+    }
+
+    /// Goes to its safe state: also when launch has died, and before the process ends.
+    fn off(&mut self, _context: &mut Context) {}
+
+    /// Called once a period while it is on, if [`Context::set_period`] asked for it.
+    ///
+    /// # Errors
+    /// The module is switched off and in error.
+    fn tick(&mut self, _context: &mut Context) -> Result<(), ModuleError> {
+        Ok(())
+    }
+
+    /// Takes data that it subscribed to, while it is on.
+    ///
+    /// # Errors
+    /// The module is switched off and in error.
+    fn received(&mut self, _context: &mut Context, _data: &Received<'_>) -> Result<(), ModuleError> {
+        Ok(())
+    }
+}
+
+/// Why a module cannot work, in words for its user. Any error becomes one with `?`.
+pub struct ModuleError(String);
+
+impl ModuleError {
+    /// From words.
+    pub fn new(text: impl Into<String>) -> Self {
+        Self(text.into())
+    }
+}
+
+impl fmt::Display for ModuleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl fmt::Debug for ModuleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+// Like anyhow's: it is made from every error, so it cannot be one itself.
+impl<E: std::error::Error> From<E> for ModuleError {
+    fn from(error: E) -> Self {
+        let mut text = error.to_string();
+        let mut source = error.source();
+        while let Some(cause) = source {
+            let cause_text = cause.to_string();
+            if !text.contains(&cause_text) {
+                text = format!("{text}: {cause_text}");
+            }
+            source = cause.source();
+        }
+        Self(text)
+    }
+}

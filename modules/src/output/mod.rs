@@ -1,0 +1,69 @@
+//! What modules say, on its way to the output collector (seed 002, 2.2.4).
+//!
+//! Every `tracing` event becomes a line. A line goes into a small queue of this process and from there, at once if nobody
+//! else is at it, into the collector's mailbox: a module never waits on its own words, and what finds no room is counted and
+//! said as soon as there is room again.
+
+mod layer;
+
+pub use layer::{drain, install, lost, retry_at, set_level};
+
+use crate::common::OutputLevel;
+use postcard_schema::Schema;
+use rohrpost_mailbox::Name;
+use serde::{Deserialize, Serialize};
+
+/// Mailbox of the collector that takes lines; a local id of its own.
+pub const LINES: u8 = 3;
+/// Class of the collector.
+pub const CLASS: &str = "output";
+/// Longest text of a line, bytes; what is longer is cut.
+pub const TEXT_MAX: usize = 900;
+
+/// Prints a line to standard error. Whoever read it may be gone; that is no reason to panic.
+pub(crate) fn print(line: &dyn std::fmt::Display) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// One line of output.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct OutputLine {
+    /// System time at which it was said, ns since 1970.
+    pub time_ns: u64,
+    /// Module that said it: the 32 bits of its name.
+    pub module: u32,
+    /// How important it is.
+    pub level: OutputLevel,
+    /// Lines of this module that were lost before this one.
+    pub lost: u32,
+    /// What it says.
+    pub text: String,
+}
+
+impl OutputLine {
+    /// The module that said it.
+    pub fn module(&self) -> Name {
+        Name::from_raw(self.module)
+    }
+
+    /// The time of day it was said (UTC), to the millisecond.
+    pub fn time_text(&self) -> String {
+        let ms = self.time_ns / 1_000_000;
+        let (seconds, minutes, hours) = (ms / 1000 % 60, ms / 60_000 % 60, ms / 3_600_000 % 24);
+        format!("{hours:02}:{minutes:02}:{seconds:02}.{:03}", ms % 1000)
+    }
+}
+
+impl OutputLevel {
+    /// One word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warn => "warn",
+            Self::Info => "info",
+            Self::Debug => "debug",
+            Self::Trace => "trace",
+        }
+    }
+}

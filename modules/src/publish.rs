@@ -1,0 +1,251 @@
+//! The publishing side of continuous data: who wants what, how often, and until when. Knows no clock and no mailbox.
+
+use crate::common::Subscribe;
+use rohrpost_mailbox::{Name, Priority};
+
+/// Subscriptions of one module at a time.
+pub(crate) const SUBSCRIPTIONS_MAX: usize = 64;
+
+/// The newest value of one kind of data.
+#[derive(Default)]
+pub(crate) struct Newest {
+    pub(crate) face: usize,
+    pub(crate) number: u16,
+    pub(crate) stamp_ns: u64,
+    /// Postcard of the value.
+    pub(crate) value: Vec<u8>,
+}
+
+/// One subscription.
+pub(crate) struct Subscription {
+    pub(crate) face: usize,
+    pub(crate) wish: Subscribe,
+    /// Data mailbox that it goes to.
+    pub(crate) to: Name,
+    /// Of the request that asked for it; the data carry the same.
+    pub(crate) priority: Priority,
+    pub(crate) sequence: u32,
+    pub(crate) missed: u32,
+    ends_ns: u64,
+    /// Next time a periodic one is due; 0 for those that want each value.
+    due_ns: u64,
+    /// Whether a value has come since the last was sent.
+    fresh: bool,
+}
+
+/// Tells what became of one delivery.
+pub(crate) enum Delivery {
+    /// Accepted.
+    Sent,
+    /// The subscriber's mailbox was full.
+    Full,
+    /// The subscriber is gone.
+    Gone,
+}
+
+/// All subscriptions to a module's data.
+#[derive(Default)]
+pub(crate) struct Subscriptions {
+    list: Vec<Subscription>,
+    /// Misses of subscriptions that have ended.
+    missed_before: u64,
+}
+
+impl Subscriptions {
+    /// Begins or renews; false when there is no room. Times are monotonic.
+    pub(crate) fn subscribe(
+        &mut self,
+        face: usize,
+        to: Name,
+        priority: Priority,
+        wish: Subscribe,
+        now_ns: u64,
+    ) -> bool {
+        let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms) * 1_000_000);
+        let due_ns = if wish.period_us == 0 { 0 } else { now_ns };
+        if let Some(known) = self.list.iter_mut().find(|s| s.to == to && s.wish.id == wish.id) {
+            known.ends_ns = ends_ns;
+            let changed = (known.wish.number, known.wish.period_us, known.face) != (wish.number, wish.period_us, face);
+            known.due_ns = if changed { due_ns } else { known.due_ns };
+            (known.face, known.wish, known.priority) = (face, wish, priority);
+            return true;
+        }
+        if self.list.len() >= SUBSCRIPTIONS_MAX {
+            return false;
+        }
+        let (sequence, missed, fresh) = (0, 0, false);
+        self.list.push(Subscription { face, wish, to, priority, sequence, missed, ends_ns, due_ns, fresh });
+        true
+    }
+
+    /// Ends one.
+    pub(crate) fn unsubscribe(&mut self, to: Name, id: u16) {
+        self.retain(|subscription| subscription.to != to || subscription.wish.id != id);
+    }
+
+    fn retain(&mut self, keep: impl Fn(&Subscription) -> bool) {
+        let gone = self.list.iter().filter(|s| !keep(s)).map(|s| u64::from(s.missed));
+        self.missed_before += gone.sum::<u64>();
+        self.list.retain(keep);
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Periods and packages missed so far, by all.
+    pub(crate) fn missed(&self) -> u64 {
+        self.missed_before + self.list.iter().map(|s| u64::from(s.missed)).sum::<u64>()
+    }
+
+    /// A new value: `deliver` it to those who want each.
+    pub(crate) fn published(&mut self, newest: &Newest, mut deliver: impl FnMut(&Subscription) -> Delivery) {
+        let mut gone = false;
+        for subscription in &mut self.list {
+            if (subscription.face, subscription.wish.number) != (newest.face, newest.number) {
+                continue;
+            }
+            if subscription.wish.period_us == 0 {
+                gone |= !subscription.settle(deliver(subscription));
+            } else {
+                subscription.fresh = true;
+            }
+        }
+        if gone {
+            self.retain(|subscription| subscription.ends_ns != 0);
+        }
+    }
+
+    /// Delivers what is due and drops those whose lease has ended.
+    pub(crate) fn tick(&mut self, now_ns: u64, mut deliver: impl FnMut(&Subscription) -> Delivery) {
+        if self.list.iter().any(|subscription| subscription.ends_ns <= now_ns) {
+            self.retain(|subscription| subscription.ends_ns > now_ns);
+        }
+        let mut gone = false;
+        for subscription in self.list.iter_mut().filter(|s| s.due_ns != 0 && s.due_ns <= now_ns) {
+            let period_ns = u64::from(subscription.wish.period_us) * 1000;
+            // Periods that passed while nobody looked are missed too, but only the newest value is sent.
+            let passed = (now_ns - subscription.due_ns) / period_ns;
+            subscription.due_ns += (passed + 1) * period_ns;
+            subscription.missed = subscription.missed.saturating_add(u32::try_from(passed).unwrap_or(u32::MAX));
+            if std::mem::take(&mut subscription.fresh) {
+                gone |= !subscription.settle(deliver(subscription));
+            } else {
+                subscription.missed = subscription.missed.saturating_add(1);
+            }
+        }
+        if gone {
+            self.retain(|subscription| subscription.ends_ns != 0);
+        }
+    }
+
+    /// When [`Subscriptions::tick`] has something to do next, ns.
+    pub(crate) fn next_ns(&self) -> Option<u64> {
+        self.list.iter().map(|s| if s.due_ns == 0 { s.ends_ns } else { s.ends_ns.min(s.due_ns) }).min()
+    }
+}
+
+impl Subscription {
+    /// Notes a delivery; false when the subscriber is gone.
+    fn settle(&mut self, delivery: Delivery) -> bool {
+        match delivery {
+            Delivery::Sent => self.sequence = self.sequence.wrapping_add(1),
+            Delivery::Full => {
+                // The number is used up, so that the subscriber sees the gap.
+                self.sequence = self.sequence.wrapping_add(1);
+                self.missed = self.missed.saturating_add(1);
+            }
+            Delivery::Gone => {
+                self.ends_ns = 0;
+                return false;
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn wish(period_ms: u32) -> Subscribe {
+        Subscribe { number: 1, id: 7, period_us: period_ms * 1000, lease_ms: 1000 }
+    }
+
+    fn subscribed(period_ms: u32) -> Subscriptions {
+        let mut all = Subscriptions::default();
+        assert!(all.subscribe(0, Name::new(1, 9, 0, 2), Priority(9), wish(period_ms), 1));
+        all
+    }
+
+    fn publish(all: &mut Subscriptions, delivery: fn() -> Delivery) -> usize {
+        let mut sent = 0;
+        let newest = Newest { number: 1, ..Newest::default() };
+        all.published(&newest, |_| {
+            sent += 1;
+            delivery()
+        });
+        sent
+    }
+
+    fn tick(all: &mut Subscriptions, now_ns: u64) -> usize {
+        let mut sent = 0;
+        all.tick(now_ns, |_| {
+            sent += 1;
+            Delivery::Sent
+        });
+        sent
+    }
+
+    #[test]
+    fn each_value_goes_to_who_wants_each() {
+        let mut all = subscribed(0);
+        assert_eq!((publish(&mut all, || Delivery::Sent), publish(&mut all, || Delivery::Sent)), (1, 1));
+        let other = Newest { number: 2, ..Newest::default() };
+        all.published(&other, |_| unreachable!("nobody asked for number 2"));
+        assert_eq!(all.list[0].sequence, 2);
+    }
+
+    #[test]
+    fn a_period_delivers_the_newest_once_or_counts_a_miss() {
+        let mut all = subscribed(10);
+        assert_eq!(publish(&mut all, || Delivery::Sent), 0, "waits for its time");
+        for (now_ms, fresh, sent, missed, why) in [
+            (0, false, 1, 0, "due at once, and there is a value"),
+            (5, true, 0, 0, "not due yet"),
+            (10, false, 1, 0, "the value of before"),
+            (20, false, 0, 1, "no new value"),
+            (55, true, 1, 3, "two periods slept through, then the newest"),
+            (60, false, 0, 4, "the grid stays where it was"),
+        ] {
+            if fresh {
+                publish(&mut all, || Delivery::Sent);
+            }
+            let got = tick(&mut all, 1 + now_ms * MS);
+            assert_eq!((got, all.missed()), (sent, missed), "at {now_ms} ms: {why}");
+        }
+    }
+
+    #[test]
+    fn a_lease_ends_unless_it_is_renewed() {
+        let mut all = subscribed(0);
+        tick(&mut all, 999 * MS);
+        assert!(all.subscribe(0, Name::new(1, 9, 0, 2), Priority(9), wish(0), 999 * MS));
+        assert_eq!(all.len(), 1, "renewed, not doubled");
+        tick(&mut all, 1500 * MS);
+        assert_eq!(all.len(), 1);
+        tick(&mut all, 2000 * MS);
+        assert_eq!(all.len(), 0);
+    }
+
+    #[test]
+    fn full_is_a_gap_and_a_miss_and_gone_is_gone() {
+        let mut all = subscribed(0);
+        publish(&mut all, || Delivery::Full);
+        assert_eq!((all.list[0].sequence, all.missed()), (1, 1));
+        publish(&mut all, || Delivery::Gone);
+        assert_eq!((all.len(), all.missed()), (0, 1), "what was missed stays counted");
+    }
+}

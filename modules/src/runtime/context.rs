@@ -1,0 +1,274 @@
+//! What a module can ask of its runtime.
+
+use super::follow::{Followings, Rate, Subscription};
+use crate::call::{Caller, Link};
+use crate::common::DataHead;
+use crate::interface::{DataPort, Proxy, append};
+use crate::publish::{Delivery, Newest, Subscriptions};
+use crate::value::Data;
+use rohrpost_config::{Installation, NameTextError};
+use rohrpost_mailbox::{
+    CreateError, Label, Name, Options, Receiver, SendError, Shape, SystemClock, SystemTime, Type, local,
+};
+use std::cell::RefCell;
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Why a module cannot speak to another.
+#[derive(Debug, thiserror::Error)]
+pub enum ContextError {
+    /// The text names no module.
+    #[error(transparent)]
+    Name(#[from] NameTextError),
+    /// A proxy or subscription of another class.
+    #[error("`{module}` is of class `{class}`, but this speaks to class `{wanted}`")]
+    Class {
+        /// What was named.
+        module: String,
+        /// Its class.
+        class: String,
+        /// The interface's class.
+        wanted: &'static str,
+    },
+    /// Data that no face of this module publishes.
+    #[error("this module has no face of class `{0}`; add one to `faces` in the configuration, or to its `Interfaces`")]
+    NoFace(&'static str),
+    /// The value cannot be written as postcard.
+    #[error("data `{0}` cannot be written: {1}")]
+    Encode(&'static str, postcard::Error),
+}
+
+/// A module's way to its node: proxies, subscriptions, publishing, time, settings.
+pub struct Context {
+    pub(crate) me: Name,
+    pub(crate) installation: Arc<Installation>,
+    pub(crate) link: Caller,
+    pub(crate) faces: Vec<Name>,
+    pub(crate) newest: Vec<Newest>,
+    pub(crate) subscriptions: Subscriptions,
+    pub(crate) followings: Followings,
+    pub(crate) clock: SystemClock,
+    /// Mailboxes of the module's own, besides commands, replies and data.
+    pub(crate) own: Vec<Receiver>,
+    pub(crate) period: Option<Duration>,
+    pub(crate) next_tick: Option<Instant>,
+    scratch: Vec<u8>,
+}
+
+impl Context {
+    pub(crate) fn new(me: Name, installation: Arc<Installation>, link: Link, faces: Vec<Name>, clock: SystemClock) -> Self {
+        Self {
+            me,
+            installation,
+            link: Rc::new(RefCell::new(link)),
+            faces,
+            newest: Vec::new(),
+            subscriptions: Subscriptions::default(),
+            followings: Followings::default(),
+            clock,
+            own: Vec::new(),
+            period: None,
+            next_tick: None,
+            scratch: Vec::new(),
+        }
+    }
+
+    /// The module's own name.
+    pub fn me(&self) -> Name {
+        self.me
+    }
+
+    /// The configuration that it runs under.
+    pub fn installation(&self) -> &Installation {
+        &self.installation
+    }
+
+    /// A path from the settings, which starts from the configuration file's folder.
+    pub fn path(&self, path: &str) -> PathBuf {
+        self.installation.resolve(path)
+    }
+
+    /// System time now.
+    pub fn now(&self) -> SystemTime {
+        self.clock.now()
+    }
+
+    /// The clock that system time is read from, to keep.
+    pub fn clock(&self) -> &SystemClock {
+        &self.clock
+    }
+
+    /// Asks for [`crate::Module::tick`] once in this time, from now on.
+    pub fn set_period(&mut self, period: Duration) {
+        self.period = Some(period.max(Duration::from_micros(1)));
+        self.next_tick = Some(Instant::now());
+    }
+
+    /// A proxy of the module that a setting names, such as `motor.0`.
+    ///
+    /// # Errors
+    /// When the text names no module, or one of another class.
+    pub fn proxy<P: Proxy>(&self, module: &str) -> Result<P, ContextError> {
+        Ok(P::new(&self.link, self.named(module, P::CLASS)?))
+    }
+
+    /// The link that proxies are made of.
+    pub fn link(&self) -> &Caller {
+        &self.link
+    }
+
+    /// Subscribes to data of the module that a setting names. The subscription is kept alive, and asked for anew when that
+    /// module is restarted.
+    ///
+    /// # Errors
+    /// When the text names no module, or one of another class.
+    pub fn subscribe<T: Data>(
+        &mut self,
+        port: DataPort<T>,
+        module: &str,
+        rate: Rate,
+    ) -> Result<Subscription<T>, ContextError> {
+        let from = self.named(module, port.class)?;
+        Ok(Subscription::new(self.followings.follow(from, port.number, (port.hash)(), rate)))
+    }
+
+    /// Subscribes to data whose type is known by its description alone.
+    pub fn subscribe_untyped(&mut self, from: Name, number: u16, interface: u32, rate: Rate) -> Subscription<()> {
+        Subscription::new(self.followings.follow(from, number, interface, rate))
+    }
+
+    /// Makes a mailbox of the module's own, local id 3 or more. What it brings comes to [`crate::Module::received`]; bodies
+    /// begin as those of subscribed data do.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
+        let participant = self.link.borrow().participant().clone();
+        self.own.push(participant.receiver(self.me.with_local(local), shape)?);
+        Ok(())
+    }
+
+    fn named(&self, module: &str, wanted: &'static str) -> Result<Name, ContextError> {
+        let name = self.installation.classes.parse_module(module)?;
+        let class = self.installation.classes.name(name.class()).unwrap_or_default();
+        if class != wanted {
+            return Err(ContextError::Class { module: module.into(), class: class.into(), wanted });
+        }
+        Ok(name)
+    }
+
+    /// Publishes a value that was true at `stamp_ns` (system time): it becomes the newest, and goes to all who subscribed.
+    /// A subscriber whose mailbox is full misses it, and sees that it did.
+    ///
+    /// # Errors
+    /// [`ContextError::NoFace`] or [`ContextError::Encode`].
+    pub fn publish<T: Data>(&mut self, port: DataPort<T>, stamp_ns: u64, value: &T) -> Result<(), ContextError> {
+        let class = self.installation.classes.id(port.class);
+        let face = self.faces.iter().position(|face| Some(face.class()) == class);
+        let face = face.ok_or(ContextError::NoFace(port.class))?;
+        self.scratch.clear();
+        append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
+        let at = self.newest_at(face, port.number);
+        let newest = &mut self.newest[at];
+        newest.stamp_ns = stamp_ns;
+        std::mem::swap(&mut newest.value, &mut self.scratch);
+        let (newest, link, faces) = (&self.newest[at], &self.link, &self.faces);
+        self.subscriptions.published(newest, |to| deliver(link, faces, newest, to));
+        Ok(())
+    }
+
+    /// Publishes a value that is true now.
+    ///
+    /// # Errors
+    /// As for [`Context::publish`].
+    pub fn publish_now<T: Data>(&mut self, port: DataPort<T>, value: &T) -> Result<(), ContextError> {
+        self.publish(port, self.now().ns, value)
+    }
+
+    fn newest_at(&mut self, face: usize, number: u16) -> usize {
+        match self.newest.iter().position(|newest| (newest.face, newest.number) == (face, number)) {
+            Some(at) => at,
+            None => {
+                self.newest.push(Newest { face, number, ..Newest::default() });
+                self.newest.len() - 1
+            }
+        }
+    }
+
+    /// Delivers periodic data that is due.
+    pub(crate) fn deliver_due(&mut self, now_ns: u64) {
+        let (all, link, faces) = (&self.newest, &self.link, &self.faces);
+        self.subscriptions.tick(now_ns, |to| {
+            match all.iter().find(|newest| (newest.face, newest.number) == (to.face, to.wish.number)) {
+                Some(newest) => deliver(link, faces, newest, to),
+                None => Delivery::Full,
+            }
+        });
+    }
+}
+
+/// Sends a value to a subscriber.
+fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::Subscription) -> Delivery {
+    let head = DataHead { stamp_ns: newest.stamp_ns, sequence: to.sequence, missed: to.missed };
+    let label = Label {
+        from: faces[newest.face].with_local(local::COMMANDS),
+        kind: Type::data(newest.number),
+        id: to.wish.id,
+        priority: to.priority,
+        options: Options::STAMPED,
+    };
+    match link.borrow_mut().send(to.to, &label, &[&head.to_bytes(), &newest.value]) {
+        Ok(()) => Delivery::Sent,
+        Err(SendError::NoMailbox(_)) => Delivery::Gone,
+        Err(SendError::TooLarge { name, len, max }) => {
+            tracing::error!("data of {len} bytes do not fit mailbox {name} ({max}); raise `size` of its module's data mailbox");
+            Delivery::Full
+        }
+        Err(_) => Delivery::Full,
+    }
+}
+
+/// Data that a subscription brought.
+pub struct Received<'a> {
+    /// The module that published it.
+    pub from: Name,
+    /// Data number in its interface.
+    pub number: u16,
+    /// Mailbox it came to.
+    pub mailbox: u8,
+    /// Which subscription.
+    pub(crate) id: u16,
+    /// Time, number, misses.
+    pub head: DataHead,
+    /// The value, postcard.
+    pub value: &'a [u8],
+}
+
+impl Received<'_> {
+    /// The value, if it belongs to this subscription and can be read. What cannot be read is told as a warning.
+    pub fn read<T: Data>(&self, subscription: &Subscription<T>) -> Option<T> {
+        if self.is_of(subscription) { self.decode() } else { None }
+    }
+
+    /// The value, if it came to this mailbox of the module's own and can be read.
+    pub fn read_from<T: Data>(&self, mailbox: u8) -> Option<T> {
+        if self.mailbox == mailbox { self.decode() } else { None }
+    }
+
+    fn decode<T: Data>(&self) -> Option<T> {
+        match postcard::from_bytes(self.value) {
+            Ok(value) => Some(value),
+            Err(error) => {
+                tracing::warn!("data {} of {} cannot be read: {error}", self.number, self.from);
+                None
+            }
+        }
+    }
+
+    /// Whether it belongs to this subscription.
+    pub fn is_of<T>(&self, subscription: &Subscription<T>) -> bool {
+        self.mailbox == local::DATA && self.id == subscription.id
+    }
+}

@@ -1,0 +1,51 @@
+//! One name under which a module's process is reached: its command mailbox, its interface, and what it has run.
+
+use crate::call::Once;
+use crate::description::Description;
+use crate::interface::{ServeFunction, Served};
+use rohrpost_mailbox::{Name, Receiver};
+
+/// One face. A module without further faces has this one.
+pub(crate) struct Face<M> {
+    pub(crate) name: Name,
+    pub(crate) commands: Receiver,
+    pub(crate) once: Once,
+    pub(crate) offer: Offer<M>,
+}
+
+/// What a face offers.
+pub(crate) struct Offer<M> {
+    /// Numbers of functions that may be run twice.
+    pub(crate) idempotent: Vec<u16>,
+    /// None: the module serves no interface under this name, only the common functions.
+    pub(crate) serve: Option<ServeFunction<M>>,
+    pub(crate) hash: u32,
+    /// Postcard of the description.
+    pub(crate) description: Vec<u8>,
+}
+
+impl<M> Face<M> {
+    pub(crate) fn new(name: Name, class: &str, commands: Receiver, served: Option<Served<M>>, started_ns: u64) -> Self {
+        let (serve, description) = match served {
+            Some(Served { description, serve, .. }) => (Some(serve), description),
+            None => (None, bare(class)),
+        };
+        let hash = description.hash();
+        let idempotent = description.functions.iter().filter(|f| f.idempotent).map(|f| f.number).collect();
+        // Writing to a growing vector does not fail.
+        let description = postcard::to_stdvec(&description).unwrap_or_default();
+        let offer = Offer { idempotent, serve, hash, description };
+        Self { name, commands, once: Once::new(started_ns), offer }
+    }
+}
+
+/// The description of a module without interface.
+fn bare(class: &str) -> Description {
+    Description {
+        name: String::new(),
+        class: class.into(),
+        text: "A module without functions or data of its own.".into(),
+        functions: Vec::new(),
+        data: Vec::new(),
+    }
+}

@@ -1,0 +1,161 @@
+//! The subscribing side of continuous data: asks, renews, and sees gaps.
+
+use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE};
+use crate::call::{CallError, Link};
+use crate::interface::append;
+use rohrpost_mailbox::Name;
+use std::marker::PhantomData;
+use std::time::{Duration, Instant};
+
+/// A subscription ends by itself so long after its last renewal.
+const LEASE: Duration = Duration::from_secs(3);
+/// It is renewed three times in a lease; one that is refused or unanswered is asked for again sooner.
+const RENEW: Duration = Duration::from_secs(1);
+const RETRY: Duration = Duration::from_millis(100);
+
+/// How often a subscriber wants data.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Rate {
+    /// Each value.
+    Each,
+    /// The newest value once in this time.
+    Every(Duration),
+}
+
+impl Rate {
+    /// At most so often a second; each value for 0.
+    pub fn hz(hz: f64) -> Self {
+        if hz > 0.0 { Self::Every(Duration::from_secs_f64(1.0 / hz)) } else { Self::Each }
+    }
+}
+
+/// A subscription to data of type `T`; [`super::Received::read`] tells whether data belong to it.
+pub struct Subscription<T> {
+    pub(crate) id: u16,
+    data: PhantomData<fn() -> T>,
+}
+
+impl<T> Clone for Subscription<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Subscription<T> {}
+
+impl<T> Subscription<T> {
+    pub(crate) fn new(id: u16) -> Self {
+        Self { id, data: PhantomData }
+    }
+}
+
+/// One thing that is followed.
+struct Followed {
+    from: Name,
+    wish: Subscribe,
+    interface: u32,
+    /// A request under way.
+    call: Option<u32>,
+    next: Instant,
+    /// Number that the next package should have; none before the first.
+    expected: Option<u32>,
+    /// What the last refusal said, so that it is told once.
+    refusal: Option<String>,
+}
+
+/// All that a module follows.
+#[derive(Default)]
+pub(crate) struct Followings {
+    list: Vec<Followed>,
+    /// Packages that should have come and did not.
+    pub(crate) lost: u64,
+}
+
+impl Followings {
+    /// Follows data number `number` of a module; returns the subscription's id.
+    pub(crate) fn follow(&mut self, from: Name, number: u16, interface: u32, rate: Rate) -> u16 {
+        let id = self.list.len() as u16;
+        let period_us = match rate {
+            Rate::Each => 0,
+            Rate::Every(period) => crate::call::micros(period).max(1),
+        };
+        let wish = Subscribe { number, id, period_us, lease_ms: LEASE.as_millis() as u32 };
+        let next = Instant::now();
+        let from = from.module();
+        self.list.push(Followed { from, wish, interface, call: None, next, expected: None, refusal: None });
+        id
+    }
+
+    /// Asks for what is due, and looks at the answers. Never waits.
+    pub(crate) fn renew(&mut self, link: &mut Link, now: Instant) {
+        link.collect();
+        for followed in &mut self.list {
+            if let Some(call) = followed.call
+                && let Some(answer) = link.poll(call)
+            {
+                followed.call = None;
+                followed.answered(answer, now);
+            }
+            if followed.call.is_none() && followed.next <= now {
+                followed.next = now + RENEW;
+                let write = |body: &mut Vec<u8>| append(body, &followed.wish);
+                match link.begin(followed.from, SUBSCRIBE, followed.interface, RENEW, write) {
+                    Ok(call) => followed.call = Some(call),
+                    Err(error) => followed.answered(Err(error), now),
+                }
+            }
+        }
+    }
+
+    /// When [`Followings::renew`] has something to do next.
+    pub(crate) fn next(&self) -> Option<Instant> {
+        self.list.iter().map(|followed| followed.next).min()
+    }
+
+    /// Notes a package's number.
+    pub(crate) fn note(&mut self, from: Name, id: u16, head: &DataHead) {
+        let Some(followed) = self.list.get_mut(usize::from(id)).filter(|followed| followed.from == from.module()) else {
+            return;
+        };
+        if let Some(expected) = followed.expected {
+            // A publisher that was restarted begins at 0 again; that is no gap.
+            let gap = head.sequence.wrapping_sub(expected);
+            if head.sequence != 0 && gap < u32::MAX / 2 {
+                self.lost += u64::from(gap);
+            }
+        }
+        followed.expected = Some(head.sequence.wrapping_add(1));
+    }
+
+    /// Tells all publishers that nothing is wanted any more; does not wait for an answer.
+    pub(crate) fn end(&mut self, link: &mut Link) {
+        for followed in self.list.drain(..) {
+            let write = |body: &mut Vec<u8>| append(body, &followed.wish.id);
+            if let Ok(call) = link.begin(followed.from, UNSUBSCRIBE, crate::common::HASH, RENEW, write) {
+                link.forget(call);
+            }
+        }
+    }
+}
+
+impl Followed {
+    fn answered(&mut self, answer: Result<(), CallError>, now: Instant) {
+        match answer {
+            Ok(()) => self.refusal = None,
+            Err(error) => {
+                self.next = now + RETRY;
+                let text = error.to_string();
+                // A module that is not there yet is the usual case at the start, and not worth a warning.
+                let early = matches!(error, CallError::NotSent(_) | CallError::Timeout(..));
+                if self.refusal.as_ref() != Some(&text) {
+                    if early {
+                        tracing::debug!("subscription to data {} of {}: {text}", self.wish.number, self.from);
+                    } else {
+                        tracing::warn!("subscription to data {} of {}: {text}", self.wish.number, self.from);
+                    }
+                    self.refusal = Some(text);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! How a program that is no module takes part: tools, tests, launch itself.
+
+use crate::call::{CallError, Link, REPLIES_KEPT};
+use crate::common::{self, DescriptionPart, OutputLevel, Status};
+use crate::description::Description;
+use crate::interface::append;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Packages of subscribed data that may wait for a tool.
+const DATA_SLOTS: u16 = 128;
+
+/// Why a tool cannot take part.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// The node.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// A mailbox.
+    #[error(transparent)]
+    Mailbox(#[from] CreateError),
+    /// All instances of class `tool` are in use.
+    #[error("all {0} tool instances of node `{1}` are in use; end some, or widen `tools` in the configuration")]
+    Crowded(usize, String),
+    /// The configuration has no such node.
+    #[error("the configuration has no node `{0}`")]
+    NoNode(String),
+}
+
+/// A tool's place on a node: a link and a data mailbox, under the first free instance of class `tool`.
+pub struct ToolLink {
+    /// Sends and calls.
+    pub link: Link,
+    /// Room for any answer and any data; tools are few, and give it back when they end.
+    large: Shape,
+    data: Option<Receiver>,
+    /// Reads system time.
+    pub clock: SystemClock,
+    timeout: Duration,
+}
+
+impl ToolLink {
+    /// Joins a running node. Calls made by this link end after `timeout`.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub fn join(installation: &Installation, node: &Arc<Node>, name: &str, timeout: Duration) -> Result<Self, ClientError> {
+        let config = installation.node(name).ok_or_else(|| ClientError::NoNode(name.into()))?;
+        let participant = Participant::join(node, Name::NONE)?;
+        let large = Shape { slots: REPLIES_KEPT as u16, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };
+        for instance in config.tools.clone() {
+            let me = Name::new(installation.system.id, installation.classes.tool().0, instance, 0);
+            let replies = match participant.receiver(me.with_local(local::REPLIES), large) {
+                Err(CreateError::Owned(..)) => continue,
+                other => other?,
+            };
+            let link = Link::new(&participant, me, replies);
+            return Ok(Self { link, large, data: None, clock: SystemClock::open(node), timeout });
+        }
+        Err(ClientError::Crowded(config.tools.clone().count(), name.into()))
+    }
+
+    /// The mailbox that takes subscribed data; made when it is first asked for.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn data(&mut self) -> Result<&mut Receiver, CreateError> {
+        if self.data.is_none() {
+            let name = self.link.me().with_local(local::DATA);
+            let shape = Shape { slots: DATA_SLOTS, ..self.large };
+            self.data = Some(self.link.participant().clone().receiver(name, shape)?);
+        }
+        self.data.as_mut().ok_or(CreateError::Reserved(Name::NONE))
+    }
+
+    /// Calls a common function with a tuple of arguments.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn common<T: serde::de::DeserializeOwned>(
+        &mut self,
+        module: Name,
+        function: u16,
+        arguments: &impl serde::Serialize,
+    ) -> Result<T, CallError> {
+        self.call(module, function, common::HASH, |body| append(body, arguments), |bytes| postcard::from_bytes(bytes))
+    }
+
+    /// Calls any function: `write` appends its arguments, `read` takes its result.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn call<T>(
+        &mut self,
+        module: Name,
+        function: u16,
+        interface: u32,
+        write: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
+        read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
+    ) -> Result<T, CallError> {
+        let call = self.link.begin(module, function, interface, self.timeout, write)?;
+        self.link.wait(call, read)
+    }
+
+    /// Switches a module on or off.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn switch(&mut self, module: Name, on: bool) -> Result<(), CallError> {
+        self.common(module, if on { common::ON } else { common::OFF }, &())
+    }
+
+    /// Asks a module how it is.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn status(&mut self, module: Name) -> Result<Status, CallError> {
+        self.common(module, common::STATUS, &())
+    }
+
+    /// Sets which output lines a module sends.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<(), CallError> {
+        self.common(module, common::OUTPUT_LEVEL, &(level,))
+    }
+
+    /// Asks a module what it offers.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn describe(&mut self, module: Name) -> Result<Description, CallError> {
+        let mut bytes = Vec::new();
+        loop {
+            let part: DescriptionPart = self.common(module, common::DESCRIBE, &(bytes.len() as u32,))?;
+            let last = part.bytes.is_empty();
+            bytes.extend_from_slice(&part.bytes);
+            if bytes.len() >= part.total as usize || last {
+                break;
+            }
+        }
+        postcard::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
+    }
+
+    /// Removes the tool's mailboxes.
+    pub fn close(self) {
+        if let Some(data) = self.data {
+            data.close();
+        }
+        self.link.close();
+    }
+}

@@ -1,0 +1,25 @@
+//! What runs a module: it joins the node, makes the mailboxes, and turns packages into calls of the module's functions.
+//!
+//! ```text
+//!             ┌──────────────── one thread ────────────────┐
+//!  commands ─▶│ server: once? dispatch, reply              │─▶ replies
+//!  data     ─▶│ runner: received, tick, on, off            │─▶ data of subscriptions
+//!  replies  ─▶│ link: proxies' calls, renewals             │─▶ commands
+//!             └────────────────────────────────────────────┘
+//! ```
+
+mod context;
+mod face;
+mod follow;
+mod host;
+mod runner;
+pub(crate) mod server;
+mod start;
+
+pub use context::{Context, ContextError, Received};
+pub use follow::{Rate, Subscription};
+pub use host::{ClientError, ToolLink};
+pub use runner::{run, run_started};
+pub use server::{read_arguments, write_result};
+pub(crate) use start::environment;
+pub use start::{Start, StartError, find_running};

@@ -1,0 +1,229 @@
+//! From a command line or launch's environment to a running module.
+
+use super::context::Context;
+use super::face::Face;
+use super::runner::{Life, Running, served};
+use crate::call::Link;
+use crate::module::Module;
+use crate::output;
+use nix::sys::signal::Signal;
+use rohrpost_config::{Errors, Full, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState};
+use rohrpost_mailbox::{
+    CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, base_directory, local,
+    monotonic_ns, node_directory, sys,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Environment by which launch tells a module what it is.
+pub(crate) mod environment {
+    pub(crate) const CONFIG: &str = "ROHRPOST_CONFIG";
+    pub(crate) const MODULE: &str = "ROHRPOST_MODULE";
+    pub(crate) const LAUNCHER: &str = "ROHRPOST_LAUNCHER";
+    pub(crate) const RESTARTS: &str = "ROHRPOST_RESTARTS";
+}
+
+/// Why a module did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The command line.
+    #[error("{0}\nusage: --config FILE --name CLASS.INSTANCE [--off]")]
+    Usage(String),
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] Errors),
+    /// The name given.
+    #[error(transparent)]
+    Name(#[from] NameTextError),
+    /// No such module.
+    #[error("{0}: no [[module]] is called `{1}`")]
+    NoModule(PathBuf, String),
+    /// The module's settings.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The node.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// A mailbox.
+    #[error(transparent)]
+    Mailbox(#[from] CreateError),
+    /// A face without an interface.
+    #[error("`{0}` is a face of `{1}`, but that program has no interface of class `{2}`")]
+    Face(String, String, String),
+    /// Launch is gone.
+    #[error("launch, process {0}, ended before this module began")]
+    Orphan(u32),
+    /// The module said no.
+    #[error("{0}: {1}")]
+    Module(String, String),
+    /// The system said no.
+    #[error("{0}: {1}")]
+    System(&'static str, std::io::Error),
+}
+
+/// What to start.
+#[derive(Debug)]
+pub struct Start {
+    /// The configuration.
+    pub installation: Arc<Installation>,
+    /// The module's name, local id 0.
+    pub name: Name,
+    /// Process id of the launch that started it, if one did.
+    pub launcher: Option<u32>,
+    /// Times that launch has started it again.
+    pub restarts: u32,
+    /// Leave it switched off.
+    pub off: bool,
+}
+
+impl Start {
+    /// Reads the command line and launch's environment.
+    ///
+    /// # Errors
+    /// Usage, configuration, or an unknown module.
+    pub fn from_environment() -> Result<Self, StartError> {
+        Self::from_arguments(std::env::args().skip(1))
+    }
+
+    /// The same, with arguments that the caller has.
+    ///
+    /// # Errors
+    /// As for [`Start::from_environment`].
+    pub fn from_arguments(arguments: impl Iterator<Item = String>) -> Result<Self, StartError> {
+        let variable = |name| std::env::var(name).ok();
+        let (mut config, mut module) = (variable(environment::CONFIG), variable(environment::MODULE));
+        let launcher = variable(environment::LAUNCHER).and_then(|pid| pid.parse().ok());
+        let restarts = variable(environment::RESTARTS).and_then(|count| count.parse().ok()).unwrap_or(0);
+        let mut off = launcher.is_some();
+        let mut arguments = arguments;
+        while let Some(argument) = arguments.next() {
+            let mut value = || arguments.next().ok_or_else(|| StartError::Usage(format!("`{argument}` needs a value")));
+            match argument.as_str() {
+                "--config" => config = Some(value()?),
+                "--name" => module = Some(value()?),
+                "--off" => off = true,
+                // Launch's own arguments of a program come after its environment; they are the module's business.
+                _ if launcher.is_some() => {}
+                other => return Err(StartError::Usage(format!("unknown argument `{other}`"))),
+            }
+        }
+        let config = config.ok_or_else(|| StartError::Usage("which configuration?".into()))?;
+        let module = module.ok_or_else(|| StartError::Usage("which module of it?".into()))?;
+        let installation = Installation::load(Path::new(&config))?;
+        let name = installation.classes.parse_module(&module)?;
+        Ok(Self { installation: Arc::new(installation), name, launcher, restarts, off })
+    }
+
+    /// Joins the node, makes the mailboxes and the module.
+    pub(crate) fn join<M: Module>(self) -> Result<Running<M>, StartError> {
+        let installation = self.installation.clone();
+        let text = installation.classes.format(self.name);
+        let module = installation.module(self.name).filter(|module| module.name == self.name);
+        let module = module.ok_or_else(|| StartError::NoModule(installation.path.clone(), text.clone()))?;
+        die_with_launch(self.launcher)?;
+        let mode = installation.node(&module.node).map_or(0o700, |node| node.mode);
+        let node = Node::create(&node_directory(&installation.name, &module.node), mode)?;
+        let participant = Participant::join(&node, self.name)?;
+        participant.set_state(ModuleState::Starting);
+        participant.set_restarts(self.restarts);
+        let stop = stop_on_signals(&participant, module.stop_within)?;
+        output::install(&participant, &installation, self.name, self.launcher.is_some());
+        schedule(installation.scheduling(self.name.class()));
+        let started_ns = monotonic_ns();
+        let mut served = served::<M>();
+        let mut faces = Vec::new();
+        for name in module.names() {
+            let class = installation.classes.name(name.class()).unwrap_or_default().to_owned();
+            let at = served.iter().position(|served| served.class == class);
+            if at.is_none() && name != module.name {
+                return Err(StartError::Face(installation.classes.format(name), text, class));
+            }
+            let commands = participant.receiver(name.with_local(local::COMMANDS), shape(&module.mailboxes.commands))?;
+            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)), started_ns));
+        }
+        let data = participant.receiver(self.name.with_local(local::DATA), shape(&module.mailboxes.data))?;
+        let replies = participant.receiver(self.name.with_local(local::REPLIES), shape(&module.mailboxes.replies))?;
+        let link = Link::new(&participant, self.name, replies);
+        let clock = SystemClock::open(&node);
+        let names = faces.iter().map(|face: &Face<M>| face.name).collect();
+        let mut context = Context::new(self.name, installation.clone(), link, names, clock);
+        let settings = installation.settings_as(module)?;
+        let made = M::new(settings, &mut context).map_err(|error| StartError::Module(text, error.to_string()))?;
+        let turn_on = !self.off && module.start == StartState::On;
+        let by_hand = self.launcher.is_none();
+        Ok(Running { life: Life::new(made, participant), faces, data, context, stop, turn_on, by_hand })
+    }
+}
+
+/// A mailbox's shape, as the configuration has it.
+pub(crate) fn shape(spec: &MailboxSpec) -> Shape {
+    Shape {
+        slots: spec.slots,
+        body_bytes_max: u16::try_from(spec.size).unwrap_or(u16::MAX),
+        full: match spec.full {
+            Full::Displace => rohrpost_mailbox::Full::Displace,
+            Full::Reject => rohrpost_mailbox::Full::Reject,
+        },
+        max_age: spec.max_age,
+        claims: spec.claims,
+    }
+}
+
+/// Ends this process when launch dies, whatever killed it: no orphan drives a robot.
+fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
+    let Some(launcher) = launcher else { return Ok(()) };
+    nix::sys::prctl::set_pdeathsig(Some(Signal::SIGTERM)).map_err(|error| StartError::System("prctl", error.into()))?;
+    // It may have died before the call above.
+    if nix::unistd::getppid().as_raw().unsigned_abs() == launcher { Ok(()) } else { Err(StartError::Orphan(launcher)) }
+}
+
+/// On SIGTERM and SIGINT: ask the loop to end; if it does not within the time, end the process.
+fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT])
+        .map_err(|error| StartError::System("signal handlers", error))?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let (flag, participant) = (stop.clone(), participant.clone());
+    let wait = move || {
+        if signals.forever().next().is_some() {
+            flag.store(true, Ordering::Release);
+            participant.ring();
+            std::thread::sleep(within);
+            output::print(&format_args!("does not stop within {within:?}; ended"));
+            std::process::exit(1);
+        }
+    };
+    std::thread::Builder::new()
+        .name("signals".into())
+        .spawn(wait)
+        .map_err(|error| StartError::System("a thread for signals", error))?;
+    Ok(stop)
+}
+
+/// Asks for the class's scheduling; a refusal is one warning.
+fn schedule(how: Scheduling) {
+    let how = match how {
+        Scheduling::Fifo { priority } => sys::Scheduling::Fifo(priority),
+        Scheduling::Normal { nice } => sys::Scheduling::Normal(nice),
+    };
+    if let Err(error) = sys::schedule(how) {
+        tracing::warn!("runs without its scheduling {how:?}: {error}; allow it with `ulimit -r 99` or CAP_SYS_NICE");
+    } else if let sys::Scheduling::Fifo(_) = how {
+        match sys::lock_memory() {
+            Ok(true) => {}
+            Ok(false) => tracing::debug!("memory is not locked: the memlock limit is finite (`ulimit -l`)"),
+            Err(error) => tracing::warn!("memory is not locked: {error}"),
+        }
+    }
+}
+
+/// Directories of the nodes of this user that are launched now.
+pub fn find_running() -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(base_directory()) else { return Vec::new() };
+    let running = |path: &PathBuf| Node::open(path).is_ok_and(|node| node.launcher().is_some());
+    let mut found: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(running).collect();
+    found.sort();
+    found
+}

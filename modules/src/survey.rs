@@ -1,0 +1,105 @@
+//! What runs on a node and what it does, read from shared memory: looking changes nothing.
+
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{ClassTraffic, MailboxInfo, Name, Node, NodeError, ParticipantInfo, local};
+use std::time::Instant;
+
+/// A node at one moment.
+pub struct Survey {
+    /// When it was made.
+    pub at: Instant,
+    /// Modules, in the order of the configuration, then those it does not name.
+    pub modules: Vec<ModuleSurvey>,
+    /// All mailboxes, in order of their names.
+    pub mailboxes: Vec<MailboxInfo>,
+    /// What all mailboxes together did, most urgent class first.
+    pub classes: Vec<ClassTraffic>,
+}
+
+/// A module at one moment.
+#[derive(Clone, Debug)]
+pub struct ModuleSurvey {
+    /// Its name, local id 0.
+    pub name: Name,
+    /// Further names of its process.
+    pub faces: Vec<Name>,
+    /// Its process, as the node's table has it; none when it does not run.
+    pub process: Option<ParticipantInfo>,
+    /// Packages that its mailboxes received so far.
+    pub received: u64,
+    /// Packages that its mailboxes lost so far, for any cause.
+    pub lost: u64,
+    /// Packages that wait for it.
+    pub depth: u32,
+}
+
+impl Survey {
+    /// Looks at a node.
+    ///
+    /// # Errors
+    /// When its directory cannot be read.
+    pub fn new(node: &Node, installation: &Installation, node_name: &str) -> Result<Self, NodeError> {
+        let mailboxes: Vec<MailboxInfo> =
+            node.mailboxes()?.into_iter().filter_map(|name| node.look_at(name)).collect();
+        let participants = node.participants();
+        let mut modules: Vec<ModuleSurvey> = installation
+            .modules_on(node_name)
+            .map(|module| survey(module.name, module.faces.clone(), &participants, &mailboxes))
+            .collect();
+        for participant in participants.iter().filter(|p| p.module != Name::NONE) {
+            if modules.iter().all(|module| module.name != participant.module) {
+                modules.push(survey(participant.module, Vec::new(), &participants, &mailboxes));
+            }
+        }
+        let classes = sum(&mailboxes);
+        Ok(Self { at: Instant::now(), modules, mailboxes, classes })
+    }
+
+    /// The module of this name, or with this face.
+    pub fn module(&self, name: Name) -> Option<&ModuleSurvey> {
+        let name = name.module();
+        self.modules.iter().find(|module| module.name == name || module.faces.contains(&name))
+    }
+
+    /// Packages a second that a module received since `earlier`.
+    pub fn received_per_s(&self, earlier: &Self, name: Name) -> f64 {
+        let (Some(now), Some(before)) = (self.module(name), earlier.module(name)) else { return 0.0 };
+        let seconds = self.at.duration_since(earlier.at).as_secs_f64();
+        if seconds > 0.0 { now.received.saturating_sub(before.received) as f64 / seconds } else { 0.0 }
+    }
+}
+
+fn survey(name: Name, faces: Vec<Name>, participants: &[ParticipantInfo], mailboxes: &[MailboxInfo]) -> ModuleSurvey {
+    let own = |mailbox: &&MailboxInfo| mailbox.name.module() == name || faces.contains(&mailbox.name.module());
+    let (mut received, mut lost, mut depth) = (0, 0, 0);
+    for mailbox in mailboxes.iter().filter(own) {
+        received += mailbox.classes.iter().map(|class| class.received).sum::<u64>();
+        lost += mailbox.classes.iter().map(ClassTraffic::lost_in_all).sum::<u64>();
+        depth += mailbox.depth;
+    }
+    let process = participants.iter().find(|participant| participant.module == name).cloned();
+    ModuleSurvey { name, faces, process, received, lost, depth }
+}
+
+/// Adds up all mailboxes, class by class.
+pub fn sum(mailboxes: &[MailboxInfo]) -> Vec<ClassTraffic> {
+    let mut classes: Vec<ClassTraffic> = Vec::new();
+    for class in mailboxes.iter().flat_map(|mailbox| &mailbox.classes) {
+        match classes.iter_mut().find(|known| known.class == class.class) {
+            Some(known) => known.add(class),
+            None => classes.push(class.clone()),
+        }
+    }
+    classes.sort_by_key(|class| std::cmp::Reverse(class.class));
+    classes
+}
+
+/// What a mailbox is for, by its local id.
+pub fn purpose(local: u8) -> &'static str {
+    match local {
+        local::COMMANDS => "commands",
+        local::REPLIES => "replies",
+        local::DATA => "data",
+        _ => "own",
+    }
+}

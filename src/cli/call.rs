@@ -1,0 +1,160 @@
+//! `rohrpost call`: a function of any module, by the module's own description.
+
+use super::target::Target;
+use super::{Failure, say};
+use rohrpost::common::{self, OutputLevel};
+use rohrpost::description::{Description, Function};
+use rohrpost::value::{Value, decode, describe_type, encode, parse_argument};
+use rohrpost::{Name, ToolLink};
+use std::process::ExitCode;
+use std::time::Duration;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost call motor.0                    lists the functions and data of motor.0
+  rohrpost call motor.0 drive 0.3 0.5      calls drive
+  rohrpost call motor.0 off                one of the functions that every module has
+  rohrpost call odometry.0 get odometry    asks for the newest data
+Arguments are numbers, words, or JSON.")]
+pub(super) struct Arguments {
+    /// Module, such as motor.0.
+    name: String,
+    /// Function; without it, what the module offers is listed.
+    function: Option<String>,
+    /// Its arguments.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+    #[command(flatten)]
+    target: Target,
+    /// Wait so long for the answer, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    timeout: f64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A time that a user gave in seconds.
+pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
+    Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let running = arguments.target.find()?;
+    let module = running.module(&arguments.name)?;
+    let mut tool = running.join(seconds(arguments.timeout)?)?;
+    let result = answer(arguments, module, &mut tool);
+    tool.close();
+    let (text, failed) = result?;
+    say(text);
+    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// What to print, and whether the function itself reported an error.
+fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(String, bool), Failure> {
+    let Some(name) = &arguments.function else {
+        let description = tool.describe(module)?;
+        let text = if arguments.json { serde_json::to_string(&description)? } else { listing(&description) };
+        return Ok((text, false));
+    };
+    let value = match (name.as_str(), &arguments.arguments[..]) {
+        ("on", []) => tool.switch(module, true).map(|()| Value::Null)?,
+        ("off", []) => tool.switch(module, false).map(|()| Value::Null)?,
+        ("status", []) => {
+            let json = serde_json::to_value(tool.status(module)?)?;
+            serde_json::from_value(json)?
+        }
+        ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|()| Value::Null)?,
+        ("get", [data]) => get(module, data, tool)?,
+        (_, texts) => call(module, name, texts, tool)?,
+    };
+    // A function's own error is an answer too; scripts see it by the exit code.
+    let (value, failed) = match value {
+        Value::Variant(outcome, inner) if outcome == "Ok" => (*inner, false),
+        Value::Variant(outcome, inner) if outcome == "Err" => (Value::Variant(outcome, inner), true),
+        value => (value, false),
+    };
+    let text = match &value {
+        _ if arguments.json => serde_json::to_string(&value)?,
+        Value::Null => "ok".into(),
+        value => value.to_string(),
+    };
+    Ok((text, failed))
+}
+
+pub(super) fn level_of(text: &str) -> Result<OutputLevel, Failure> {
+    use OutputLevel::{Debug, Error, Info, Trace, Warn};
+    let level = [Error, Warn, Info, Debug, Trace].into_iter().find(|level| level.name() == text);
+    level.ok_or_else(|| format!("no level `{text}`; there are error, warn, info, debug, trace").into())
+}
+
+fn get(module: Name, data: &str, tool: &mut ToolLink) -> Result<Value, Failure> {
+    let description = tool.describe(module)?;
+    let item = description.data_item(data).ok_or_else(|| {
+        let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
+        format!("no data `{data}`; it has: {}", names.join(", "))
+    })?;
+    let number = item.number;
+    let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(number,));
+    let bytes = tool.call(module, common::GET_DATA, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
+    let (_, value) = postcard_u64(&bytes).ok_or("the answer is too short")?;
+    Ok(decode(&item.ty, value)?)
+}
+
+/// A postcard u64 and what follows it.
+fn postcard_u64(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    let end = bytes.iter().position(|byte| byte & 0x80 == 0)? + 1;
+    let (front, rest) = bytes.split_at(end);
+    let value = front.iter().rev().fold(0u64, |value, byte| value << 7 | u64::from(byte & 0x7f));
+    Some((value, rest))
+}
+
+fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Result<Value, Failure> {
+    let description = tool.describe(module)?;
+    let function = description.function(name).ok_or_else(|| {
+        let names: Vec<&str> = description.functions.iter().map(|function| function.name.as_str()).collect();
+        let own = if names.is_empty() { String::new() } else { format!("{}, ", names.join(", ")) };
+        format!("no function `{name}`; it has: {own}on, off, status, get DATA, output-level LEVEL")
+    })?;
+    if function.arguments.len() != texts.len() {
+        return Err(format!("{} takes {} arguments, not {}", usage(function), function.arguments.len(), texts.len()).into());
+    }
+    let mut body = Vec::new();
+    for (argument, text) in function.arguments.iter().zip(texts) {
+        let value = match text.chars().next() {
+            Some('{' | '[' | '"') => serde_json::from_str(text).map_err(|error| format!("{}: {error}", argument.name))?,
+            _ => parse_argument(&argument.ty, text).map_err(|error| format!("{}: {error}", argument.name))?,
+        };
+        body.extend(encode(&argument.ty, &value).map_err(|error| format!("{}: {error}", argument.name))?);
+    }
+    let write = |to: &mut Vec<u8>| {
+        to.extend_from_slice(&body);
+        Ok(())
+    };
+    let bytes = tool.call(module, function.number, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
+    Ok(decode(&function.result, &bytes)?)
+}
+
+fn usage(function: &Function) -> String {
+    let arguments: Vec<String> =
+        function.arguments.iter().map(|argument| format!(" <{}: {}>", argument.name, describe_type(&argument.ty))).collect();
+    format!("{}{}", function.name, arguments.concat())
+}
+
+fn listing(description: &Description) -> String {
+    let mut text = format!("class {}: {}\n", description.class, description.text);
+    if !description.functions.is_empty() {
+        text.push_str("\nfunctions\n");
+    }
+    for function in &description.functions {
+        text.push_str(&format!("  {} -> {}\n      {}\n", usage(function), describe_type(&function.result), function.text));
+    }
+    if !description.data.is_empty() {
+        text.push_str("\ndata\n");
+    }
+    for item in &description.data {
+        text.push_str(&format!("  {}: {}\n      {}\n", item.name, describe_type(&item.ty), item.text));
+    }
+    text.push_str("\nevery module: on, off, status, get DATA, output-level LEVEL");
+    text
+}

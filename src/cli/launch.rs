@@ -1,0 +1,117 @@
+//! `rohrpost launch`: the modules of a node, with a live table.
+
+use super::summary::{ModuleLine, module_lines, print_modules};
+use super::{Failure, say};
+use rohrpost::config::Installation;
+use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost::survey::Survey;
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The live table is drawn so often.
+const REFRESH: Duration = Duration::from_millis(500);
+
+#[derive(clap::Args)]
+#[command(after_help = "Example: rohrpost launch config/demo.toml\nCtrl-C stops the modules in reverse order.")]
+pub(super) struct Arguments {
+    /// The configuration.
+    file: PathBuf,
+    /// Node to launch, if the configuration has several.
+    #[arg(long, value_name = "NAME")]
+    node: Option<String>,
+    /// No live table, only what happens.
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let installation = Arc::new(Installation::load(&arguments.file)?);
+    let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
+    let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
+    let mut view = View::new(arguments.quiet);
+    while launch.watch(view.wait()) {
+        view.show(&mut launch)?;
+    }
+    view.leave();
+    Ok(end(launch))
+}
+
+/// Stops everything; what failed for good makes the exit code.
+pub(super) fn end(mut launch: Launch) -> ExitCode {
+    launch.take_notes().iter().for_each(|note| drop(say(note)));
+    let failures = launch.failures();
+    launch.stop().iter().for_each(|note| drop(say(note)));
+    for (module, why) in &failures {
+        eprintln!("{module} failed for good: {why}");
+    }
+    if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// What a person at the terminal sees while a node runs.
+pub(super) struct View {
+    /// Draw the table over and over in one place.
+    live: bool,
+    next: Instant,
+    last: Option<Survey>,
+    notes: Vec<String>,
+}
+
+/// Notes that stay below the live table.
+const NOTES_MAX: usize = 8;
+
+impl View {
+    pub(super) fn new(quiet: bool) -> Self {
+        let live = !quiet && std::io::stdout().is_terminal();
+        Self { live, next: Instant::now(), last: None, notes: Vec::new() }
+    }
+
+    /// How long to watch until the next drawing.
+    pub(super) fn wait(&self) -> Duration {
+        self.next.saturating_duration_since(Instant::now()).max(Duration::from_millis(1))
+    }
+
+    /// Shows what is new, if it is time.
+    pub(super) fn show(&mut self, launch: &mut Launch) -> Result<(), Failure> {
+        let notes = launch.take_notes();
+        if !self.live {
+            notes.iter().for_each(|note| drop(say(note)));
+        }
+        self.notes.extend(notes);
+        if Instant::now() < self.next {
+            return Ok(());
+        }
+        self.next = Instant::now() + REFRESH;
+        if !self.live {
+            return Ok(());
+        }
+        let survey = launch.survey()?;
+        let lines = module_lines(launch.installation(), &survey, self.last.as_ref(), |name| {
+            (launch.restarts(name), launch.phase(name).cloned())
+        });
+        self.draw(&lines);
+        self.last = Some(survey);
+        Ok(())
+    }
+
+    fn draw(&mut self, lines: &[ModuleLine]) {
+        let excess = self.notes.len().saturating_sub(NOTES_MAX);
+        self.notes.drain(..excess);
+        // Home, then each line cleared to its end, then all below: no flicker.
+        let text = format!("{}\n{}\n", print_modules(lines), self.notes.join("\n"));
+        let text = text.replace('\n', "\x1b[K\n");
+        let first = if self.last.is_none() { "\x1b[2J" } else { "" };
+        let _ = write!(std::io::stdout(), "{first}\x1b[H{text}\x1b[J");
+        let _ = std::io::stdout().flush();
+    }
+
+    /// Leaves the last table where it stands.
+    pub(super) fn leave(&mut self) {
+        if self.live {
+            say("");
+        }
+        self.notes.clear();
+    }
+}

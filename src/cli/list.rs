@@ -1,0 +1,105 @@
+//! `rohrpost list`.
+
+use super::summary::{ModuleLine, module_lines, print_modules};
+use super::table::table;
+use super::target::{Running, Target};
+use super::{Failure, say};
+use rohrpost::mailbox::{Full, Loss, MailboxInfo};
+use rohrpost::survey::{Survey, purpose};
+use serde::Serialize;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Example: rohrpost list --mailboxes\nReading the counters disturbs nobody.")]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    target: Target,
+    /// List mailboxes too.
+    #[arg(long, short)]
+    mailboxes: bool,
+    /// One JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct MailboxLine {
+    mailbox: String,
+    purpose: &'static str,
+    owner: Option<u32>,
+    slots: u16,
+    body_bytes_max: u16,
+    full: &'static str,
+    waiting: u32,
+    waiting_max: u32,
+    sent: u64,
+    received: u64,
+    lost: Vec<(&'static str, u64)>,
+}
+
+#[derive(Serialize)]
+struct Listing<'a> {
+    installation: &'a str,
+    node: &'a str,
+    modules: Vec<ModuleLine>,
+    mailboxes: Vec<MailboxLine>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let running = arguments.target.find()?;
+    let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
+    let listing = Listing {
+        installation: &running.installation.name,
+        node: &running.node_name,
+        modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
+        mailboxes: survey.mailboxes.iter().map(|mailbox| mailbox_line(&running, mailbox)).collect(),
+    };
+    if arguments.json {
+        say(serde_json::to_string(&listing)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    say(format_args!("node {} of {}\n", listing.node, listing.installation));
+    say(print_modules(&listing.modules));
+    if arguments.mailboxes {
+        say(print_mailboxes(&listing.mailboxes));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn mailbox_line(running: &Running, mailbox: &MailboxInfo) -> MailboxLine {
+    let lost = |cause: Loss| mailbox.classes.iter().map(|class| class.lost(cause)).sum();
+    MailboxLine {
+        mailbox: running.installation.classes.format_full(mailbox.name),
+        purpose: purpose(mailbox.name.local()),
+        owner: mailbox.owner,
+        slots: mailbox.shape.slots,
+        body_bytes_max: mailbox.shape.body_bytes_max,
+        full: match mailbox.shape.full {
+            Full::Displace => "displace",
+            Full::Reject => "reject",
+        },
+        waiting: mailbox.depth,
+        waiting_max: mailbox.depth_max,
+        sent: mailbox.sent,
+        received: mailbox.classes.iter().map(|class| class.received).sum(),
+        lost: Loss::ALL.into_iter().map(|cause| (cause.name(), lost(cause))).filter(|(_, n)| *n > 0).collect(),
+    }
+}
+
+fn print_mailboxes(lines: &[MailboxLine]) -> String {
+    let rows = lines.iter().map(|line| {
+        let lost: Vec<String> = line.lost.iter().map(|(cause, n)| format!("{n} {cause}")).collect();
+        [
+            line.mailbox.clone(),
+            line.purpose.into(),
+            line.owner.map_or("nobody".into(), |pid| pid.to_string()),
+            format!("{} x {} B", line.slots, line.body_bytes_max),
+            line.full.into(),
+            format!("{} (most {})", line.waiting, line.waiting_max),
+            line.sent.to_string(),
+            line.received.to_string(),
+            if lost.is_empty() { "none".into() } else { lost.join(", ") },
+        ]
+    });
+    table(["mailbox", "for", ">owner", ">slots", "when full", ">waiting", ">sent", ">received", "lost"], rows)
+}

@@ -1,0 +1,79 @@
+//! The command line: one file a subcommand.
+
+mod call;
+mod check;
+mod clean;
+mod demo;
+mod echo;
+mod launch;
+mod list;
+mod log;
+mod run;
+mod status;
+mod summary;
+mod table;
+mod target;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// What went wrong, in words for the person at the terminal.
+type Failure = Box<dyn std::error::Error>;
+
+/// Prioritised mailboxes for robots: check a configuration, launch it, look at it, call it.
+#[derive(Parser)]
+#[command(name = "rohrpost", version, after_help = "Try `rohrpost demo`, then in another terminal `rohrpost list`.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Explain what a configuration will run, or what is wrong with it.
+    Check(check::Arguments),
+    /// Start the modules of a node and watch over them.
+    Launch(launch::Arguments),
+    /// Run a simulated robot that drives and maps, or play a robot's log.
+    Demo(demo::Arguments),
+    /// List the modules and mailboxes of a running node.
+    List(list::Arguments),
+    /// Ask modules how they are.
+    Status(status::Arguments),
+    /// Call a function of a module.
+    Call(call::Arguments),
+    /// Print the data that a module publishes.
+    Echo(echo::Arguments),
+    /// Print what modules say.
+    Log(log::Arguments),
+    /// Remove what a crash left in shared memory, and nothing that lives.
+    Clean(clean::Arguments),
+    /// Run a built-in module by hand.
+    Run(run::Arguments),
+}
+
+/// Runs the command that was typed.
+pub(crate) fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Launch(arguments) => launch::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::List(arguments) => list::run(&arguments),
+        Command::Status(arguments) => status::run(&arguments),
+        Command::Call(arguments) => call::run(&arguments),
+        Command::Echo(arguments) => echo::run(&arguments),
+        Command::Log(arguments) => log::run(&arguments),
+        Command::Clean(arguments) => clean::run(&arguments),
+        Command::Run(arguments) => run::run(arguments),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("{error}");
+        ExitCode::FAILURE
+    })
+}
+
+/// Prints a line; false when nobody reads any more (a closed pipe is the reader's way to say enough).
+fn say(line: impl std::fmt::Display) -> bool {
+    use std::io::Write;
+    writeln!(std::io::stdout(), "{line}").is_ok()
+}

@@ -1,0 +1,24 @@
+//! `rohrpost run`: what launch starts built-in modules with, and what a person starts one by hand with.
+
+use super::Failure;
+use rohrpost::Start;
+use rohrpost::config::BUILTINS;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Example: rohrpost run sim --config config/demo.toml --name motor.0")]
+pub(super) struct Arguments {
+    /// Which built-in module.
+    builtin: String,
+    /// What every module takes: --config FILE --name CLASS.INSTANCE [--off].
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter())?;
+    match rohrpost_modules::builtin::run(&arguments.builtin, start) {
+        Some(result) => result.map(|()| ExitCode::SUCCESS).map_err(Into::into),
+        None => Err(format!("no built-in module `{}`; there are: {}", arguments.builtin, BUILTINS.join(", ")).into()),
+    }
+}

@@ -1,0 +1,121 @@
+//! What a node does, as text: modules, and traffic by class.
+
+use super::table::{table, time};
+use rohrpost::Name;
+use rohrpost::config::Installation;
+use rohrpost::launch::Phase;
+use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, ParticipantInfo};
+use rohrpost::survey::Survey;
+use serde::Serialize;
+
+/// A module, as the tables show it.
+#[derive(Serialize)]
+pub(super) struct ModuleLine {
+    pub(super) module: String,
+    pub(super) faces: Vec<String>,
+    pub(super) state: String,
+    pub(super) priority: u8,
+    pub(super) scheduling: String,
+    pub(super) pid: Option<u32>,
+    pub(super) received: u64,
+    pub(super) received_per_s: Option<f64>,
+    pub(super) waiting: u32,
+    pub(super) lost: u64,
+    pub(super) restarts: u32,
+}
+
+/// The modules of a survey; rates since an earlier one. `launch` knows restarts and phases that the node's table does not.
+pub(super) fn module_lines(
+    installation: &Installation,
+    survey: &Survey,
+    earlier: Option<&Survey>,
+    launch: impl Fn(Name) -> (u32, Option<Phase>),
+) -> Vec<ModuleLine> {
+    let line = |module: &rohrpost::survey::ModuleSurvey| {
+        let (restarts, phase) = launch(module.name);
+        ModuleLine {
+            module: installation.classes.format(module.name),
+            faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
+            state: state(module.process.as_ref(), phase.as_ref()),
+            priority: module.name.class().0,
+            scheduling: scheduling(module.process.as_ref()),
+            pid: module.process.as_ref().map(|process| process.pid),
+            received: module.received,
+            received_per_s: earlier.map(|earlier| survey.received_per_s(earlier, module.name)),
+            waiting: module.depth,
+            lost: module.lost,
+            restarts: module.process.as_ref().map_or(restarts, |process| process.restarts),
+        }
+    };
+    survey.modules.iter().map(line).collect()
+}
+
+/// How the module's process really is scheduled, which may differ from what was asked for.
+fn scheduling(process: Option<&ParticipantInfo>) -> String {
+    use rohrpost::mailbox::sys::{Scheduling, scheduling_of};
+    match process.map(|process| scheduling_of(process.pid)) {
+        Some(Ok(Scheduling::Fifo(priority))) => format!("fifo {priority}"),
+        Some(Ok(Scheduling::Normal(nice))) => format!("nice {nice}"),
+        Some(Err(_)) | None => "-".into(),
+    }
+}
+
+fn state(process: Option<&ParticipantInfo>, phase: Option<&Phase>) -> String {
+    match (process, phase) {
+        (_, Some(Phase::Failed(_))) => "failed".into(),
+        (_, Some(Phase::Ended)) => "ended".into(),
+        (_, Some(Phase::Waiting)) => "waiting".into(),
+        (Some(process), _) => process.state.map_or("-", ModuleState::name).into(),
+        (None, _) => "dead".into(),
+    }
+}
+
+/// Modules as a table.
+pub(super) fn print_modules(lines: &[ModuleLine]) -> String {
+    let rows = lines.iter().map(|line| {
+        let mut module = line.module.clone();
+        for face in &line.faces {
+            module.push_str(&format!(" + {face}"));
+        }
+        [
+            module,
+            line.state.clone(),
+            line.priority.to_string(),
+            line.scheduling.clone(),
+            line.pid.map_or("-".into(), |pid| pid.to_string()),
+            line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}")),
+            line.received.to_string(),
+            line.waiting.to_string(),
+            line.lost.to_string(),
+            line.restarts.to_string(),
+        ]
+    });
+    let heads =
+        ["module", "state", ">priority", "scheduling", ">pid", ">in/s", ">received", ">waiting", ">lost", ">restarts"];
+    table(heads, rows)
+}
+
+/// Traffic by class as a table: packages, losses by cause, waiting times.
+pub(super) fn print_classes(installation: &Installation, classes: &[ClassTraffic]) -> String {
+    let rows = classes.iter().map(|class| {
+        let name = class.class.map_or("others".into(), |id| {
+            installation.classes.name(id).map_or_else(|| id.0.to_string(), ToOwned::to_owned)
+        });
+        let losses: Vec<String> = Loss::ALL
+            .into_iter()
+            .filter(|cause| class.lost(*cause) > 0)
+            .map(|cause| format!("{} {}", class.lost(cause), cause.name()))
+            .collect();
+        let quantile = |share| class.latency.quantile(share).map_or("-".into(), time);
+        [
+            name,
+            class.class.map_or("-".into(), |id| id.0.to_string()),
+            class.received.to_string(),
+            if losses.is_empty() { "none".into() } else { losses.join(", ") },
+            quantile(0.5),
+            quantile(0.99),
+            if class.received > 0 { time(class.latency.max) } else { "-".into() },
+        ]
+    });
+    table(["class", ">priority", ">received", "lost", ">waited p50", ">p99", ">max"], rows)
+}

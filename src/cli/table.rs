@@ -1,0 +1,30 @@
+//! Tables for terminals.
+
+use comfy_table::{CellAlignment, Table, presets};
+use std::time::Duration;
+
+/// A plain table: a line of heads, then rows; columns whose head begins with `>` stand to the right.
+pub(super) fn table<const N: usize>(heads: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(heads.map(|head| head.trim_start_matches('>')));
+    rows.into_iter().for_each(|row| drop(table.add_row(row)));
+    for (column, head) in table.column_iter_mut().zip(heads) {
+        column.set_padding((0, 2));
+        if head.starts_with('>') {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+}
+
+/// A short time in the unit that suits it.
+pub(super) fn time(time: Duration) -> String {
+    let us = time.as_secs_f64() * 1e6;
+    match us {
+        us if us < 999.5 => format!("{us:.0} µs"),
+        us if us < 9_995.0 => format!("{:.2} ms", us / 1e3),
+        us if us < 999_500.0 => format!("{:.0} ms", us / 1e3),
+        us => format!("{:.1} s", us / 1e6),
+    }
+}

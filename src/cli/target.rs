@@ -1,0 +1,85 @@
+//! Which running node a tool means.
+
+use super::Failure;
+use clap::Args;
+use rohrpost::ToolLink;
+use rohrpost::config::Installation;
+use rohrpost::mailbox::{Name, Node, node_directory};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Which node.
+#[derive(Args)]
+pub(super) struct Target {
+    /// Configuration of the node; without it, the one node that runs.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Node of the configuration, if it has several.
+    #[arg(long, value_name = "NAME", requires = "config")]
+    node: Option<String>,
+}
+
+/// A node that runs, and its configuration.
+pub(super) struct Running {
+    pub(super) installation: Installation,
+    pub(super) node_name: String,
+    pub(super) node: Arc<Node>,
+}
+
+impl Target {
+    /// Finds the node that is meant.
+    pub(super) fn find(&self) -> Result<Running, Failure> {
+        let (config, node_name) = match &self.config {
+            Some(config) => (config.clone(), self.node.clone()),
+            None => {
+                let (config, node) = only_running()?;
+                (config, Some(node))
+            }
+        };
+        let installation = Installation::load(&config)?;
+        let node_name = rohrpost::launch::choose_node(&installation, node_name.as_deref())?.name.clone();
+        let node = Node::open(&node_directory(&installation.name, &node_name))?;
+        Ok(Running { installation, node_name, node })
+    }
+}
+
+/// Configuration and name of the one node that is launched now.
+fn only_running() -> Result<(PathBuf, String), Failure> {
+    let running = rohrpost::find_running();
+    match &running[..] {
+        [] => Err("no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into()),
+        [only] => noted_config(only),
+        several => {
+            let list: Vec<String> = several.iter().map(|path| path.display().to_string()).collect();
+            Err(format!("several nodes run here; say which with --config and --node:\n  {}", list.join("\n  ")).into())
+        }
+    }
+}
+
+/// What launch wrote about its configuration.
+fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
+    let file = directory.join(rohrpost::launch::CONFIG_FILE);
+    let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    match text.lines().collect::<Vec<_>>()[..] {
+        [config, node] => Ok((config.into(), node.into())),
+        _ => Err(format!("{} is not what this version of launch writes; say --config FILE", file.display()).into()),
+    }
+}
+
+impl Running {
+    /// Takes part as a tool.
+    pub(super) fn join(&self, timeout: Duration) -> Result<ToolLink, Failure> {
+        Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)
+    }
+
+    /// The module or face that a user names.
+    pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
+        Ok(self.installation.classes.parse_name(text)?.module())
+    }
+
+    /// A name as users write it.
+    pub(super) fn text(&self, name: Name) -> String {
+        self.installation.classes.format(name)
+    }
+}
