@@ -1,3 +1,4 @@
 //! Module template, interfaces, launch and built-in modules.
 
 pub mod types;
+pub mod value;
