@@ -1,0 +1,213 @@
+//! `rohrpost demo`: a simulated robot, or the log of a real one.
+
+use super::launch::{View, end};
+use super::summary::print_classes;
+use super::{Failure, say};
+use rohrpost::common::State;
+use rohrpost::config::{Installation, Program};
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::{CartographerInterface, MapCounts, PlayerInterface, Progress};
+use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost::{Class, Name};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const SIMULATION: &str = include_str!("../../config/demo.toml");
+const LOG: &str = include_str!("../../config/demo-log.toml");
+const BUILDING: &str = include_str!("../../config/building.map");
+/// After the end of a log, so long for the last packages to be mapped and drawn.
+const SETTLE: Duration = Duration::from_secs(2);
+/// Functions asked for in the summary; their numbers in the interfaces.
+const FIRST_FUNCTION: u16 = 16;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost demo                            a simulated robot drives and maps until Ctrl-C
+  rohrpost demo --seconds 20
+  rohrpost demo --log run.log.gz --speed 10
+Reads config/demo.toml (or config/demo-log.toml) of the present folder if there is one, else its own copy.")]
+pub(super) struct Arguments {
+    /// End by itself after so many seconds.
+    #[arg(long, value_name = "N")]
+    seconds: Option<f64>,
+    /// Play this CARMEN log (also gzipped) instead of simulating.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Times the speed at which the log was recorded.
+    #[arg(long, default_value_t = 10.0, value_name = "X", requires = "log")]
+    speed: f64,
+    /// Another configuration.
+    #[arg(long, value_name = "FILE", conflicts_with = "log")]
+    config: Option<PathBuf>,
+    /// Show it live in the Rerun viewer, if one is installed, instead of writing a file.
+    #[arg(long)]
+    viewer: bool,
+    /// Leave the GUI out.
+    #[arg(long, conflicts_with = "viewer")]
+    no_gui: bool,
+    /// No live table, only what happens.
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
+    let file = configuration(arguments, folder.path())?;
+    let installation = Arc::new(Installation::load(&file)?);
+    let node = choose_node(&installation, None)?.name.clone();
+    let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
+    let outcome = watch(arguments, &mut launch);
+    let summary = summary(&mut launch);
+    let code = end(launch);
+    outcome?;
+    say(summary?.trim_end());
+    Ok(code)
+}
+
+/// Until the time is over, the log is over, or it is told to stop.
+fn watch(arguments: &Arguments, launch: &mut Launch) -> Result<(), Failure> {
+    let mut deadline = match arguments.seconds {
+        Some(seconds) => Some(Instant::now() + super::call::seconds(seconds)?),
+        None => None,
+    };
+    let mut view = View::new(arguments.quiet);
+    let mut ask_at = Instant::now();
+    let mut over = false;
+    while launch.watch(view.wait()) {
+        view.show(launch)?;
+        if !over && Instant::now() >= ask_at {
+            ask_at = Instant::now() + Duration::from_millis(500);
+            over = progress(launch).is_some_and(|progress| progress.finished);
+            if over {
+                deadline = Some(deadline.unwrap_or(Instant::now() + SETTLE).min(Instant::now() + SETTLE));
+            }
+        }
+        if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+            break;
+        }
+    }
+    view.leave();
+    Ok(())
+}
+
+/// The file that says what runs: the folder's own, or a copy with what the command line says written in.
+fn configuration(arguments: &Arguments, temporary: &Path) -> Result<PathBuf, Failure> {
+    let (name, text) = if arguments.log.is_some() { ("demo-log.toml", LOG) } else { ("demo.toml", SIMULATION) };
+    let own = arguments.config.clone().unwrap_or_else(|| Path::new("config").join(name));
+    let there = own.exists();
+    if arguments.config.is_some() && !there {
+        return Err(format!("{}: no such file", own.display()).into());
+    }
+    if there && arguments.log.is_none() && !arguments.no_gui && !arguments.viewer {
+        return Ok(own);
+    }
+    let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
+    let folder = if there { own.parent().unwrap_or(Path::new(".")).canonicalize()? } else { std::env::current_dir()? };
+    // Checked as it was written, so that a mistake is told with its own file and line.
+    let installation = Installation::parse(&text, &own)?;
+    let mut table: toml::Table = toml::from_str(&text)?;
+    let modules = table.get_mut("module").and_then(toml::Value::as_array_mut).ok_or("no [[module]]")?;
+    for (entry, module) in modules.iter_mut().zip(&installation.modules) {
+        let Some(entry) = entry.as_table_mut() else { continue };
+        rewrite(entry, &module.program, &folder, there, arguments)?;
+    }
+    if arguments.no_gui {
+        let is_gui = |entry: &toml::Value| entry.get("name").and_then(toml::Value::as_str).is_some_and(is_gui);
+        modules.retain(|entry| !is_gui(entry));
+    }
+    let file = temporary.join(name);
+    std::fs::write(&file, toml::to_string(&table)?)?;
+    std::fs::write(temporary.join("building.map"), BUILDING)?;
+    Ok(file)
+}
+
+fn is_gui(name: &str) -> bool {
+    name.split('.').next() == Some("gui")
+}
+
+/// Paths that started from the file's folder must find their way from another one; then what the command line says.
+fn rewrite(
+    entry: &mut toml::Table,
+    program: &Program,
+    folder: &Path,
+    there: bool,
+    arguments: &Arguments,
+) -> Result<(), Failure> {
+    if let Program::Command(words) = program
+        && let [first, rest @ ..] = &words[..]
+        && first.contains('/')
+    {
+        let absolute = folder.join(first).display().to_string();
+        let words: Vec<toml::Value> =
+            std::iter::once(absolute).chain(rest.iter().cloned()).map(toml::Value::String).collect();
+        entry.insert("program".into(), toml::Value::Array(words));
+    }
+    let gui = entry.get("name").and_then(toml::Value::as_str).is_some_and(is_gui);
+    let Some(settings) = entry.get_mut("settings").and_then(toml::Value::as_table_mut) else { return Ok(()) };
+    if let (Some(log), true) = (&arguments.log, settings.contains_key("speed")) {
+        let log = log.canonicalize().map_err(|error| format!("{}: {error}", log.display()))?;
+        settings.insert("file".into(), log.display().to_string().into());
+        settings.insert("speed".into(), arguments.speed.into());
+    } else if gui {
+        let file = std::env::current_dir()?.join("rohrpost-demo.rrd");
+        settings.insert("file".into(), file.display().to_string().into());
+        if arguments.viewer {
+            settings.insert("viewer".into(), "window".into());
+        }
+    } else if let (Some(toml::Value::String(map)), true) = (settings.get_mut("map"), there) {
+        *map = folder.join(&*map).display().to_string();
+    }
+    Ok(())
+}
+
+/// The module of a class, if it runs.
+fn running(launch: &Launch, class: &str) -> Option<Name> {
+    let class: Class = launch.installation().classes.id(class)?;
+    launch.installation().modules.iter().flat_map(|module| module.names()).find(|name| name.class() == class)
+}
+
+fn progress(launch: &mut Launch) -> Option<Progress> {
+    let player = running(launch, PlayerInterface::CLASS)?;
+    ask(launch, player, PlayerInterface::hash())
+}
+
+/// The first function of a module's own, without arguments.
+fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interface: u32) -> Option<T> {
+    let read = |bytes: &[u8]| rohrpost::macro_support::from_bytes::<T>(bytes);
+    launch.tool().call(module, FIRST_FUNCTION, interface, |_| Ok(()), read).ok()
+}
+
+/// What there is to say at the end: packages, losses and latencies by class, and what came of them.
+fn summary(launch: &mut Launch) -> Result<String, Failure> {
+    let survey = launch.survey()?;
+    let mut text = print_classes(launch.installation(), &survey.classes);
+    let received: u64 = survey.classes.iter().map(|class| class.received).sum();
+    let lost: u64 = survey.classes.iter().map(rohrpost::mailbox::ClassTraffic::lost_in_all).sum();
+    text.push_str(&format!("\n{received} packages received, {lost} lost\n"));
+    if let Some(played) = progress(launch) {
+        let Progress { scans, odometries, discarded, malformed, .. } = played;
+        text.push_str(&format!(
+            "log: {scans} scans and {odometries} odometry lines played, {discarded} discarded for their stamps, \
+             {malformed} broken\n"
+        ));
+    }
+    let mapper = running(launch, CartographerInterface::CLASS);
+    if let Some(counts) = mapper.and_then(|name| ask::<MapCounts>(launch, name, CartographerInterface::hash())) {
+        let MapCounts { scans, odometries, mapped, without_pose, free, occupied } = counts;
+        text.push_str(&format!(
+            "map: {scans} scans and {odometries} odometry received, {mapped} scans mapped ({without_pose} without pose), \
+             {free} cells free, {occupied} occupied\n"
+        ));
+    }
+    for module in &survey.modules {
+        if let Ok(status) = launch.tool().status(module.name)
+            && status.state == State::Error
+        {
+            let name = launch.installation().classes.format(module.name);
+            text.push_str(&format!("{name} is in error: {}\n", status.error));
+        }
+    }
+    Ok(text)
+}
