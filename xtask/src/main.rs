@@ -1,3 +1,47 @@
-//! Builds, runs and tests.
+//! `cargo xtask`: builds, runs, tests and shows Rohrpost; `cargo demo` is the first of its commands.
+//!
+//! Nothing but the standard library: `cargo demo` compiles this before anything else, and that should take a second.
+#![forbid(unsafe_code)]
 
-fn main() {}
+mod cargo;
+mod checks;
+mod demo;
+mod picture;
+mod venv;
+
+use std::process::ExitCode;
+
+const HELP: &str = "\
+cargo demo [--no-gui] [ARGS...]   the same as `cargo xtask demo`
+cargo xtask demo [--no-gui] [ARGS...]
+    Builds `rohrpost` and, unless --no-gui is given, the GUI bridge; then runs `rohrpost demo ARGS...`.
+cargo xtask test
+    All tests: the workspace's, the GUI bridge's, and those that need Rerun's command line.
+cargo xtask ci
+    Format, clippy for both builds, then all tests.
+cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
+    A picture of a drawing as its viewer shows it, without a screen.
+";
+
+/// A failure as it is told to the user: what went wrong, and what to do.
+pub(crate) type Failure = String;
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let (command, rest) = args.split_first().map_or(("help", &[][..]), |(first, rest)| (first.as_str(), rest));
+    let done = match command {
+        "demo" => demo::run(rest),
+        "test" => checks::test(),
+        "ci" => checks::ci(),
+        "picture" => picture::run(rest),
+        "help" | "--help" | "-h" => {
+            print!("{HELP}");
+            Ok(ExitCode::SUCCESS)
+        }
+        other => Err(format!("no command `{other}`; there are:\n{HELP}")),
+    };
+    done.unwrap_or_else(|failure| {
+        eprintln!("xtask: {failure}");
+        ExitCode::FAILURE
+    })
+}

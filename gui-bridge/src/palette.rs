@@ -1,0 +1,50 @@
+//! Colours that are told apart on a dark ground, also by those who see few of them.
+
+/// Red, green, blue.
+pub(crate) type Rgb = [u8; 3];
+
+/// The robot where it is believed to be.
+pub(crate) const ROBOT: Rgb = [255, 150, 40];
+/// Where odometry alone puts it.
+pub(crate) const ODOMETRY: Rgb = [122, 138, 158];
+/// What the scanner sees.
+pub(crate) const SCAN: Rgb = [255, 64, 96];
+/// Ground of the world's view; unknown parts of the map show it.
+pub(crate) const GROUND: Rgb = [38, 42, 50];
+/// Lines that help to read, such as the map's scale.
+pub(crate) const AID: Rgb = [104, 112, 126];
+/// A square that is free, and one that is occupied.
+pub(crate) const FREE: Rgb = [226, 228, 224];
+/// See [`FREE`].
+pub(crate) const OCCUPIED: Rgb = [16, 22, 34];
+
+/// Okabe and Ito's eight without black: one for each class, in the order in which classes come.
+const SERIES: [Rgb; 8] = [
+    [86, 180, 233],
+    [230, 159, 0],
+    [0, 178, 130],
+    [224, 130, 180],
+    [240, 228, 66],
+    [213, 94, 0],
+    [120, 140, 255],
+    [190, 190, 190],
+];
+
+/// The colour of the `index`th series; they come again after eight.
+pub(crate) fn series(index: usize) -> Rgb {
+    SERIES[index % SERIES.len()]
+}
+
+/// The same hue, nearer to the ground: for what stands beside the main thing.
+pub(crate) fn muted(colour: Rgb) -> Rgb {
+    colour.map(|part| (u16::from(part) * 11 / 20) as u8)
+}
+
+/// Colour of a map's square, 0..=100 percent occupied.
+pub(crate) fn occupancy(percent: u8) -> Rgb {
+    let share = i32::from(percent.min(100));
+    std::array::from_fn(|part| {
+        let (free, occupied) = (i32::from(FREE[part]), i32::from(OCCUPIED[part]));
+        (free + (occupied - free) * share / 100) as u8
+    })
+}

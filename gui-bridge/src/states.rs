@@ -1,0 +1,126 @@
+//! What modules are doing, and what they say.
+
+use crate::scene::{DrawError, Scene, entity};
+use rerun::{StateChange, StateConfiguration, TextDocument, TextLog, TextLogLevel};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// The states of a module, and their colours as 0xRRGGBBAA.
+const STATES: [(&str, u32); 5] = [
+    ("starting", 0x5B8D_EFFF),
+    ("off", 0x6B74_80FF),
+    ("on", 0x3FA7_60FF),
+    ("error", 0xE6A0_1FFF),
+    ("dead", 0xD643_4EFF),
+];
+
+/// A line is cut after this many bytes.
+const LINE_MAX: usize = 4096;
+
+/// How much a line matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Something does not work.
+    Error,
+    /// Something may stop working.
+    Warning,
+    /// Something that an operator wants to know.
+    Info,
+    /// Something that a programmer wants to know.
+    Debug,
+}
+
+impl Level {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Error => TextLogLevel::ERROR,
+            Self::Warning => TextLogLevel::WARN,
+            Self::Info => TextLogLevel::INFO,
+            Self::Debug => TextLogLevel::DEBUG,
+        }
+    }
+}
+
+/// The last state of each module.
+#[derive(Default)]
+pub(crate) struct States {
+    last: BTreeMap<String, String>,
+}
+
+impl States {
+    /// All of them at one glance. The lanes alone do not give that: their view keeps the span of time that was there
+    /// when it was opened, so that a live one shows the past only.
+    fn table(&self) -> TextDocument {
+        let mut table = String::from("| module | state |\n| --- | --- |\n");
+        for (module, state) in &self.last {
+            let state = if state == "on" { state.clone() } else { format!("**{state}**") };
+            // Writing to a String cannot fail.
+            let _ = writeln!(table, "| {module} | {state} |");
+        }
+        TextDocument::from_markdown(table)
+    }
+}
+
+impl Scene {
+    /// `module` is in this state: `starting`, `off`, `on`, `error` or `dead`. Said again it changes nothing, so it may
+    /// come with every poll. `text` says why, and becomes a line of output; leave it empty if there is nothing to say.
+    pub fn module_state(&mut self, module: &str, state: &str, text: &str) -> Result<(), DrawError> {
+        let lane = entity(&["modules", module]);
+        match self.states.last.insert(module.into(), state.into()) {
+            Some(last) if last == state => return Ok(()),
+            Some(_) => {}
+            None => self.log_static(lane.clone(), &colours())?,
+        }
+        self.log(lane, &StateChange::single(state))?;
+        self.log(entity(&["modules now"]), &self.states.table())?;
+        if text.is_empty() {
+            return Ok(());
+        }
+        let level = match state {
+            "dead" => Level::Error,
+            "error" => Level::Warning,
+            _ => Level::Info,
+        };
+        self.output_line(module, level, text)
+    }
+
+    /// `module` says something.
+    pub fn output_line(&mut self, module: &str, level: Level, text: &str) -> Result<(), DrawError> {
+        let line = TextLog::new(format!("{module}: {}", cut(text, LINE_MAX))).with_level(level.name());
+        self.log(entity(&["output", module]), &line)
+    }
+}
+
+fn colours() -> StateConfiguration {
+    let (names, colours): (Vec<_>, Vec<_>) = STATES.into_iter().unzip();
+    StateConfiguration::new().with_values(names).with_colors(colours)
+}
+
+/// The first `max` bytes of a text, less a character that this would tear.
+pub(crate) fn cut(text: &str, max: usize) -> &str {
+    &text[..text.floor_char_boundary(max)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Drawing;
+
+    #[test]
+    fn a_state_said_again_draws_nothing() {
+        let mut drawing = Drawing::new();
+        for (state, text) in [("starting", ""), ("on", ""), ("on", "still on"), ("dead", "killed by signal 9")] {
+            drawing.scene.module_state("laser.0", state, text).unwrap();
+        }
+        let rows = drawing.rows();
+        assert_eq!(rows["/modules/laser.0"], 3 + 1, "three changes and the colours");
+        assert_eq!(rows[r"/modules\ now"], 3);
+        assert_eq!(rows["/output/laser.0"], 1, "the reason of the last one");
+    }
+
+    #[test]
+    fn a_line_is_cut_between_characters() {
+        assert_eq!(cut("äöü", 3), "ä");
+        assert_eq!(cut("abc", 9), "abc");
+    }
+}

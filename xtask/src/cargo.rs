@@ -1,0 +1,49 @@
+//! Where things are, and how other programs are run.
+
+use crate::Failure;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus};
+
+/// The package whose build compiles all of Rerun.
+pub(crate) const BRIDGE: &str = "rohrpost-gui-bridge";
+/// The profile that this package is built in, and the folder below `target` that this makes.
+pub(crate) const BRIDGE_PROFILE: &str = "bridge";
+
+/// The workspace's root.
+pub(crate) fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here).to_path_buf()
+}
+
+/// Where Cargo puts what it builds.
+pub(crate) fn target() -> PathBuf {
+    // A relative path counts from where Cargo was called, which is where this runs.
+    let asked = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
+    asked.map_or_else(|| root().join("target"), |path| std::path::absolute(&path).unwrap_or(path))
+}
+
+/// A call of the Cargo that called this, from the root.
+pub(crate) fn cargo(args: &[&str]) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.args(args).current_dir(root()).env("CARGO_TARGET_DIR", target());
+    command
+}
+
+/// Says what is run and why, runs it, and fails if it does.
+pub(crate) fn run(why: &str, command: &mut Command) -> Result<(), Failure> {
+    eprintln!("==> {why}\n    {}", shown(command));
+    let status = status(command)?;
+    if status.success() { Ok(()) } else { Err(format!("{why}: `{}` ended with {status}", shown(command))) }
+}
+
+/// Runs to the end, whatever it is.
+pub(crate) fn status(command: &mut Command) -> Result<ExitStatus, Failure> {
+    command.status().map_err(|error| format!("cannot run `{}`: {error}", shown(command)))
+}
+
+fn shown(command: &Command) -> String {
+    let program = Path::new(command.get_program());
+    let name = program.file_name().unwrap_or(program.as_os_str());
+    let words = std::iter::once(name).chain(command.get_args());
+    words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,45 @@
+//! `cargo xtask test` and `cargo xtask ci`.
+//!
+//! Rerun's tests are in two builds: the bridge's own ones run in its profile, so that Rerun is compiled once only, and
+//! those that look at whole drawings with Rerun's command line belong to the root package's feature `rerun-tests`. They
+//! find that command line by the environment variable `ROHRPOST_RERUN`, and have to fail without it, saying
+//! `run them by "cargo xtask test", which installs Rerun's command line`.
+
+use crate::Failure;
+use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE, cargo};
+use crate::venv;
+use std::process::{Command, ExitCode};
+
+/// All tests.
+pub(crate) fn test() -> Result<ExitCode, Failure> {
+    cargo::run("testing all but the GUI bridge", &mut cargo(&["test", "--workspace", "--exclude", BRIDGE]))?;
+    let bridge = ["--profile", BRIDGE_PROFILE, "--package", BRIDGE];
+    cargo::run("testing the GUI bridge", cargo(&["test"]).args(bridge))?;
+    cargo::run("building the GUI bridge", cargo(&["build"]).args(bridge))?;
+    let rerun = venv::venv()?.rerun;
+    cargo::run(
+        "testing drawings with Rerun's command line",
+        cargo(&["test", "--package", "rohrpost", "--features", "rerun-tests", "--test", "rerun"])
+            .env("ROHRPOST_RERUN", rerun)
+            .env("ROHRPOST_BRIDGE", cargo::target().join(BRIDGE_PROFILE).join(BRIDGE)),
+    )?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What has to pass before anything lands.
+pub(crate) fn ci() -> Result<ExitCode, Failure> {
+    cargo::run("looking at the format", &mut cargo(&["fmt", "--all", "--check"]))?;
+    let deny = ["--all-targets", "--", "--deny", "warnings"];
+    cargo::run("clippy for all but the GUI bridge", cargo(&["clippy", "--workspace", "--exclude", BRIDGE]).args(deny))?;
+    cargo::run("clippy for the GUI bridge", &mut bridge_clippy())?;
+    test()
+}
+
+/// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the compiler of
+/// the workspace's own crates, clippy takes Rerun as it was built: 10 seconds.
+fn bridge_clippy() -> Command {
+    let mut command = cargo(&["build", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--all-targets"]);
+    // What `cargo clippy -- --deny warnings` hands to its driver.
+    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
+    command
+}
