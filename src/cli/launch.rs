@@ -41,13 +41,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 /// Stops everything; what failed for good makes the exit code.
 pub(super) fn end(mut launch: Launch) -> ExitCode {
-    launch.take_notes().iter().for_each(|note| drop(say(note)));
+    say_all(&launch.take_notes());
     let failures = launch.failures();
-    launch.stop().iter().for_each(|note| drop(say(note)));
+    say_all(&launch.stop());
     for (module, why) in &failures {
         eprintln!("{module} failed for good: {why}");
     }
     if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn say_all(notes: &[String]) {
+    for note in notes {
+        say(note);
+    }
 }
 
 /// What a person at the terminal sees while a node runs.
@@ -77,7 +83,7 @@ impl View {
     pub(super) fn show(&mut self, launch: &mut Launch) -> Result<(), Failure> {
         let notes = launch.take_notes();
         if !self.live {
-            notes.iter().for_each(|note| drop(say(note)));
+            say_all(&notes);
         }
         self.notes.extend(notes);
         if Instant::now() < self.next {

@@ -8,7 +8,7 @@ pub(super) fn table<const N: usize>(heads: [&str; N], rows: impl IntoIterator<It
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     table.set_header(heads.map(|head| head.trim_start_matches('>')));
-    rows.into_iter().for_each(|row| drop(table.add_row(row)));
+    table.add_rows(rows);
     for (column, head) in table.column_iter_mut().zip(heads) {
         column.set_padding((0, 2));
         if head.starts_with('>') {
