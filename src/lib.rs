@@ -54,10 +54,10 @@
 pub use rohrpost_config as config;
 pub use rohrpost_mailbox as mailbox;
 pub use rohrpost_mailbox::{Class, Name, Priority, SystemTime};
+pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::macro_support::serde;
-pub use rohrpost_modules::call::{CallError, Fault, Pending};
 pub use rohrpost_modules::runtime::{
     ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, find_running,
 };

@@ -1,8 +1,8 @@
 //! Draws an invented robot for a minute of its time: `cargo run --profile bridge -p rohrpost-gui-bridge --example scene
 //! scene.rrd`, then `rerun scene.rrd` or `cargo xtask picture scene.rrd scene.png`.
 
+use rohrpost::types::{Cell, LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use rohrpost_gui_bridge::{Level, Scene, Sink, Value};
-use rohrpost_modules::types::{Cell, LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use std::f64::consts::TAU;
 
 const HZ: u64 = 20;

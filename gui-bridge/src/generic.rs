@@ -3,33 +3,9 @@
 use crate::scene::{DrawError, Scene};
 use crate::states::cut;
 use rerun::{EntityPath, EntityPathPart, Scalars, TextLog};
+use rohrpost::value::Value;
 use std::collections::HashMap;
 use std::fmt::Write;
-
-/// A datum without its type, as a walk along its description yields it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// Nothing: a unit, or an option without a value.
-    Null,
-    /// True or false.
-    Bool(bool),
-    /// A signed whole number.
-    I(i128),
-    /// An unsigned whole number.
-    U(u128),
-    /// A real number.
-    F(f64),
-    /// Characters.
-    Text(String),
-    /// Bytes.
-    Bytes(Vec<u8>),
-    /// A list, a tuple or an array.
-    List(Vec<Value>),
-    /// A struct or a map.
-    Map(Vec<(String, Value)>),
-    /// A case of an enum, and what it holds.
-    Variant(String, Box<Value>),
-}
 
 /// A list longer than this is described, not plotted.
 pub const PLOTTED_LIST_MAX: usize = 16;
@@ -154,6 +130,7 @@ fn brief(value: &Value) -> String {
         Value::I(number) => number.to_string(),
         Value::U(number) => number.to_string(),
         Value::F(number) => number.to_string(),
+        Value::Char(character) => character.to_string(),
         Value::Text(text) => cut(text, TEXT_MAX).into(),
         Value::Bytes(bytes) => format!("{} bytes", bytes.len()),
         Value::Map(fields) => format!("{} fields", fields.len()),

@@ -1,8 +1,8 @@
 //! Draws a robot in Rerun: the world from above, what its modules are doing, what they say, and how packages flow.
 //!
 //! ```text
-//!   packages ──▶ (the bridge's main) ──▶ Scene ──▶ Rerun's batcher thread ──▶ Sink: a file or a viewer
-//!                                        world, states, charts, generic
+//!   packages ──▶ Bridge (a module) ──▶ Scene ──▶ Rerun's batcher thread ──▶ Sink: a file or a viewer
+//!                                   world, states, charts, generic
 //! ```
 //!
 //! A [`Scene`] knows nothing of mailboxes: who receives packages calls one of its methods for each. This is the only
@@ -15,6 +15,7 @@
 #![forbid(unsafe_code)]
 
 mod blueprint;
+mod bridge;
 mod charts;
 pub mod generic;
 mod palette;
@@ -24,7 +25,7 @@ mod states;
 mod trail;
 mod world;
 
-pub use generic::Value;
+pub use bridge::Bridge;
 pub use scene::{CloseError, DrawError, Scene};
 pub use sink::{Connection, OpenError, Sink};
 pub use states::Level;

@@ -1,3 +1,7 @@
-//! Draws a robot in Rerun.
+//! The GUI bridge's program: a module like any other, started by launch or by hand.
 
-fn main() {}
+#![forbid(unsafe_code)]
+
+fn main() -> std::process::ExitCode {
+    rohrpost::run::<rohrpost_gui_bridge::Bridge>()
+}

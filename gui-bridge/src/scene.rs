@@ -53,7 +53,7 @@ pub enum CloseError {
 ///
 /// ```
 /// use rohrpost_gui_bridge::{Scene, Sink};
-/// use rohrpost_modules::types::Pose;
+/// use rohrpost::types::Pose;
 ///
 /// let file = std::env::temp_dir().join(format!("scene-doc-{}.rrd", std::process::id()));
 /// let mut scene = Scene::open("lab", &Sink::File(file.clone()), 1_700_000_000_000_000_000)?;

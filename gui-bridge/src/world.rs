@@ -16,7 +16,7 @@ use crate::scene::{DrawError, Scene, entity};
 use crate::trail::{CHUNKS_MAX, Change, Trail};
 use nalgebra::{Isometry2, Point2};
 use rerun::{Arrows2D, LineStrips2D, Points2D, Radius, RotationAxisAngle, SegmentationImage, Transform3D};
-use rohrpost_modules::types::{LaserScan, OccupancyGrid, Odometry, Pose};
+use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose};
 use std::collections::{HashMap, HashSet};
 
 mod extent;

@@ -2,11 +2,11 @@
 
 pub use crate::call::{CallError, Caller, Fault, Pending};
 pub use crate::description::{Argument, DataItem, Description, Function};
+pub use crate::interface::append;
 pub use crate::interface::{DataPort, Interface, Proxy, ProxyCore, Serve};
 pub use crate::runtime::{read_arguments, write_result};
-pub use crate::interface::append;
+pub use crate::value::Data;
 pub use postcard::from_bytes;
 pub use postcard_schema;
-pub use crate::value::Data;
 pub use rohrpost_mailbox::Name;
 pub use serde;

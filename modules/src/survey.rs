@@ -39,8 +39,7 @@ impl Survey {
     /// # Errors
     /// When its directory cannot be read.
     pub fn new(node: &Node, installation: &Installation, node_name: &str) -> Result<Self, NodeError> {
-        let mailboxes: Vec<MailboxInfo> =
-            node.mailboxes()?.into_iter().filter_map(|name| node.look_at(name)).collect();
+        let mailboxes: Vec<MailboxInfo> = node.mailboxes()?.into_iter().filter_map(|name| node.look_at(name)).collect();
         let participants = node.participants();
         let mut modules: Vec<ModuleSurvey> = installation
             .modules_on(node_name)

@@ -117,12 +117,16 @@ fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Resu
         format!("no function `{name}`; it has: {own}on, off, status, get DATA, output-level LEVEL")
     })?;
     if function.arguments.len() != texts.len() {
-        return Err(format!("{} takes {} arguments, not {}", usage(function), function.arguments.len(), texts.len()).into());
+        return Err(
+            format!("{} takes {} arguments, not {}", usage(function), function.arguments.len(), texts.len()).into()
+        );
     }
     let mut body = Vec::new();
     for (argument, text) in function.arguments.iter().zip(texts) {
         let value = match text.chars().next() {
-            Some('{' | '[' | '"') => serde_json::from_str(text).map_err(|error| format!("{}: {error}", argument.name))?,
+            Some('{' | '[' | '"') => {
+                serde_json::from_str(text).map_err(|error| format!("{}: {error}", argument.name))?
+            }
             _ => parse_argument(&argument.ty, text).map_err(|error| format!("{}: {error}", argument.name))?,
         };
         body.extend(encode(&argument.ty, &value).map_err(|error| format!("{}: {error}", argument.name))?);
@@ -136,8 +140,11 @@ fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Resu
 }
 
 fn usage(function: &Function) -> String {
-    let arguments: Vec<String> =
-        function.arguments.iter().map(|argument| format!(" <{}: {}>", argument.name, describe_type(&argument.ty))).collect();
+    let arguments: Vec<String> = function
+        .arguments
+        .iter()
+        .map(|argument| format!(" <{}: {}>", argument.name, describe_type(&argument.ty)))
+        .collect();
     format!("{}{}", function.name, arguments.concat())
 }
 
@@ -147,7 +154,12 @@ fn listing(description: &Description) -> String {
         text.push_str("\nfunctions\n");
     }
     for function in &description.functions {
-        text.push_str(&format!("  {} -> {}\n      {}\n", usage(function), describe_type(&function.result), function.text));
+        text.push_str(&format!(
+            "  {} -> {}\n      {}\n",
+            usage(function),
+            describe_type(&function.result),
+            function.text
+        ));
     }
     if !description.data.is_empty() {
         text.push_str("\ndata\n");

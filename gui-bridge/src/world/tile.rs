@@ -4,7 +4,7 @@ use crate::palette;
 use crate::scene::DrawError;
 use rerun::components::ImageFormat;
 use rerun::{AnnotationContext, AnnotationInfo, ChannelDatatype, ColorModel, Rgba32};
-use rohrpost_modules::types::{Cell, OccupancyGrid, Pose};
+use rohrpost::types::{Cell, OccupancyGrid, Pose};
 
 /// Cells of a tile: what a graphics card takes as one texture.
 pub const MAP_CELLS_MAX: usize = 4096 * 4096;

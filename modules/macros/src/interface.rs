@@ -193,7 +193,8 @@ fn interface(
     let (vis, name) = (&item.vis, &item.ident);
     let interface = format_ident!("{name}Interface");
     let (trait_name, trait_text) = (name.to_string(), text_of(&item.attrs));
-    let doc = format!("The interface [`{name}`]: what a module names as its own. Its constants are the data it publishes.");
+    let doc =
+        format!("The interface [`{name}`]: what a module names as its own. Its constants are the data it publishes.");
     let functions = commands.iter().map(|command| {
         let Command { number: Number { number, idempotent }, name, text, names, types, result } = command;
         let (name, names) = (name.to_string(), names.iter().map(Ident::to_string));

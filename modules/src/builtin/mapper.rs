@@ -1,8 +1,6 @@
 //! `mapper`: draws a map from scans and poses.
 
-use crate::interfaces::{
-    Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface,
-};
+use crate::interfaces::{Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::robot::grid::{Mapper, Settings as GridSettings, TileIndex};
 use crate::robot::track::{NoPose, Track};

@@ -41,7 +41,8 @@ impl Module for PilotModule {
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         let laser = context.subscribe(LaserInterface::SCAN, &settings.laser, Rate::Each)?;
         let motor = context.proxy::<MotorProxy>(&settings.motor)?.with_timeout(PATIENCE);
-        let manners = PilotSettings { cruise_m_s: settings.cruise_m_s, seed: settings.seed, ..PilotSettings::default() };
+        let manners =
+            PilotSettings { cruise_m_s: settings.cruise_m_s, seed: settings.seed, ..PilotSettings::default() };
         Ok(Self { laser, motor, pilot: Pilot::new(manners), trouble: None })
     }
 

@@ -71,12 +71,10 @@ impl Every {
 
 fn world(settings: &Settings, context: &Context) -> Result<World, ModuleError> {
     let path = context.path(&settings.map);
-    let text = std::fs::read_to_string(&path).map_err(|error| ModuleError::new(format!("{}: {error}", path.display())))?;
-    let world = if text.starts_with("type") {
-        World::parse_octile(&text, settings.cell_m, None)
-    } else {
-        World::parse(&text)
-    };
+    let text =
+        std::fs::read_to_string(&path).map_err(|error| ModuleError::new(format!("{}: {error}", path.display())))?;
+    let world =
+        if text.starts_with("type") { World::parse_octile(&text, settings.cell_m, None) } else { World::parse(&text) };
     world.map_err(|error| ModuleError::new(format!("{}: {error}", path.display())))
 }
 

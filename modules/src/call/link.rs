@@ -191,11 +191,7 @@ impl Link {
         over.then(|| self.finish(at, |_| Ok(())))
     }
 
-    fn finish<T>(
-        &mut self,
-        at: usize,
-        read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
-    ) -> Result<T, CallError> {
+    fn finish<T>(&mut self, at: usize, read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>) -> Result<T, CallError> {
         let call = self.calls.swap_remove(at);
         let result = match call.answer {
             None => Err(CallError::Timeout(call.to, call.timeout)),

@@ -172,9 +172,7 @@ impl Child {
     fn is_ready(&self, node: &Node) -> bool {
         let pid = self.process.as_ref().map(std::process::Child::id);
         let ready = |state| !matches!(state, ModuleState::Starting | ModuleState::Stopping);
-        node.participants()
-            .iter()
-            .any(|p| p.module == self.name && Some(p.pid) == pid && p.state.is_some_and(ready))
+        node.participants().iter().any(|p| p.module == self.name && Some(p.pid) == pid && p.state.is_some_and(ready))
     }
 
     /// It has ended: again, or not, as its policy has it.

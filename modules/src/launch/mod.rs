@@ -119,8 +119,7 @@ impl Launch {
             .map(|module| Child::new(module, &installation, &executable))
             .collect();
         let node_name = node_name.to_owned();
-        let mut launch =
-            Self { installation, node_name, node, children, tool, lock, _time: time, events, notes };
+        let mut launch = Self { installation, node_name, node, children, tool, lock, _time: time, events, notes };
         match launch.start_all() {
             Ok(()) => Ok(launch),
             Err(error) => {
@@ -263,8 +262,7 @@ fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeepe
 /// [`LaunchError::Signals`].
 pub fn events() -> Result<Receiver<Event>, LaunchError> {
     use signal_hook::consts::{SIGCHLD, SIGINT, SIGTERM};
-    let mut signals =
-        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGCHLD]).map_err(LaunchError::Signals)?;
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGCHLD]).map_err(LaunchError::Signals)?;
     let (sender, receiver) = std::sync::mpsc::channel();
     let forward = move || {
         for signal in signals.forever() {

@@ -51,7 +51,13 @@ pub fn install(participant: &Arc<Participant>, installation: &Installation, me: 
     let Some(class) = installation.classes.id(CLASS) else { return };
     // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard error.
     let print = if launched { OutputLevel::Error } else { OutputLevel::Trace };
-    let way = Way { participant: participant.clone(), sender: None, retry_at: None, bytes: Vec::with_capacity(1024), sequence: 0 };
+    let way = Way {
+        participant: participant.clone(),
+        sender: None,
+        retry_at: None,
+        bytes: Vec::with_capacity(1024),
+        sequence: 0,
+    };
     let output = Output {
         me,
         to: Name::new(me.system(), class.0, 0, LINES),
@@ -163,13 +169,8 @@ impl Output {
     /// False when nothing more goes through now.
     fn send(&self, way: &mut Way, mut line: OutputLine) -> bool {
         line.lost = self.lost_now.swap(0, Ordering::Relaxed);
-        let label = Label {
-            from: self.me,
-            kind: Type::data(1),
-            id: 0,
-            priority: self.priority,
-            options: Options::STAMPED,
-        };
+        let label =
+            Label { from: self.me, kind: Type::data(1), id: 0, priority: self.priority, options: Options::STAMPED };
         way.bytes.clear();
         // A line can be written: text and numbers.
         let _ = crate::interface::append(&mut way.bytes, &line);

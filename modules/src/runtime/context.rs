@@ -58,7 +58,13 @@ pub struct Context {
 }
 
 impl Context {
-    pub(crate) fn new(me: Name, installation: Arc<Installation>, link: Link, faces: Vec<Name>, clock: SystemClock) -> Self {
+    pub(crate) fn new(
+        me: Name,
+        installation: Arc<Installation>,
+        link: Link,
+        faces: Vec<Name>,
+        clock: SystemClock,
+    ) -> Self {
         Self {
             me,
             installation,
@@ -223,7 +229,9 @@ fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::
         Ok(()) => Delivery::Sent,
         Err(SendError::NoMailbox(_)) => Delivery::Gone,
         Err(SendError::TooLarge { name, len, max }) => {
-            tracing::error!("data of {len} bytes do not fit mailbox {name} ({max}); raise `size` of its module's data mailbox");
+            tracing::error!(
+                "data of {len} bytes do not fit mailbox {name} ({max}); raise `size` of its module's data mailbox"
+            );
             Delivery::Full
         }
         Err(_) => Delivery::Full,

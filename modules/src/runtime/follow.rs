@@ -1,7 +1,7 @@
 //! The subscribing side of continuous data: asks, renews, and sees gaps.
 
-use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE};
 use crate::call::{CallError, Link};
+use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE};
 use crate::interface::append;
 use rohrpost_mailbox::Name;
 use std::marker::PhantomData;
@@ -114,7 +114,8 @@ impl Followings {
 
     /// Notes a package's number.
     pub(crate) fn note(&mut self, from: Name, id: u16, head: &DataHead) {
-        let Some(followed) = self.list.get_mut(usize::from(id)).filter(|followed| followed.from == from.module()) else {
+        let Some(followed) = self.list.get_mut(usize::from(id)).filter(|followed| followed.from == from.module())
+        else {
             return;
         };
         if let Some(expected) = followed.expected {

@@ -5,7 +5,9 @@ use crate::common::{self, DescriptionPart, OutputLevel, Status};
 use crate::description::Description;
 use crate::interface::append;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local};
+use rohrpost_mailbox::{
+    BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
+};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -46,7 +48,12 @@ impl ToolLink {
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub fn join(installation: &Installation, node: &Arc<Node>, name: &str, timeout: Duration) -> Result<Self, ClientError> {
+    pub fn join(
+        installation: &Installation,
+        node: &Arc<Node>,
+        name: &str,
+        timeout: Duration,
+    ) -> Result<Self, ClientError> {
         let config = installation.node(name).ok_or_else(|| ClientError::NoNode(name.into()))?;
         let participant = Participant::join(node, Name::NONE)?;
         let large = Shape { slots: REPLIES_KEPT as u16, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };

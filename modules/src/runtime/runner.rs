@@ -185,6 +185,8 @@ impl<M: Module> Running<M> {
 
     fn periodic(&mut self) {
         let now = Instant::now();
+        // Also while it is off: late answers must not wait for ever in front of its sleep.
+        self.context.link.borrow_mut().collect();
         if self.life.state == ModuleState::On {
             self.context.followings.renew(&mut self.context.link.borrow_mut(), now);
         }

@@ -7,7 +7,9 @@ use crate::call::Link;
 use crate::module::Module;
 use crate::output;
 use nix::sys::signal::Signal;
-use rohrpost_config::{Errors, Full, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState};
+use rohrpost_config::{
+    Errors, Full, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState,
+};
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, base_directory, local,
     monotonic_ns, node_directory, sys,
