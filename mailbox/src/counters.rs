@@ -120,6 +120,13 @@ impl Counters {
         }
     }
 
+    /// Packages that were accepted and are no longer there: received, or lost and counted.
+    pub(crate) fn accepted(&self) -> u64 {
+        let accepted = || Loss::ALL.into_iter().filter(|cause| cause.was_accepted());
+        let of = |row: ClassTraffic| row.received + accepted().map(|cause| row.lost(cause)).sum::<u64>();
+        self.0.iter().filter_map(Row::read).map(of).sum()
+    }
+
     /// The rows in use, by class as it stands in the names of their senders; the rest last.
     pub(crate) fn read(&self) -> Vec<ClassTraffic> {
         let mut rows: Vec<ClassTraffic> = self.0.iter().filter_map(Row::read).collect();

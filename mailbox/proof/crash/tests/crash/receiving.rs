@@ -114,3 +114,24 @@ fn a_receiver_dies_replacing_a_mailbox_of_another_shape() {
         all_usable(ground, receiver);
     });
 }
+
+#[test]
+fn a_receiver_dies_replacing_a_mailbox_that_a_living_sender_fills() {
+    let scene = |ground: &Ground| {
+        drop(ground.receiver());
+        ground.send(LOW, 0..4);
+        // Displaces package 3, and outlives the scene.
+        Box::leak(Box::new(ground.sender())).loan(HIGH).unwrap()
+    };
+    each_step("replace", 8, scene, |ground, mut loan, death| {
+        let mut receiver = ground.join().receiver(MAILBOX, OTHER_SHAPE).unwrap();
+        let label = crate::victim::write(&mut loan, 100);
+        loan.send(&label, 8).unwrap();
+        let found = drain(ground, &mut receiver, u64::from(death.is_some()));
+        assert_eq!(found.packages, [(100, false)], "{death:?}: it moved on");
+        for (cause, packages) in [(Loss::Displaced, 1), (Loss::Closed, 3)] {
+            let lost = found.lost(cause);
+            assert!(lost == packages || death.is_some() && lost == packages + 1, "{death:?}: {cause:?} {lost}");
+        }
+    });
+}

@@ -138,7 +138,8 @@ fn die_with<T>(what: T) {
     std::mem::forget(what);
 }
 
-fn write(loan: &mut Loan<'_>, id: u32) -> Label {
+/// Fills a loan as `send` does.
+pub(crate) fn write(loan: &mut Loan<'_>, id: u32) -> Label {
     let body = loan.body();
     body[..4].copy_from_slice(&id.to_le_bytes());
     body[4..8].copy_from_slice(&(!id).to_le_bytes());
