@@ -3,6 +3,7 @@
 use crate::aftermath::{adopt_and_drain, all_usable, drain, empty, received};
 use crate::ground::{Ground, HIGH, LOW, MAILBOX, OTHER_SHAPE, SHAPE, each_step};
 use rohrpost_mailbox_crash::{Loss, Shape};
+use std::cell::Cell;
 use std::time::Duration;
 
 #[test]
@@ -51,6 +52,34 @@ fn a_receiver_dies_dropping_stale_packages() {
             empty(ground);
         },
     );
+}
+
+#[test]
+fn who_mends_what_a_death_left_dies_too() {
+    for first in ["send", "displace", "receive", "adopt", "close"] {
+        for fatal in 1.. {
+            let first_survived = Cell::new(false);
+            // The second in turn; its last turn survives.
+            each_step(
+                "adopt",
+                1,
+                |ground| {
+                    ground.orphan();
+                    ground.send(LOW, [3]);
+                    ground.run(first, fatal).is_none()
+                },
+                |ground, survived, death| {
+                    first_survived.set(survived);
+                    let deaths = u64::from(!survived) + u64::from(death.is_some());
+                    let found = adopt_and_drain(ground, deaths);
+                    assert!((0..4).all(|id| found.times(id) <= 1), "{first}, step {fatal}, then {death:?}: {found:?}");
+                },
+            );
+            if first_survived.get() {
+                break;
+            }
+        }
+    }
 }
 
 /// Package 0 is in a dead receiver's hand, 1 and 2 are ready, and a dead sender was filling the last slot.
