@@ -1,8 +1,8 @@
 //! Counters of a mailbox, in its segment's first page: anyone may read them, and reading changes nothing.
 //!
 //! A row a class, claimed by the first that needs it; the last row takes all classes for which none is left. Losses are
-//! counted by whoever causes or finds them; a process killed between counting and acting can leave a count one too high,
-//! never too low: no loss is hidden.
+//! counted by whoever causes or finds them; a process killed between counting and acting, or whose mailbox is replaced just
+//! then, can leave a count one too high, never too low: no loss is hidden.
 
 use crate::name::{Class, Priority};
 use crate::step::step;
@@ -118,6 +118,13 @@ impl Counters {
             to.losses.iter().zip(&from.losses).for_each(|(to, from)| copy64(to, from));
             to.latency.iter().zip(&from.latency).for_each(|(to, from)| copy32(to, from));
         }
+    }
+
+    /// Packages that were accepted and are no longer there: received, or lost and counted.
+    pub(crate) fn accepted(&self) -> u64 {
+        let accepted = || Loss::ALL.into_iter().filter(|cause| cause.was_accepted());
+        let of = |row: ClassTraffic| row.received + accepted().map(|cause| row.lost(cause)).sum::<u64>();
+        self.0.iter().filter_map(Row::read).map(of).sum()
     }
 
     /// The rows in use, by class as it stands in the names of their senders; the rest last.

@@ -101,12 +101,23 @@ impl Shape {
         (SLOT_PREFIX + usize::from(self.body_bytes_max)).next_multiple_of(64)
     }
 
+    /// As the segment will say it, to the nanosecond: else a mailbox would not know its own shape again.
+    pub(crate) fn as_stored(self) -> Self {
+        let max_age = self.max_age.map(|age| Duration::from_nanos(stored_ns(age)));
+        Self { max_age, ..self }
+    }
+
     fn full_code(&self) -> u32 {
         match self.full {
             Full::Displace => 0,
             Full::Reject => 1,
         }
     }
+}
+
+/// 0 is kept for none.
+fn stored_ns(age: Duration) -> u64 {
+    u64::try_from(age.as_nanos()).unwrap_or(u64::MAX).max(1)
 }
 
 /// The first line of a segment.
@@ -133,8 +144,7 @@ impl Identity {
         self.body_bytes_max.store(u32::from(shape.body_bytes_max), Relaxed);
         self.full.store(shape.full_code(), Relaxed);
         self.claims.store(u32::from(shape.claims), Relaxed);
-        let max_age_ns = shape.max_age.map_or(0, |age| u64::try_from(age.as_nanos()).unwrap_or(u64::MAX).max(1));
-        self.max_age_ns.store(max_age_ns, Relaxed);
+        self.max_age_ns.store(shape.max_age.map_or(0, stored_ns), Relaxed);
         self.magic.store(MAGIC, std::sync::atomic::Ordering::Release);
     }
 

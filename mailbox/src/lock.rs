@@ -34,6 +34,26 @@ pub(crate) fn is_locked(file: &File, byte: u64) -> io::Result<bool> {
     Ok(i32::from(answer.l_type) != libc::F_UNLCK)
 }
 
+/// One byte of an open file, locked until this drops. Given back by name: closing the file alone would leave it locked while
+/// a child that another thread is just starting still has a copy of the descriptor.
+pub(crate) struct Held {
+    pub(crate) file: File,
+    byte: u64,
+}
+
+impl Held {
+    /// None when another open file holds it.
+    pub(crate) fn try_take(file: File, byte: u64) -> io::Result<Option<Self>> {
+        Ok(try_lock(&file, byte)?.then_some(Self { file, byte }))
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        let _ = unlock(&self.file, self.byte);
+    }
+}
+
 /// Gives one byte back.
 pub(crate) fn unlock(file: &File, byte: u64) -> io::Result<()> {
     fcntl(file, FcntlArg::F_OFD_SETLK(&region(libc::F_UNLCK, byte)))?;

@@ -12,7 +12,7 @@
 
 use crate::doorbell;
 use crate::layout::{MAGIC, VERSION};
-use crate::lock;
+use crate::lock::{self, Held};
 use crate::memory::Mapping;
 use crate::name::Name;
 use crate::step::step;
@@ -111,7 +111,7 @@ pub enum NodeError {
         "node directory {0} has layout version {1}, this program version {VERSION}; stop what runs there and remove it"
     )]
     Version(PathBuf, u32),
-    /// No such node.
+    /// No such node, or it was removed after it was opened.
     #[error("no node at {0}: is it launched?")]
     Missing(PathBuf),
     /// Nothing free in the table.
@@ -254,17 +254,40 @@ impl Node {
     pub fn launch_lock(self: &Arc<Self>) -> Result<LaunchLock, NodeError> {
         let failed = |error| NodeError::Io(self.path.clone(), error);
         let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
-        if !lock::try_lock(&file, LAUNCH_BYTE).map_err(failed)? {
+        let Some(held) = Held::try_take(file, LAUNCH_BYTE).map_err(failed)? else {
             return Err(NodeError::Launched(self.path.clone(), self.page().launch_pid.load(Ordering::Acquire)));
-        }
+        };
+        self.check_present(&held.file)?;
         self.page().launch_pid.store(std::process::id(), Ordering::Release);
-        Ok(LaunchLock { _file: file })
+        Ok(LaunchLock { _held: held })
+    }
+
+    /// Whether `file`, just opened by its path, is the one that this node has mapped: the directory may have been removed.
+    /// Asked when its lock is held; until then somebody may be removing it.
+    pub(crate) fn check_present(&self, file: &File) -> Result<(), NodeError> {
+        let failed = |error| NodeError::Io(self.path.clone(), error);
+        let (there, mine) = (file.metadata().map_err(failed)?, self.file.metadata().map_err(failed)?);
+        let present = (there.dev(), there.ino()) == (mine.dev(), mine.ino()) && there.nlink() > 0;
+        if present { Ok(()) } else { Err(NodeError::Missing(self.path.clone())) }
+    }
+
+    /// Takes the launch's place and every participant's; none when somebody has one of them. So nobody can join or launch
+    /// until the result is dropped.
+    pub(crate) fn keep_all_out(&self) -> Result<Option<File>, NodeError> {
+        let failed = |error| NodeError::Io(self.path.clone(), error);
+        let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
+        for byte in (0..PARTICIPANTS_MAX as u64).chain([LAUNCH_BYTE]) {
+            if !lock::try_lock(&file, byte).map_err(failed)? {
+                return Ok(None);
+            }
+        }
+        Ok(Some(file))
     }
 }
 
 /// Held by the launch of a node.
 pub struct LaunchLock {
-    _file: File,
+    _held: Held,
 }
 
 /// One participant, as the table has it.
@@ -330,8 +353,20 @@ pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
     options.custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW).open(path)
 }
 
+/// Opens a file of the node's directory to look at it: never through a link, never waiting for a pipe's other end.
+pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
+    let flags = libc::O_CLOEXEC | libc::O_NOFOLLOW | libc::O_NONBLOCK;
+    OpenOptions::new().read(true).custom_flags(flags).open(path)
+}
+
 /// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later.
 pub(crate) fn allocate(file: &File, bytes: usize) -> io::Result<()> {
     let length = libc::off_t::try_from(bytes).map_err(|_| io::ErrorKind::InvalidInput)?;
-    Ok(nix::fcntl::posix_fallocate(file, 0, length)?)
+    loop {
+        match nix::fcntl::posix_fallocate(file, 0, length) {
+            // A signal came; its handler has run.
+            Err(nix::errno::Errno::EINTR) => {}
+            result => return Ok(result?),
+        }
+    }
 }

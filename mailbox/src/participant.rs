@@ -33,13 +33,21 @@ impl Participant {
                 continue;
             }
             step!("join: locked");
+            node.check_present(&file)?;
             let incarnation = node.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1);
             let entry = node.entry(participant);
+            // Who leaves takes its process id out of the table.
+            let died = entry.pid.load(Ordering::Relaxed) != 0;
             entry.state.store(0, Ordering::Relaxed);
             entry.restarts.store(0, Ordering::Relaxed);
             entry.joined_ns.store(crate::clock::monotonic_ns(), Ordering::Relaxed);
             step!("join: before incarnation");
             entry.incarnation.store(incarnation, Ordering::Release);
+            step!("join: incarnation");
+            if died {
+                // From our lock until the new incarnation the dead one looked alive; who searched then missed what it left.
+                node.announce_death();
+            }
             entry.pid.store(std::process::id(), Ordering::Relaxed);
             entry.module.store(module.module().raw(), Ordering::Release);
             step!("join: joined");

@@ -81,6 +81,10 @@ impl Queue {
             let mut bits = fresh | std::mem::take(&mut self.deferred[i]);
             while bits != 0 {
                 let slot = i * 64 + bits.trailing_zeros() as usize;
+                // Whatever another process wrote there.
+                if slot >= slots.count() {
+                    break;
+                }
                 bits &= bits - 1;
                 let word = slots.load(slot);
                 if !word.is_ready() {

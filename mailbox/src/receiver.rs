@@ -3,6 +3,7 @@
 use crate::clock::monotonic_ns;
 use crate::counters::Loss;
 use crate::doorbell;
+use crate::lock::Held;
 use crate::name::Name;
 use crate::package::{Head, Options};
 use crate::participant::Participant;
@@ -11,7 +12,6 @@ use crate::registry;
 use crate::segment::Segment;
 use crate::slots::Taken;
 use crate::step::step;
-use std::fs::File;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -25,11 +25,11 @@ pub struct Receiver {
     /// The node's count of deaths when the slots were last searched for what the dead left.
     deaths_seen: u32,
     /// Holds the owner's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
-    _lock: File,
+    _lock: Held,
 }
 
 impl Receiver {
-    pub(crate) fn new(participant: Arc<Participant>, segment: Segment, lock: File) -> Self {
+    pub(crate) fn new(participant: Arc<Participant>, segment: Segment, lock: Held) -> Self {
         let queue = Queue::new(usize::from(segment.shape.slots));
         let deaths_seen = participant.node().page().deaths.load(Ordering::Acquire);
         let mut receiver = Self { participant, segment, queue, deaths_seen, _lock: lock };
@@ -65,15 +65,16 @@ impl Receiver {
 
     /// The most important package; sleeps until there is one, at most for `timeout`.
     pub fn receive_timeout(&mut self, timeout: Duration) -> Option<Package<'_>> {
-        let deadline = Instant::now() + timeout;
+        // A time too long to be told is for ever.
+        let deadline = Instant::now().checked_add(timeout);
         loop {
             if let Some(taken) = self.next() {
                 return Some(Package::new(self, taken));
             }
-            if Instant::now() >= deadline {
+            if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
                 return None;
             }
-            wait_any(&mut [self], Some(deadline), || false);
+            wait_any(&mut [self], deadline, || false);
         }
     }
 
@@ -82,8 +83,9 @@ impl Receiver {
         let slots = self.segment.slots();
         slots.retire();
         step!("close: retired");
-        let unlinked = registry::remove(self.participant.node(), self.name());
-        debug_assert!(unlinked.is_ok());
+        // If it cannot be removed (the registry stays locked, the directory is gone), it is retired all the same: nobody
+        // sends there any more, and the next receiver replaces it.
+        let _ = registry::remove(self.participant.node(), self.name());
         // After the fence of `retire` a sender either sees it and takes its package back, or its package is seen here.
         self.queue.rescan(&slots);
         let mut lost = 0;

@@ -5,7 +5,7 @@
 
 use crate::counters::{ClassTraffic, Loss};
 use crate::layout::{Shape, ShapeError};
-use crate::lock;
+use crate::lock::{self, Held};
 use crate::name::Name;
 use crate::node::{Node, NodeError, RegistryLock, allocate, open_shared};
 use crate::participant::Participant;
@@ -13,7 +13,7 @@ use crate::queue::Queue;
 use crate::receiver::Receiver;
 use crate::segment::{BadSegment, Segment, name_of, path_of};
 use crate::step::step;
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -61,6 +61,7 @@ impl Participant {
             return Err(CreateError::Reserved(name));
         }
         shape.check().map_err(|error| CreateError::Shape(name, error))?;
+        let shape = shape.as_stored();
         let _registry = RegistryLock::take(self.node().path())?;
         let (segment, lock) = match self.take_over(name, shape)? {
             Predecessor::Same(segment, lock) => (segment, lock),
@@ -77,7 +78,7 @@ impl Participant {
         Ok(Receiver::new(self.clone(), segment, lock))
     }
 
-    /// Looks at what is there, as its owner.
+    /// Looks at what is there, as its owner, and adopts it if it is the same.
     fn take_over(&self, name: Name, shape: Shape) -> Result<Predecessor, CreateError> {
         let path = path_of(self.node().path(), name);
         let memory = |source| CreateError::Memory { name, bytes: shape.segment_bytes(), source };
@@ -86,28 +87,29 @@ impl Participant {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
             Err(error) => return Err(memory(error)),
         };
-        let owned = !lock::try_lock(&file, OWNER_BYTE).map_err(memory)?;
         let old = match Segment::check(&file, name, true) {
-            Ok(old) => old,
-            Err(BadSegment::Foreign) => return Ok(Predecessor::None),
+            Ok(old) => Some(old),
+            Err(BadSegment::Foreign) => None,
             Err(BadSegment::Io(error)) => return Err(memory(error)),
         };
-        if owned {
-            return Err(CreateError::Owned(name, old.page().owner.pid.load(Ordering::Relaxed)));
-        }
+        let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(memory)? else {
+            let pid = old.map_or(0, |old| old.page().owner.pid.load(Ordering::Relaxed));
+            return Err(CreateError::Owned(name, pid));
+        };
+        let Some(old) = old else { return Ok(Predecessor::None) };
         if old.shape != shape || old.slots().is_retired() {
-            retire(&old);
             return Ok(Predecessor::Other(old));
         }
         step!("adopt: before");
         let page = old.page();
         old.slots().adopt(|priority| page.counters.lost(priority, Loss::Poison, 1));
         page.owner.adoptions.fetch_add(1, Ordering::Relaxed);
-        Ok(Predecessor::Same(old, file))
+        Ok(Predecessor::Same(old, lock))
     }
 
-    /// Makes the file, whole, then gives it its name.
-    fn make(&self, name: Name, shape: Shape, old: Option<&Segment>) -> Result<(Segment, File), CreateError> {
+    /// Makes the file, whole, then gives it its name. The old mailbox is given up only when nothing can go wrong any more:
+    /// without memory for the new one, what the old one holds stays.
+    fn make(&self, name: Name, shape: Shape, old: Option<&Segment>) -> Result<(Segment, Held), CreateError> {
         let node = self.node();
         let path = path_of(node.path(), name);
         // One maker at a time (the registry's lock), so one temporary name will do; a dead maker's leftover is overwritten.
@@ -119,15 +121,19 @@ impl Participant {
             allocate(&file, shape.segment_bytes())?;
             step!("create: allocated");
             let segment = Segment::format(&file, name, shape)?;
-            if let Some(old) = old {
-                segment.page().counters.carry_over(&old.page().counters);
-                segment.page().hot.ticket.store(old.page().hot.ticket.load(Ordering::Relaxed), Ordering::Relaxed);
-            }
-            lock::try_lock(&file, OWNER_BYTE)?;
+            let lock = Held::try_take(file, OWNER_BYTE)?.ok_or(io::ErrorKind::WouldBlock)?;
             step!("create: formatted");
+            if let Some(old) = old {
+                retire(old);
+                let counters = &segment.page().counters;
+                counters.carry_over(&old.page().counters);
+                // Not the old one's tickets: those of packages that their senders took back were never accepted.
+                segment.page().hot.ticket.store(counters.accepted(), Ordering::Relaxed);
+                step!("create: carried over");
+            }
             fs::rename(&unfinished, &path)?;
             step!("create: named");
-            Ok((segment, file))
+            Ok((segment, lock))
         };
         let result = made().map_err(|source| {
             let _ = fs::remove_file(&unfinished);
@@ -142,8 +148,8 @@ impl Participant {
 enum Predecessor {
     None,
     /// Of the same shape: adopted.
-    Same(Segment, File),
-    /// Given up; its counters go on in the next.
+    Same(Segment, Held),
+    /// To be given up; its counters go on in the next.
     Other(Segment),
 }
 
@@ -159,6 +165,7 @@ fn retire(old: &Segment) {
         old.page().counters.lost(taken.word.priority(), Loss::Closed, 1);
         slots.release(taken);
     }
+    slots.settle(|priority| old.page().counters.lost(priority, Loss::Displaced, 1));
 }
 
 /// Takes a mailbox's name away; the caller owns it.
@@ -238,10 +245,9 @@ impl Node {
         let failed = |error| NodeError::Io(path.clone(), error);
         let registry = RegistryLock::take(self.path())?;
         let Ok(file) = open_shared(&path, false) else { return Ok(false) };
-        if !lock::try_lock(&file, OWNER_BYTE).map_err(failed)? {
-            return Ok(false);
-        }
-        if let Ok(old) = Segment::check(&file, name, true) {
+        let old = Segment::check(&file, name, true);
+        let Some(_owner) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else { return Ok(false) };
+        if let Ok(old) = old {
             retire(&old);
         }
         unlink(self, name, &registry)?;
@@ -253,13 +259,9 @@ impl Node {
     /// # Errors
     /// When something cannot be removed.
     pub fn remove_if_dead(&self) -> Result<bool, NodeError> {
-        if self.launcher().is_some() || !self.participants().is_empty() {
-            return Ok(false);
-        }
+        let Some(_nobody) = self.keep_all_out()? else { return Ok(false) };
         for name in self.mailboxes()? {
-            if !self.remove_orphan(name)? {
-                return Ok(false);
-            }
+            self.remove_orphan(name)?;
         }
         let failed = |error| NodeError::Io(self.path().into(), error);
         fs::remove_dir_all(self.path()).map_err(failed)?;

@@ -4,7 +4,7 @@ use crate::clock::monotonic_ns;
 use crate::layout::{Page, SLOT_PREFIX, Shape};
 use crate::memory::Mapping;
 use crate::name::Name;
-use crate::node::open_shared;
+use crate::node::{open_shared, open_to_read};
 use crate::package::{HEAD_BYTES, Head};
 use crate::slots::Slots;
 use std::fs::File;
@@ -39,7 +39,9 @@ pub(crate) fn name_of(path: &Path) -> Option<Name> {
     if path.extension()? != "mbx" {
         return None;
     }
-    u32::from_str_radix(path.file_stem()?.to_str()?, 16).ok().map(Name::from_raw)
+    let name = u32::from_str_radix(path.file_stem()?.to_str()?, 16).ok().map(Name::from_raw)?;
+    // `1.mbx` is nobody's: a name has exactly one file.
+    (path.file_name() == path_of(Path::new(""), name).file_name()).then_some(name)
 }
 
 impl Segment {
@@ -54,7 +56,7 @@ impl Segment {
     /// Maps the mailbox of this name as it stands.
     pub(crate) fn open(node: &Path, name: Name, writable: bool) -> Result<(Self, File), BadSegment> {
         let path = path_of(node, name);
-        let file = if writable { open_shared(&path, false)? } else { File::open(&path)? };
+        let file = if writable { open_shared(&path, false)? } else { open_to_read(&path)? };
         Ok((Self::check(&file, name, writable)?, file))
     }
 

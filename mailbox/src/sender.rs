@@ -119,11 +119,8 @@ impl Sender {
     /// When it was not accepted.
     pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
         let len: usize = parts.iter().map(|part| part.len()).sum();
-        let mut loan = self.loan(label.priority)?;
-        if len > loan.body().len() {
-            let max = loan.body().len();
-            return Err(SendError::TooLarge { name: loan.sender.name(), len, max });
-        }
+        let claim = self.claim(label.priority, len)?;
+        let mut loan = Loan { sender: self, claim: Some(claim), priority: label.priority };
         let mut body = loan.body();
         for part in parts {
             let (here, rest) = body.split_at_mut(part.len());
@@ -138,13 +135,18 @@ impl Sender {
     /// # Errors
     /// [`SendError::Full`], or what reopening a replaced mailbox brings.
     pub fn loan(&mut self, priority: Priority) -> Result<Loan<'_>, SendError> {
-        let claim = self.claim(priority)?;
+        let claim = self.claim(priority, 0)?;
         Ok(Loan { sender: self, claim: Some(claim), priority })
     }
 
-    fn claim(&mut self, priority: Priority) -> Result<Claim, SendError> {
+    /// A slot for a body of `len` bytes. One too large is refused before it pushes anybody out.
+    fn claim(&mut self, priority: Priority, len: usize) -> Result<Claim, SendError> {
         for _ in 0..REOPEN_MAX {
             let me = self.participant.claimant();
+            let (max, retired) = (self.body_bytes_max(), self.segment.slots().is_retired());
+            if len > max && !retired {
+                return Err(SendError::TooLarge { name: self.name(), len, max });
+            }
             match self.segment.slots().claim(me, &mut self.cursor, priority, self.segment.shape.full) {
                 Ok(claim) => return Ok(claim),
                 Err(NoSlot::Full) => {
@@ -189,16 +191,10 @@ impl Sender {
                 return Err(error);
             }
         };
-        let result = self.claim(priority).and_then(|claim| {
-            let max = self.body_bytes_max();
-            if len > max {
-                self.segment.slots().abandon(claim);
-                return Err(SendError::TooLarge { name: self.name(), len, max });
-            }
+        let result = self.claim(priority, len).inspect(|claim| {
             // SAFETY: both claims are ours, on different segments.
             let (from, to) = unsafe { (retired.body_mut(old.slot), self.segment.body_mut(claim.slot)) };
             to[..len].copy_from_slice(&from[..len]);
-            Ok(claim)
         });
         retired.slots().abandon(old);
         result

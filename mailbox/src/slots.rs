@@ -188,7 +188,10 @@ impl<'a> Slots<'a> {
         step!("publish: ticket");
         let word = Word::ready(priority, ticket);
         if !self.change(slot, claim.word, word) {
-            return Published::Reclaimed;
+            // ORDERING: Acquire; pairs with the Release of the change that was in the way: if it was `settle`'s, then
+            // `retired` is seen below.
+            fence(Ordering::Acquire);
+            return if self.is_retired() { Published::Retired } else { Published::Reclaimed };
         }
         step!("publish: ready");
         self.hint(slot);
@@ -237,7 +240,8 @@ impl<'a> Slots<'a> {
 
     /// Says that the receiver is about to sleep. Look at the hints after this, then sleep, then [`Slots::awake`].
     pub(crate) fn drowsy(&self) {
-        self.hot.sleeping.store(1, Ordering::Relaxed);
+        // ORDERING: Release; pairs with the Acquire in `publish`: who sees this owner asleep sees whose bell to ring.
+        self.hot.sleeping.store(1, Ordering::Release);
         // ORDERING (F): `sleeping` before the last look at the hints. Pairs with (E).
         fence(Ordering::SeqCst);
     }
@@ -296,5 +300,18 @@ impl<'a> Slots<'a> {
         self.hot.retired.store(1, Ordering::Relaxed);
         // ORDERING (G): `retired` before the owner's last look at the words. Pairs with (E).
         fence(Ordering::SeqCst);
+    }
+
+    /// Of a mailbox given up: tells `lost` what those displaced who still fill, since they could only count it here, where
+    /// nobody looks any more. They find their claim changed, and go on as after any other retirement.
+    pub(crate) fn settle(&self, mut lost: impl FnMut(Priority)) {
+        for slot in 0..self.count {
+            let word = self.load(slot);
+            if let State::Filling { by, displaced: Some(priority) } = word.state() {
+                lost(priority);
+                step!("settle: counted");
+                self.change(slot, word, Word::filling(by, None));
+            }
+        }
     }
 }

@@ -17,6 +17,9 @@ use std::time::Duration;
 /// A reader that was overtaken twice by the writer tries again, so often: the writer writes at most some thousand times a
 /// second, a reading takes less than a microsecond.
 const READ_TRIES: usize = 8;
+/// A slower pace begins so far ahead: longer than writing a record takes. A writer that was held up tries again, so often.
+const SLOWER_LEAD_NS: u64 = 1_000_000;
+const WRITE_TRIES: usize = 8;
 const BILLION: i128 = 1_000_000_000;
 
 /// Where system time comes from.
@@ -147,6 +150,11 @@ impl SharedRecord {
 
 impl TimePage {
     fn read(&self) -> Option<TimeRecord> {
+        self.read_while(|| ()).map(|(record, ())| record)
+    }
+
+    /// The record, and what `meanwhile` said while it was the valid one.
+    fn read_while<T>(&self, meanwhile: impl Fn() -> T) -> Option<(TimeRecord, T)> {
         for _ in 0..READ_TRIES {
             // ORDERING: Acquire (A); pairs with (B): the record that the index names is whole.
             let index = self.index.load(Ordering::Acquire);
@@ -154,21 +162,28 @@ impl TimePage {
                 return None;
             }
             let record = self.records[(index % 2) as usize].load();
+            let said = meanwhile();
             // ORDERING (C): the fields before the second look; pairs with (D). While the index stands, the writer is at most
             // in the other record.
             fence(Ordering::Acquire);
             if self.index.load(Ordering::Relaxed) == index {
-                return record;
+                return Some((record?, said));
             }
         }
         None
     }
 
-    fn write(&self, record: &TimeRecord) {
+    /// Writes the record that the index does not name.
+    fn fill(&self, record: &TimeRecord) {
         let next = self.index.load(Ordering::Relaxed) + 1;
         // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
         fence(Ordering::Release);
         self.records[(next % 2) as usize].store(record);
+    }
+
+    /// Makes the record just filled the valid one.
+    fn turn(&self) {
+        let next = self.index.load(Ordering::Relaxed) + 1;
         // ORDERING: Release (B); pairs with (A).
         self.index.store(next, Ordering::Release);
         step!("time: turned");
@@ -198,7 +213,12 @@ impl SystemClock {
 
     /// System time now. No system call, lock or heap.
     pub fn now(&self) -> SystemTime {
-        self.at(monotonic_ns())
+        // The clock is read while the record is valid. By an older record it could be later, and by a newer one earlier,
+        // than what the next reading says.
+        match self.mapping.as_ref().and_then(|mapping| mapping.at::<TimePage>(0).read_while(monotonic_ns)) {
+            Some((record, now)) => record.at(now),
+            None => self.at(monotonic_ns()),
+        }
     }
 
     /// System time at a moment of the monotonic clock.
@@ -235,7 +255,7 @@ impl TimeKeeper {
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
         let epoch = page.read().map_or(1, |last| last.epoch + 1);
-        page.write(&TimeRecord {
+        page.fill(&TimeRecord {
             epoch,
             source,
             monotonic_ns: monotonic_ns(),
@@ -244,17 +264,26 @@ impl TimeKeeper {
             error_ns: 0,
             drift_ns_s: 0,
         });
+        page.turn();
         Ok(keeper)
     }
 
     /// Goes on in the same epoch with another pace, never back.
     pub fn set_pace(&mut self, pace: f64) {
         let page: &TimePage = self.mapping.at(0);
-        if let Some(last) = page.read() {
-            let now = monotonic_ns();
-            let time = last.at(now);
-            let pace_ppb = (pace.clamp(0.0, 1000.0) * 1e9) as u64;
-            page.write(&TimeRecord { monotonic_ns: now, system_ns: time.ns, pace_ppb, ..last });
+        let Some(last) = page.read() else { return };
+        let pace_ppb = (pace.clamp(0.0, 1000.0) * 1e9) as u64;
+        // Until the index turns, readers go by the old pace. So that the new record is never behind what they read till
+        // then, a slower pace begins a little in the future.
+        let lead_ns = if pace_ppb < last.pace_ppb { SLOWER_LEAD_NS } else { 0 };
+        for _ in 0..WRITE_TRIES {
+            let begin_ns = monotonic_ns() + lead_ns;
+            let system_ns = last.at(begin_ns).ns;
+            page.fill(&TimeRecord { monotonic_ns: begin_ns, system_ns, pace_ppb, ..last });
+            if lead_ns == 0 || monotonic_ns() < begin_ns {
+                break;
+            }
         }
+        page.turn();
     }
 }

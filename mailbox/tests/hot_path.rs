@@ -1,0 +1,63 @@
+//! Sending and receiving take nothing from the heap, and give nothing back to it.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod common;
+
+use common::{Ground, HIGH, LOW, MAILBOX, label, shape};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::time::Duration;
+
+thread_local! {
+    static USES: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+#[global_allocator]
+static HEAP: Counting = Counting;
+
+// SAFETY: hands all on to the system's; a constant thread-local without destructor neither allocates nor ends.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        USES.with(|uses| uses.set(uses.get() + 1));
+        // SAFETY: as promised by our caller.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        USES.with(|uses| uses.set(uses.get() + 1));
+        // SAFETY: as promised by our caller.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[test]
+fn the_hot_paths_do_not_touch_the_heap() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let mut receiver = ground.join().receiver(MAILBOX, shape(8)).unwrap();
+    let mut sender = ground.sender();
+    let clock = rohrpost_mailbox::SystemClock::open(&node);
+    let round = |id: u16, sender: &mut rohrpost_mailbox::Sender, receiver: &mut rohrpost_mailbox::Receiver| {
+        for _ in 0..9 {
+            let _ = sender.send(&label(LOW, id), &[b"parts", b"of a body"]);
+        }
+        sender.send(&label(HIGH, id), &[b"displaces"]).unwrap();
+        drop(sender.loan(HIGH));
+        sender.loan(HIGH).unwrap().send(&label(HIGH, id), 10).unwrap();
+        let mut all = 0;
+        while let Some(package) = receiver.try_receive() {
+            all += package.body().len();
+        }
+        assert!(all > 0 && receiver.receive_timeout(Duration::from_micros(1)).is_none());
+        node.announce_death();
+        let _ = clock.now();
+    };
+    round(0, &mut sender, &mut receiver);
+    let before = USES.with(Cell::get);
+    assert!(before > 0, "counts");
+    (1..1000).for_each(|id| round(id, &mut sender, &mut receiver));
+    assert_eq!(USES.with(Cell::get), before);
+}

@@ -1,0 +1,160 @@
+//! What comes out, and in which order, against a model of a page.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod common;
+
+use common::{Ground, MAILBOX, label, lost, received, shape};
+use proptest::prelude::*;
+use rohrpost_mailbox::{Full, Loss, Options, Priority, Receiver, SendError, Sender};
+
+const SENDERS: usize = 3;
+
+#[derive(Clone, Debug)]
+enum Step {
+    Send {
+        sender: usize,
+        priority: u8,
+    },
+    DropLoan {
+        sender: usize,
+        priority: u8,
+    },
+    Receive,
+    /// The receiver goes, another adopts.
+    Restart,
+}
+
+fn step() -> impl Strategy<Value = Step> {
+    let sends = (0..SENDERS, 1u8..5);
+    prop_oneof![
+        6 => sends.clone().prop_map(|(sender, priority)| Step::Send { sender, priority }),
+        1 => sends.prop_map(|(sender, priority)| Step::DropLoan { sender, priority }),
+        4 => Just(Step::Receive),
+        1 => Just(Step::Restart),
+    ]
+}
+
+/// A mailbox as it is described: a list.
+struct Model {
+    slots: usize,
+    full: Full,
+    /// Priority and number, in the order of sending.
+    waiting: Vec<(u8, u16)>,
+    sent: u64,
+    displaced: u64,
+    refused: u64,
+    received: u64,
+}
+
+impl Model {
+    /// Makes room for a package of this priority.
+    fn claim(&mut self, priority: u8) -> bool {
+        if self.waiting.len() < self.slots {
+            return true;
+        }
+        let least = self.waiting.iter().map(|package| package.0).min().filter(|least| *least < priority);
+        match least.filter(|_| self.full == Full::Displace) {
+            Some(least) => {
+                let newest = self.waiting.iter().rposition(|package| package.0 == least).unwrap();
+                self.waiting.remove(newest);
+                self.displaced += 1;
+            }
+            None => self.refused += 1,
+        }
+        least.is_some() && self.full == Full::Displace
+    }
+
+    fn receive(&mut self) -> Option<u16> {
+        let most = self.waiting.iter().map(|package| package.0).max()?;
+        let first = self.waiting.iter().position(|package| package.0 == most)?;
+        self.received += 1;
+        Some(self.waiting.remove(first).1)
+    }
+}
+
+fn receive(receiver: &mut Receiver) -> Option<u16> {
+    let package = receiver.try_receive()?;
+    assert_eq!(package.body(), package.head().id.to_le_bytes());
+    assert!(!package.head().options.has(Options::REDELIVERED));
+    Some(package.head().id)
+}
+
+fn send(sender: &mut Sender, priority: u8, id: u16) -> bool {
+    match sender.send(&label(Priority(priority), id), &[&id.to_le_bytes()]) {
+        Ok(()) => true,
+        Err(SendError::Full(MAILBOX)) => false,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+fn agree(slots: u16, full: Full, steps: &[Step]) {
+    let ground = Ground::new();
+    let shape = rohrpost_mailbox::Shape { full, ..shape(slots) };
+    let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
+    let mut senders: Vec<Sender> = (0..SENDERS).map(|_| ground.sender()).collect();
+    let mut model =
+        Model { slots: slots.into(), full, waiting: Vec::new(), sent: 0, displaced: 0, refused: 0, received: 0 };
+    for (id, step) in (0u16..).zip(steps) {
+        match *step {
+            Step::Send { sender, priority } => {
+                let room = model.claim(priority);
+                assert_eq!(send(&mut senders[sender], priority, id), room);
+                if room {
+                    model.waiting.push((priority, id));
+                    model.sent += 1;
+                }
+            }
+            Step::DropLoan { sender, priority } => {
+                assert_eq!(senders[sender].loan(Priority(priority)).is_ok(), model.claim(priority));
+            }
+            Step::Receive => assert_eq!(receive(&mut receiver), model.receive()),
+            Step::Restart => {
+                drop(receiver);
+                receiver = ground.join().receiver(MAILBOX, shape).unwrap();
+            }
+        }
+    }
+    let info = ground.look();
+    assert_eq!((info.sent, info.depth as usize), (model.sent, model.waiting.len()));
+    let found = (received(&info), lost(&info, Loss::Displaced), lost(&info, Loss::Refused));
+    assert_eq!(found, (model.received, model.displaced, model.refused));
+    while let Some(id) = model.receive() {
+        assert_eq!(receive(&mut receiver), Some(id));
+    }
+    assert_eq!(receive(&mut receiver), None);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(200) })]
+
+    #[test]
+    fn a_mailbox_is_a_list_by_priority_and_age(
+        slots in prop_oneof![1u16..6, 63u16..67],
+        displaces: bool,
+        steps in proptest::collection::vec(step(), 0..300),
+    ) {
+        agree(slots, if displaces { Full::Displace } else { Full::Reject }, &steps);
+    }
+}
+
+#[test]
+fn a_full_mailbox_does_what_it_says() {
+    for (full, priorities, out) in [
+        (Full::Displace, &[1, 1, 2, 3][..], &[3, 2][..]),
+        (Full::Displace, &[2, 2, 2], &[2, 2]),
+        (Full::Displace, &[3, 2, 1], &[3, 2]),
+        (Full::Reject, &[1, 1, 9], &[1, 1]),
+    ] {
+        let ground = Ground::new();
+        let mut receiver = ground.join().receiver(MAILBOX, rohrpost_mailbox::Shape { full, ..shape(2) }).unwrap();
+        let mut sender = ground.sender();
+        for (id, priority) in (0..).zip(priorities) {
+            send(&mut sender, *priority, id);
+        }
+        for priority in out {
+            assert_eq!(receiver.try_receive().unwrap().head().priority, Priority(*priority), "{full:?} {priorities:?}");
+        }
+        assert!(receiver.try_receive().is_none());
+    }
+}

@@ -1,0 +1,109 @@
+//! System time: epochs, never back within one, whole whatever happens to its writer.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod common;
+
+use common::{Ground, tell};
+use rohrpost_mailbox::{SystemClock, TimeKeeper, TimeSource, monotonic_ns, realtime_ns};
+use std::time::{Duration, Instant};
+
+/// The killed writer's mark: an epoch of pace p begins at p times this.
+const MARK_NS: u64 = 1_000_000_000_000_000;
+
+#[test]
+fn role() {
+    let Some((role, ground)) = common::role() else { return };
+    assert_eq!(role, "write");
+    let node = ground.node();
+    tell("writing");
+    for turn in u64::from(std::process::id()).. {
+        let pace = 1 + turn % 9;
+        let source = if pace.is_multiple_of(2) { TimeSource::Log } else { TimeSource::Simulation };
+        let mut keeper = TimeKeeper::begin(&node, source, pace * MARK_NS, pace as f64).unwrap();
+        (0..50).for_each(|_| keeper.set_pace(pace as f64));
+    }
+}
+
+#[test]
+fn without_a_page_the_wall_clock_is_taken() {
+    let ground = Ground::new();
+    let clock = SystemClock::open(&ground.node());
+    assert_eq!(clock.record(), None);
+    let (before, now, after) = (realtime_ns(), clock.now(), realtime_ns());
+    assert_eq!(now.epoch, 0);
+    assert!((before..=after).contains(&now.ns));
+    let second_ago = clock.at(monotonic_ns() - 1_000_000_000);
+    assert!(second_ago.ns < before - 900_000_000);
+}
+
+#[test]
+fn an_epoch_begins_with_every_step_and_time_follows_the_pace() {
+    let ground = Ground::new();
+    let node = ground.node();
+    for (epoch, source, system_ns, pace) in
+        [(1, TimeSource::Simulation, 5_000, 0.0), (2, TimeSource::Local, 9_000, 1.0), (3, TimeSource::Log, 7_000, 2.5)]
+    {
+        let _keeper = TimeKeeper::begin(&node, source, system_ns, pace).unwrap();
+        let clock = SystemClock::open(&node);
+        let record = clock.record().unwrap();
+        assert_eq!((record.epoch, record.source, record.system_ns), (epoch, source, system_ns));
+        let later = clock.at(record.monotonic_ns + 1_000_000);
+        assert_eq!((later.ns, later.epoch), (system_ns + (1e6 * pace) as u64, epoch));
+        assert_eq!((later.age, later.error), (Duration::from_millis(1), Duration::ZERO));
+        assert!(clock.now().ns >= system_ns);
+    }
+}
+
+#[test]
+fn another_pace_never_takes_time_back() {
+    let ground = Ground::new();
+    let mut keeper = TimeKeeper::begin(&ground.node(), TimeSource::Simulation, 1_000_000, 1.0).unwrap();
+    let clock = SystemClock::open(&ground.node());
+    let writer = std::thread::spawn(move || {
+        for turn in 0..150 {
+            keeper.set_pace([0.0, 3.0, 1.0, 200.0, 0.5][turn % 5]);
+            let until = Instant::now() + Duration::from_millis(3);
+            while Instant::now() < until {
+                std::thread::yield_now();
+            }
+        }
+    });
+    let mut last = clock.now();
+    let mut steps = 0;
+    while !writer.is_finished() {
+        let now = clock.now();
+        assert_eq!(now.epoch, 1);
+        assert!(now.ns >= last.ns, "back by {} ns", last.ns - now.ns);
+        steps += u64::from(now.ns > last.ns);
+        last = now;
+    }
+    assert!(steps > 100);
+}
+
+#[test]
+fn a_reader_finds_a_whole_record_however_its_writer_dies() {
+    let ground = Ground::new();
+    drop(TimeKeeper::begin(&ground.node(), TimeSource::Simulation, MARK_NS, 1.0).unwrap());
+    let clock = SystemClock::open(&ground.node());
+    let end = Instant::now() + Duration::from_secs(3);
+    let (mut epoch, mut kills, mut readings) = (0, 0, 0u64);
+    while Instant::now() < end {
+        let writer = ground.start("write");
+        assert_eq!(writer.hear(), "writing");
+        for _ in 0..(writer.id() % 7 + 1) * 2_000 {
+            // None: a writer without pause overtook each try; that is no torn record, and a real one writes seldom.
+            let Some(record) = clock.record() else { continue };
+            readings += 1;
+            let pace = record.pace_ppb / 1_000_000_000;
+            let source = if pace.is_multiple_of(2) { TimeSource::Log } else { TimeSource::Simulation };
+            assert_eq!((record.system_ns / MARK_NS, record.source), (pace, source), "torn: {record:?}");
+            assert!(record.epoch >= epoch, "epoch {} after {epoch}", record.epoch);
+            epoch = record.epoch;
+        }
+        writer.kill();
+        kills += 1;
+        assert!(clock.record().is_some(), "a dead writer stops nobody");
+    }
+    assert!(kills > 10 && readings > 1000, "{kills} kills, {readings} readings");
+}
