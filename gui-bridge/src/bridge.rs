@@ -7,8 +7,8 @@ use crate::{Connection, DrawError, Level, Scene, Sink};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::config::Show;
 use rohrpost::description::Description;
-use rohrpost::interface::Interface;
-use rohrpost::interfaces::CollectorInterface;
+use rohrpost::interface::{Interface, Proxy};
+use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
 use rohrpost::mailbox::{ModuleState, Node};
 use rohrpost::output::OutputLine;
 use rohrpost::survey::Survey;
@@ -229,8 +229,29 @@ impl Bridge {
                 tracing::warn!("{module} has no data `{data}` to draw; it has: {}", names.join(", "));
                 continue;
             };
+            if let (Kind::Line, Some(scene)) = (kind_of(&item), &mut self.scene) {
+                earlier_lines(scene, drawn.from, context);
+            }
             let subscription = context.subscribe_untyped(drawn.from, item.number, description.hash(), drawn.rate);
             drawn.way = Some(Way { subscription, kind: kind_of(&item), item });
+        }
+    }
+}
+
+/// Draws what was said before the bridge began to listen; a line that comes twice does no harm.
+fn earlier_lines(scene: &mut Scene, collector: Name, context: &Context) {
+    let proxy = CollectorProxy::new(context.link(), collector).with_timeout(PATIENCE);
+    let mut next = 0;
+    while let Ok(page) = proxy.lines_from(next) {
+        for line in &page.lines {
+            scene.set_time(line.time_ns);
+            let module = context.installation().classes.format(line.module());
+            // What cannot be drawn is missing from a picture; nothing else depends on it.
+            let _ = scene.output_line(&module, level(line.level), &line.text);
+        }
+        next = page.first + page.lines.len() as u64;
+        if page.lines.is_empty() || next >= page.next {
+            break;
         }
     }
 }

@@ -71,7 +71,7 @@ impl Queue {
     }
 
     /// Moves what the hints speak of into the heap.
-    fn look(&mut self, slots: &Slots<'_>) {
+    pub(crate) fn look(&mut self, slots: &Slots<'_>) {
         // ORDERING: Acquire; pairs with the fetch_add of `publish`: all that a sender hinted before its package T is seen below.
         let horizon = slots.hot.ticket.load(Ordering::Acquire);
         for i in 0..slots.count().div_ceil(64) {

@@ -139,13 +139,21 @@ impl Receiver {
         self.queue.rescan(&slots);
     }
 
+    /// Turns hints into what they speak of, so that those which speak of nothing keep nobody awake.
+    fn settle(&mut self) {
+        if self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen {
+            self.search();
+        }
+        self.queue.look(&self.segment.slots());
+    }
+
     fn may_have(&self) -> bool {
         self.queue.may_have_more(&self.segment.slots())
             || self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen
     }
 }
 
-/// Sleeps until one of these mailboxes may have a package, `other` says that there is something else to do, or the deadline
+/// Sleeps until one of these mailboxes has a package, `other` says that there is something else to do, or the deadline
 /// has passed. May return early for no reason. All must be of one participant, whose bell it is that wakes.
 ///
 /// Whoever makes `other` true from outside calls [`Participant::ring`] afterwards.
@@ -157,6 +165,7 @@ pub fn wait_any(receivers: &mut [&mut Receiver], deadline: Option<Instant>, othe
         return;
     };
     assert!(receivers.iter().all(|receiver| Arc::ptr_eq(&receiver.participant, &participant)));
+    receivers.iter_mut().for_each(|receiver| receiver.settle());
     let bell = &participant.entry().bell;
     // ORDERING: Acquire, and before `drowsy`: whatever is published after the looks below rings, and so changes this value.
     let seen = bell.load(Ordering::Acquire);

@@ -86,6 +86,7 @@ impl<M: Module> Life<M> {
             return Err(Fault::ModuleError(self.error.clone()));
         }
         self.enter(ModuleState::On);
+        tracing::info!("is on");
         context.next_tick = context.period.map(|_| Instant::now());
         // Asked for before the answer goes out: who switches modules on one after the other knows who listens to whom.
         context.followings.renew(&mut context.link.borrow_mut(), Instant::now());
@@ -95,6 +96,7 @@ impl<M: Module> Life<M> {
     pub(crate) fn turn_off(&mut self, context: &mut Context) {
         if self.state == ModuleState::On {
             self.module.off(context);
+            tracing::info!("is off");
         }
         self.error.clear();
         self.enter(ModuleState::Off);
