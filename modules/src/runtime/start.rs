@@ -98,7 +98,9 @@ impl Start {
         let (mut config, mut module) = (variable(environment::CONFIG), variable(environment::MODULE));
         let launcher = variable(environment::LAUNCHER).and_then(|pid| pid.parse().ok());
         let restarts = variable(environment::RESTARTS).and_then(|count| count.parse().ok()).unwrap_or(0);
-        let mut off = launcher.is_some();
+        // Launch switches modules on when all are ready. Of one that it has started again others expect that it works, and
+        // what waits in its mailboxes comes before any word of launch's.
+        let mut off = launcher.is_some() && restarts == 0;
         let mut arguments = arguments;
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or_else(|| StartError::Usage(format!("`{argument}` needs a value")));
