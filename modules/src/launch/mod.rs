@@ -99,16 +99,16 @@ impl Launch {
         executable: PathBuf,
         events: Receiver<Event>,
     ) -> Result<Self, LaunchError> {
-        let mode = installation.node(node_name).map_or(0o700, |node| node.mode);
-        let node = Node::create(&node_directory(&installation.name, node_name), mode)?;
-        let lock = node.launch_lock()?;
-        let mut notes = leftovers::end(&node, &installation, node_name)?;
         let beside = executable.parent().map(PathBuf::from).unwrap_or_default();
         let missing = installation.missing_programs(node_name, &beside);
         let fatal: Vec<String> = missing.iter().filter(|p| !p.optional).map(ToString::to_string).collect();
         if !fatal.is_empty() {
             return Err(LaunchError::Programs(fatal.join("\n")));
         }
+        let mode = installation.node(node_name).map_or(0o700, |node| node.mode);
+        let node = Node::create(&node_directory(&installation.name, node_name), mode)?;
+        let lock = node.launch_lock()?;
+        let mut notes = leftovers::end(&node, &installation, node_name)?;
         notes.extend(missing.iter().map(|program| format!("left out: {program}")));
         let time = begin_time(&node, &installation)?;
         leftovers::note_config(&node, &installation, node_name)?;
