@@ -256,13 +256,14 @@ fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeepe
     TimeKeeper::begin(node, source, realtime_ns(), pace)
 }
 
-/// A channel of events: SIGINT and SIGTERM say stop, SIGCHLD says that a child may have ended.
+/// A channel of events: SIGINT, SIGTERM and SIGHUP (a terminal was closed) say stop, SIGCHLD that a child may have ended.
 ///
 /// # Errors
 /// [`LaunchError::Signals`].
 pub fn events() -> Result<Receiver<Event>, LaunchError> {
-    use signal_hook::consts::{SIGCHLD, SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGCHLD]).map_err(LaunchError::Signals)?;
+    use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
+    let mut signals =
+        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP, SIGCHLD]).map_err(LaunchError::Signals)?;
     let (sender, receiver) = std::sync::mpsc::channel();
     let forward = move || {
         for signal in signals.forever() {

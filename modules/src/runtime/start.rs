@@ -183,10 +183,11 @@ fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
     if nix::unistd::getppid().as_raw().unsigned_abs() == launcher { Ok(()) } else { Err(StartError::Orphan(launcher)) }
 }
 
-/// On SIGTERM and SIGINT: ask the loop to end; if it does not within the time, end the process.
+/// On SIGTERM, SIGINT and SIGHUP: ask the loop to end; if it does not within the time, end the process. SIGHUP is how the
+/// kernel wakes a stopped module whose launch has died.
 fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT])
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGHUP])
         .map_err(|error| StartError::System("signal handlers", error))?;
     let stop = Arc::new(AtomicBool::new(false));
     let (flag, participant) = (stop.clone(), participant.clone());
