@@ -11,10 +11,14 @@ use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Longest pause before a restart.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
+/// So long, after a module has ended, for its last words to come through the pipe. A program that it started may hold the
+/// pipe open.
+const LAST_WORDS: Duration = Duration::from_millis(100);
 /// Lines of what a module printed that are kept to be told when it ends.
 const PRINTED_MAX: usize = 12;
 
@@ -54,6 +58,8 @@ pub(super) struct Child {
     restarts: u32,
     backoff: Duration,
     printed: Arc<Mutex<VecDeque<String>>>,
+    /// Fills `printed` until the pipe closes.
+    reader: Option<JoinHandle<()>>,
 }
 
 impl Child {
@@ -84,6 +90,7 @@ impl Child {
             restarts: 0,
             backoff: module.restart.backoff,
             printed: Arc::default(),
+            reader: None,
         }
     }
 
@@ -124,7 +131,7 @@ impl Child {
         }
     }
 
-    fn try_spawn(&self) -> io::Result<std::process::Child> {
+    fn try_spawn(&mut self) -> io::Result<std::process::Child> {
         let (reader, writer) = io::pipe()?;
         let process = Command::new(&self.program)
             .args(&self.arguments)
@@ -138,7 +145,8 @@ impl Child {
             .process_group(0)
             .spawn()?;
         let printed = self.printed.clone();
-        std::thread::Builder::new().name("printed".into()).spawn(move || keep_last(reader, &printed))?;
+        let reader = std::thread::Builder::new().name("printed".into()).spawn(move || keep_last(reader, &printed))?;
+        self.reader = Some(reader);
         Ok(process)
     }
 
@@ -213,7 +221,11 @@ impl Child {
         format!("{} {how}; starts again in {pause:?}{printed}", self.text)
     }
 
-    fn take_printed(&self) -> String {
+    fn take_printed(&mut self) -> String {
+        let deadline = Instant::now() + LAST_WORDS;
+        while self.reader.as_ref().is_some_and(|reader| !reader.is_finished()) && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(1));
+        }
         let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
         printed.drain(..).map(|line| format!("\n    {line}")).collect()
     }
