@@ -1,7 +1,8 @@
 //! `rohrpost clean`.
 
 use super::{Failure, say};
-use rohrpost::mailbox::{Node, base_directory};
+use rohrpost::mailbox::{Node, NodeError, base_directory};
+use std::path::Path;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -17,25 +18,12 @@ pub(super) fn run(_: &Arguments) -> Result<ExitCode, Failure> {
     let mut seen = 0;
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
         seen += 1;
-        let node = match Node::open(&path) {
-            Ok(node) => node,
-            Err(error) => {
-                say(error);
-                continue;
-            }
+        match clean(&path) {
+            Ok(done) => say(done),
+            // Its launch has ended meanwhile, and removed it itself.
+            Err(_) if !path.exists() => continue,
+            Err(error) => say(error),
         };
-        if node.remove_if_dead()? {
-            say(format_args!("removed {}", path.display()));
-            continue;
-        }
-        let mut removed = 0;
-        // A module that its launch is about to start again has no owner for a moment; its packages are waited for.
-        if node.launcher().is_none() {
-            for name in node.mailboxes()? {
-                removed += usize::from(node.remove_orphan(name)?);
-            }
-        }
-        say(format_args!("{} is in use; removed {removed} mailboxes without owner", path.display()));
     }
     if seen == 0 {
         say(format_args!("nothing to clean in {}", base.display()));
@@ -43,4 +31,20 @@ pub(super) fn run(_: &Arguments) -> Result<ExitCode, Failure> {
     // Only if it is empty.
     let _ = std::fs::remove_dir(&base);
     Ok(ExitCode::SUCCESS)
+}
+
+/// Removes what is dead of one node; what was done.
+fn clean(path: &Path) -> Result<String, NodeError> {
+    let node = Node::open(path)?;
+    if node.remove_if_dead()? {
+        return Ok(format!("removed {}", path.display()));
+    }
+    let mut removed = 0;
+    // A module that its launch is about to start again has no owner for a moment; its packages are waited for.
+    if node.launcher().is_none() {
+        for name in node.mailboxes()? {
+            removed += usize::from(node.remove_orphan(name)?);
+        }
+    }
+    Ok(format!("{} is in use; removed {removed} mailboxes without owner", path.display()))
 }

@@ -5,6 +5,7 @@ use crate::probe::COUNT;
 use crate::process::Running;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 fn wait_gone(pids: &[u32]) {
     wait(format!("{pids:?} end"), || (!pids.iter().any(|pid| runs(*pid))).then_some(()));
@@ -156,5 +157,49 @@ fn clean_leaves_modules_alone_that_outlived_their_launch() {
     signal(pid, Signal::SIGKILL);
     wait_gone(&[pid]);
     assert!(place.say(&["clean"]).ok().contains("removed "));
+    place.assert_empty();
+}
+
+#[test]
+fn clean_leaves_alone_what_is_no_node() {
+    let place = Place::new();
+    std::fs::create_dir(place.memory().join("notes")).unwrap();
+    std::fs::write(place.memory().join("notes/shopping"), "milk").unwrap();
+    std::fs::write(place.memory().join("list"), "bread").unwrap();
+    place.say(&["clean"]).ok();
+    assert!(place.memory().join("notes/shopping").exists() && place.memory().join("list").exists());
+}
+
+/// Says that a test is over, also when it fails.
+struct Ended<'a>(&'a AtomicBool);
+
+impl Drop for Ended<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn launches_and_cleaning_at_the_same_time_do_not_harm_each_other() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "", "")]);
+    let over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !over.load(Ordering::Relaxed) {
+                let said = place.say(&["clean"]);
+                assert_eq!(said.code, Some(0), "{said:?}");
+            }
+        });
+        let _over = Ended(&over);
+        for _ in 0..8 {
+            let mut launch = place.launch(&config);
+            wait("the probe answers", || {
+                launch.assert_runs();
+                place.say(&["call", "probe.0", "count", "1"]).code.filter(|code| *code == 0)
+            });
+            launch.stop();
+        }
+    });
     place.assert_empty();
 }

@@ -2,6 +2,7 @@
 
 use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, runs, wait};
 use crate::probe::WORK;
+use crate::process::Running;
 use nix::sys::signal::Signal;
 
 #[test]
@@ -55,6 +56,9 @@ fn a_module_that_will_not_stop_is_killed_and_named() {
     wait("probe.3 works", || (place.recorded("work begins") == 1).then_some(()));
     tool.close();
     launch.signal(Signal::SIGTERM);
+    // Who presses Ctrl-C again and again makes it neither faster nor worse.
+    launch.signal(Signal::SIGINT);
+    launch.signal(Signal::SIGINT);
     assert!(launch.end().success());
     for (module, killed) in [("probe.0", false), ("probe.1", true), ("probe.2", true)] {
         let told = format!("{module} did not stop within 300ms; killed");
@@ -74,6 +78,30 @@ fn a_second_launch_is_refused_and_the_first_unharmed() {
     assert_eq!(robot.pid("probe.0"), pid);
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
     launch.stop();
+    assert_eq!(place.recorded("start"), 1);
+    place.assert_empty();
+}
+
+#[test]
+fn of_many_launches_at_once_one_wins() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "", "")]);
+    let mut launches: Vec<Running> = (0..6).map(|_| place.launch(&config)).collect();
+    wait("all but one have ended", || {
+        let ended = launches.iter_mut().filter_map(Running::ended).count();
+        (ended == 5).then_some(())
+    });
+    let winner = launches.iter_mut().position(|launch| launch.ended().is_none()).unwrap();
+    let mut winner = launches.swap_remove(winner);
+    let robot = place.robot(&config, "main", &mut winner);
+    robot.wait_on(&mut winner);
+    for launch in &mut launches {
+        assert_eq!(launch.end().code(), Some(1));
+        assert!(launch.err().contains(&format!("launched already, by process {}", winner.pid())), "{}", launch.err());
+    }
+    assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
+    drop(robot);
+    winner.stop();
     assert_eq!(place.recorded("start"), 1);
     place.assert_empty();
 }

@@ -161,6 +161,36 @@ fn many_tools_work_at_the_same_time() {
 }
 
 #[test]
+fn a_tool_too_many_is_told_so() {
+    let place = Place::new();
+    let config = place.config_of("test", "[nodes.main]\ntools = [5, 6]\n", &[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    // Launch is one tool, and this the other.
+    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));
+    echo.wait_for("\n");
+    let told = place.say(&["call", "probe.0", "count", "1"]).fails();
+    assert!(told.contains("all 2 tool instances of node `main` are in use"), "{told}");
+    place.say(&["list"]).ok();
+    echo.signal(nix::sys::signal::Signal::SIGKILL);
+    echo.end();
+    // The place of one that was killed is free again.
+    assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
+    drop(robot);
+    launch.stop();
+    place.assert_empty();
+}
+
+#[test]
+fn without_a_collector_there_is_no_log() {
+    let place = Place::new();
+    let (_launch, _robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let told = place.say(&["log"]).fails();
+    assert!(told.contains("is its module launched?"), "{told}");
+}
+
+#[test]
 fn a_closed_pipe_ends_a_tool_quietly() {
     let place = Place::new();
     let _launch = node(&place);
