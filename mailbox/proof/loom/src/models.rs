@@ -457,6 +457,23 @@ pub(crate) fn a_retired_mailbox_counts_the_displaced() {
     assert!(mailbox.all_free());
 }
 
+/// The same, when the counters go on elsewhere: what is counted by the time the owner has settled is all that anyone will
+/// ever see of this mailbox, so the victim must be in hand or counted by then.
+pub(crate) fn a_replaced_mailbox_hides_no_loss() {
+    let mailbox = Mailbox::new(1);
+    mailbox.sender(1, Full::Displace).send(10, 10);
+    let sender = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.retire();
+    owner.queue.rescan(&slots);
+    let mut seen = owner.drain();
+    slots.settle(|priority| seen.push(priority.0));
+    seen.extend(mailbox.displaced());
+    sender.join().unwrap();
+    assert!(seen.contains(&10), "hidden");
+}
+
 // ---- deaths ----
 
 /// A sender dies at `step`; another sends and the receiver searches meanwhile. The dead one's package arrives if it was
