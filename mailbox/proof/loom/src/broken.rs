@@ -352,7 +352,11 @@ pub(crate) const BROKEN: &[Broken] = &[
     // What a sender displaced, and has not counted yet when the counters are carried over.
     Broken {
         name: "settles_nothing",
-        edits: &[edit("slots", "lost(priority);\n                step!(\"settle: counted\");", "step!(\"settle: counted\");")],
+        edits: &[edit(
+            "slots",
+            "lost(priority);\n                step!(\"settle: counted\");",
+            "step!(\"settle: counted\");",
+        )],
         caught_by: "a_replaced_mailbox_hides_no_loss",
         says: "hidden",
     },
