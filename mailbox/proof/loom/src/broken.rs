@@ -299,12 +299,8 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "bell_read_after_the_last_look",
         edits: &[
-            edit("models", "        let seen = self.mailbox.bell.load(Ordering::Acquire);\n", ""),
-            edit(
-                "models",
-                "self.mailbox.sleep(seen);",
-                "self.mailbox.sleep(self.mailbox.bell.load(Ordering::Acquire));",
-            ),
+            edit("rig", "        let seen = self.mailbox.bell.load(Ordering::Acquire);\n", ""),
+            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(self.mailbox.bell.load(Ordering::Acquire));"),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -313,8 +309,8 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "drowsy_after_the_last_look",
         edits: &[
-            edit("models", "        slots.drowsy();\n", ""),
-            edit("models", "self.mailbox.sleep(seen);", "slots.drowsy();\n            self.mailbox.sleep(seen);"),
+            edit("rig", "        slots.drowsy();\n", ""),
+            edit("rig", "self.mailbox.sleep(seen);", "slots.drowsy();\n            self.mailbox.sleep(seen);"),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -324,7 +320,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "the_waker_clears_sleeping",
         edits: &[edit(
-            "models",
+            "rig",
             "                    self.mailbox.ring();\n",
             "                    self.mailbox.ring();\n                    slots.awake();\n",
         )],
