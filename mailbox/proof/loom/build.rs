@@ -10,8 +10,9 @@ mod broken;
 use broken::{BROKEN, Edit, MIRRORED, MODELS};
 
 const MAILBOX: &str = "../../src";
-/// What a variant consists of; the last one is ours, the others are the mailbox's.
-const PARTS: [&str; 4] = ["word", "slots", "queue", "models"];
+/// What a variant consists of: the mailbox's, and ours.
+const PARTS: [&str; 5] = ["word", "slots", "queue", "rig", "models"];
+const OURS: [&str; 2] = ["rig", "models"];
 
 fn main() {
     println!("cargo:rerun-if-changed=src");
@@ -69,7 +70,7 @@ fn variant(out: &Path, name: &str, edits: &[Edit], tests: &str) -> String {
 }
 
 fn source(part: &str) -> String {
-    let path = if part == "models" { format!("src/{part}.rs") } else { format!("{MAILBOX}/{part}.rs") };
+    let path = if OURS.contains(&part) { format!("src/{part}.rs") } else { format!("{MAILBOX}/{part}.rs") };
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 

@@ -17,6 +17,7 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_retired_mailbox_keeps_nothing", 3),
     ("a_retired_mailbox_keeps_nothing_of_the_dead", 2),
     ("a_retired_mailbox_counts_the_displaced", 3),
+    ("a_replaced_mailbox_hides_no_loss", 3),
     ("a_sender_dies_with_a_claim", 2),
     ("a_sender_dies_with_a_ticket", 2),
     ("a_sender_dies_without_its_hint", 2),
@@ -298,12 +299,8 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "bell_read_after_the_last_look",
         edits: &[
-            edit("models", "        let seen = self.mailbox.bell.load(Ordering::Acquire);\n", ""),
-            edit(
-                "models",
-                "self.mailbox.sleep(seen);",
-                "self.mailbox.sleep(self.mailbox.bell.load(Ordering::Acquire));",
-            ),
+            edit("rig", "        let seen = self.mailbox.bell.load(Ordering::Acquire);\n", ""),
+            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(self.mailbox.bell.load(Ordering::Acquire));"),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -312,8 +309,8 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "drowsy_after_the_last_look",
         edits: &[
-            edit("models", "        slots.drowsy();\n", ""),
-            edit("models", "self.mailbox.sleep(seen);", "slots.drowsy();\n            self.mailbox.sleep(seen);"),
+            edit("rig", "        slots.drowsy();\n", ""),
+            edit("rig", "self.mailbox.sleep(seen);", "slots.drowsy();\n            self.mailbox.sleep(seen);"),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -323,7 +320,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "the_waker_clears_sleeping",
         edits: &[edit(
-            "models",
+            "rig",
             "                    self.mailbox.ring();\n",
             "                    self.mailbox.ring();\n                    slots.awake();\n",
         )],
@@ -342,11 +339,22 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "no_fence_g",
         edits: &[edit(
             "slots",
-            "Pairs with (E).\n        fence(Ordering::SeqCst);\n    }\n}",
-            "Pairs with (E).\n    }\n}",
+            "last look at the words. Pairs with (E).\n        fence(Ordering::SeqCst);\n",
+            "last look at the words. Pairs with (E).\n",
         )],
         caught_by: "a_retired_mailbox_keeps_nothing",
         says: WRONG,
+    },
+    // What a sender displaced, and has not counted yet when the counters are carried over.
+    Broken {
+        name: "settles_nothing",
+        edits: &[edit(
+            "slots",
+            "lost(priority);\n                step!(\"settle: counted\");",
+            "step!(\"settle: counted\");",
+        )],
+        caught_by: "a_replaced_mailbox_hides_no_loss",
+        says: "hidden",
     },
     // Retired between claim and publishing.
     Broken {
