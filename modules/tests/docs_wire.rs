@@ -40,8 +40,7 @@ const MOTOR: Name = Name::new(1, 200, 0, 0);
 #[test]
 fn a_command_has_the_documented_bytes() {
     let interface = MotorInterface::hash();
-    let call =
-        CallEnvelope { interface, incarnation: 1_234_567_890, sequence: 7, valid_for_us: 200_000, age_us: 0 };
+    let call = CallEnvelope { interface, incarnation: 1_234_567_890, sequence: 7, valid_for_us: 200_000, age_us: 0 };
     let head =
         Head { to: MOTOR, from: PILOT, kind: Type::command(16), id: 7, priority: Priority(140), ..Head::default() };
     check("command", head, &call.to_bytes(), &postcard::to_stdvec(&(0.3f64, 0.5f64)).unwrap());

@@ -89,6 +89,7 @@ pub fn choose_node<'a>(installation: &'a Installation, name: Option<&str>) -> Re
 
 impl Launch {
     /// Makes the node and starts its modules one after the other, each when the one before is ready; then switches them on.
+    /// The collector of output is switched on as soon as it is ready.
     /// `executable` is the `rohrpost` command, which holds the built-in modules.
     ///
     /// # Errors
@@ -142,6 +143,10 @@ impl Launch {
                     _ if stop => return Err(LaunchError::NotReady(child.text().into(), "told to stop".into())),
                     _ => {}
                 }
+            }
+            // At once: switched off, the collector would drop what the others say while they start.
+            if Some(self.children[index].name().class()) == self.installation.classes.id(crate::output::CLASS) {
+                self.switch_on(index);
             }
         }
         for index in 0..self.children.len() {
