@@ -73,7 +73,7 @@ impl Child {
             arguments,
             config: installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone()),
             program,
-            restart: module.restart.clone(),
+            restart: module.restart,
             start: module.start,
             ready_within: module.ready_within,
             stop_within: module.stop_within,
