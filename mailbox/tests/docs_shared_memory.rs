@@ -36,7 +36,7 @@ fn a_mailbox_is_as_documented() {
         sender.send(&label(HIGH, 0), &[b"taken"]).unwrap();
         let package = receiver.try_receive().unwrap();
         let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
-        assert!(there.0.starts_with(b"rohrpost") && there.0.len() % 4096 == 0);
+        assert!(there.0.starts_with(b"rohrpost") && there.0.len().is_multiple_of(4096));
         let identity = [8, 12, 16, 20, 24, 28].map(|at| there.u32(at));
         assert_eq!(identity, [1, MAILBOX.raw(), u32::from(slots), 100, 1, 3]);
         assert_eq!((there.u64(32), there.u32(64), there.u32(68)), (9_000_000_000, 0, std::process::id()));
