@@ -22,7 +22,7 @@ pub(super) struct Arguments {
     /// Function; without it, what the module offers is listed.
     function: Option<String>,
     /// Its arguments.
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    #[arg(allow_negative_numbers = true)]
     arguments: Vec<String>,
     #[command(flatten)]
     target: Target,
