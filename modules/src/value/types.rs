@@ -18,6 +18,8 @@ pub fn describe_result(ty: &OwnedNamedType) -> String {
         Ty::Enum(variants) if ty.name.starts_with("Result<") => {
             let inner = variants.iter().map(|variant| match &variant.ty {
                 VariantTy::NewtypeVariant(inner) => value(inner),
+                // So postcard-schema describes the two variants of a `Result`.
+                VariantTy::TupleVariant(inner) if inner.len() == 1 => value(&inner[0]),
                 _ => "ok".to_owned(),
             });
             inner.collect::<Vec<_>>().join(", or error ")
