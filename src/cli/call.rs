@@ -4,7 +4,7 @@ use super::target::Target;
 use super::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::description::{Description, Function};
-use rohrpost::value::{Value, decode, describe_type, encode, parse_argument};
+use rohrpost::value::{Value, decode, describe_result, describe_type, encode, parse_argument};
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -22,7 +22,7 @@ pub(super) struct Arguments {
     /// Function; without it, what the module offers is listed.
     function: Option<String>,
     /// Its arguments.
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    #[arg(allow_negative_numbers = true)]
     arguments: Vec<String>,
     #[command(flatten)]
     target: Target,
@@ -157,7 +157,7 @@ fn listing(description: &Description) -> String {
         text.push_str(&format!(
             "  {} -> {}\n      {}\n",
             usage(function),
-            describe_type(&function.result),
+            describe_result(&function.result),
             function.text
         ));
     }

@@ -1,5 +1,6 @@
 //! `rohrpost status`.
 
+use super::summary::is_left_out;
 use super::table::{table, time};
 use super::target::Target;
 use super::{Failure, say};
@@ -38,7 +39,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(name) => vec![running.module(name)?],
         None => {
             let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
-            survey.modules.iter().map(|module| module.name).collect()
+            let asked = survey.modules.iter().filter(|module| !is_left_out(module, &running.installation));
+            asked.map(|module| module.name).collect()
         }
     };
     let mut tool = running.join(super::call::seconds(arguments.timeout)?)?;

@@ -100,16 +100,16 @@ impl Launch {
         executable: PathBuf,
         events: Receiver<Event>,
     ) -> Result<Self, LaunchError> {
-        let mode = installation.node(node_name).map_or(0o700, |node| node.mode);
-        let node = Node::create(&node_directory(&installation.name, node_name), mode)?;
-        let lock = node.launch_lock()?;
-        let mut notes = leftovers::end(&node, &installation, node_name)?;
         let beside = executable.parent().map(PathBuf::from).unwrap_or_default();
         let missing = installation.missing_programs(node_name, &beside);
         let fatal: Vec<String> = missing.iter().filter(|p| !p.optional).map(ToString::to_string).collect();
         if !fatal.is_empty() {
             return Err(LaunchError::Programs(fatal.join("\n")));
         }
+        let mode = installation.node(node_name).map_or(0o700, |node| node.mode);
+        let node = Node::create(&node_directory(&installation.name, node_name), mode)?;
+        let lock = node.launch_lock()?;
+        let mut notes = leftovers::end(&node, &installation, node_name)?;
         notes.extend(missing.iter().map(|program| format!("left out: {program}")));
         let time = begin_time(&node, &installation)?;
         leftovers::note_config(&node, &installation, node_name)?;
@@ -261,13 +261,14 @@ fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeepe
     TimeKeeper::begin(node, source, realtime_ns(), pace)
 }
 
-/// A channel of events: SIGINT and SIGTERM say stop, SIGCHLD says that a child may have ended.
+/// A channel of events: SIGINT, SIGTERM and SIGHUP (a terminal was closed) say stop, SIGCHLD that a child may have ended.
 ///
 /// # Errors
 /// [`LaunchError::Signals`].
 pub fn events() -> Result<Receiver<Event>, LaunchError> {
-    use signal_hook::consts::{SIGCHLD, SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGCHLD]).map_err(LaunchError::Signals)?;
+    use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
+    let mut signals =
+        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP, SIGCHLD]).map_err(LaunchError::Signals)?;
     let (sender, receiver) = std::sync::mpsc::channel();
     let forward = move || {
         for signal in signals.forever() {

@@ -98,7 +98,9 @@ impl Start {
         let (mut config, mut module) = (variable(environment::CONFIG), variable(environment::MODULE));
         let launcher = variable(environment::LAUNCHER).and_then(|pid| pid.parse().ok());
         let restarts = variable(environment::RESTARTS).and_then(|count| count.parse().ok()).unwrap_or(0);
-        let mut off = launcher.is_some();
+        // Launch switches modules on when all are ready. Of one that it has started again others expect that it works, and
+        // what waits in its mailboxes comes before any word of launch's.
+        let mut off = launcher.is_some() && restarts == 0;
         let mut arguments = arguments;
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or_else(|| StartError::Usage(format!("`{argument}` needs a value")));
@@ -181,10 +183,11 @@ fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
     if nix::unistd::getppid().as_raw().unsigned_abs() == launcher { Ok(()) } else { Err(StartError::Orphan(launcher)) }
 }
 
-/// On SIGTERM and SIGINT: ask the loop to end; if it does not within the time, end the process.
+/// On SIGTERM, SIGINT and SIGHUP: ask the loop to end; if it does not within the time, end the process. SIGHUP is how the
+/// kernel wakes a stopped module whose launch has died.
 fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT])
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGHUP])
         .map_err(|error| StartError::System("signal handlers", error))?;
     let stop = Arc::new(AtomicBool::new(false));
     let (flag, participant) = (stop.clone(), participant.clone());

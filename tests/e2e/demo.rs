@@ -1,0 +1,104 @@
+//! The demo, as its user sees it.
+
+use crate::harness::{Place, Running, probe, runs, wait};
+use nix::sys::signal::Signal;
+
+const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
+
+/// The number before these words.
+fn number(text: &str, words: &str) -> u64 {
+    let before = text.split(words).next().filter(|before| before.len() < text.len());
+    let before = before.unwrap_or_else(|| panic!("no `{words}` in:\n{text}"));
+    before.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn the_simulated_robot_maps_and_says_what_came_of_it() {
+    let place = Place::new();
+    let said = place.say(&["demo", "--seconds", "4", "--no-gui", "--quiet"]).ok();
+    for class in ["pilot", "mapper", "output", "tool"] {
+        assert!(said.lines().any(|line| line.starts_with(class)), "no class {class}:\n{said}");
+    }
+    assert!(number(&said, " packages received, ") > 50, "{said}");
+    assert_eq!(number(&said, " lost\n"), 0, "{said}");
+    assert!(number(&said, " scans mapped (") > 5, "{said}");
+    assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+    place.assert_empty();
+}
+
+#[test]
+fn a_log_is_played_to_its_end_and_nothing_of_it_is_lost() {
+    let place = Place::new();
+    let said = place.say(&["demo", "--log", LOG, "--speed", "50", "--no-gui"]).ok();
+    // Counted here once more, by other means. Good lines end with the logger's own stamp, 20 s and more; the robot repeats
+    // its odometry with stamps next to zero, and two lines are broken.
+    let text = std::fs::read_to_string(LOG).unwrap();
+    let of = |word: &str| text.lines().filter(|line| line.starts_with(word)).count() as u64;
+    let discarded = text.lines().filter(|line| line.contains("e-62 ")).count() as u64;
+    let broken = number(&said, " broken\n");
+    let (scans, odometry) = (number(&said, " scans and "), number(&said, " odometry lines played"));
+    assert_eq!(number(&said, " discarded for their stamps"), discarded);
+    assert_eq!(scans + odometry, of("FLASER ") + of("ODOM ") - discarded - broken, "{said}");
+    assert_eq!((scans, odometry, discarded, broken), (20, 100, 20, 2), "{said}");
+    assert!(
+        said.contains(&format!("map: {scans} scans and {odometry} odometry received, {scans} scans mapped")),
+        "{said}"
+    );
+    assert_eq!(number(&said, " lost\n"), 0, "{said}");
+    place.assert_empty();
+}
+
+#[test]
+fn a_packed_log_plays_like_the_plain_one() {
+    let place = Place::new();
+    let said = place.say(&["demo", "--log", &format!("{LOG}.gz"), "--speed", "100", "--no-gui", "--quiet"]).ok();
+    assert!(said.contains("log: 20 scans and 100 odometry lines played, 20 discarded"), "{said}");
+}
+
+#[test]
+fn ctrl_c_ends_the_demo_with_its_summary() {
+    for log in [false, true] {
+        let place = Place::new();
+        let arguments: &[&str] =
+            if log { &["demo", "--no-gui", "--log", LOG, "--speed", "0.01"] } else { &["demo", "--no-gui"] };
+        let mut demo = Running::start(place.command(arguments));
+        wait("the demo can be seen", || place.say(&["status"]).code.filter(|code| *code == 0));
+        let list = place.say(&["list", "--json"]).json();
+        let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
+        assert!(pids.len() >= 3, "{list}");
+        let said = demo.stop();
+        assert!(said.contains(" packages received, ") && said.contains("map: "), "{said}");
+        assert_eq!(said.contains("log: "), log, "{said}");
+        assert!(!pids.iter().any(|pid| runs(*pid as u32)));
+        place.assert_empty();
+    }
+}
+
+#[test]
+fn mistakes_are_told_before_anything_runs() {
+    let place = Place::new();
+    for (arguments, words) in [
+        (&["demo", "--log", "nowhere.log"][..], "nowhere.log: "),
+        (&["demo", "--config", "nowhere.toml"], "nowhere.toml: no such file"),
+        (&["demo", "--log", LOG, "--speed", "0", "--no-gui"], "speed"),
+        (&["demo", "--log", LOG, "--speed=-3", "--no-gui"], "speed"),
+        (&["demo", "--seconds=-1", "--no-gui"], "-1 s is no time to wait"),
+    ] {
+        let told = place.say(arguments).fails();
+        assert!(told.contains(words), "{arguments:?}: no `{words}` in: {told}");
+        place.assert_empty();
+    }
+}
+
+#[test]
+fn the_configuration_of_the_present_folder_is_taken_if_there_is_one() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "", "")]);
+    std::fs::create_dir(place.path("config")).unwrap();
+    std::fs::rename(config, place.path("config/demo.toml")).unwrap();
+    let mut demo = Running::start(place.command(&["demo"]));
+    wait("the probe runs", || place.say(&["call", "probe.0", "count", "1"]).code.filter(|code| *code == 0));
+    demo.signal(Signal::SIGTERM);
+    assert!(demo.end().success());
+    place.assert_empty();
+}

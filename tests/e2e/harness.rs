@@ -1,0 +1,402 @@
+//! A place of its own for each test: shared memory, files, processes. All of it is gone when the place is dropped.
+
+use crate::probe::ProbingInterface;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use rohrpost::config::Installation;
+use rohrpost::macro_support::append;
+use rohrpost::mailbox::{Node, ParticipantInfo, node_directory};
+use rohrpost::serde::Serialize;
+use rohrpost::{Name, ToolLink};
+use std::fmt::Debug;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// The command under test.
+const ROHRPOST: &str = env!("CARGO_BIN_EXE_rohrpost");
+/// What takes longer does not come any more, however busy the computer is.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Head of all configurations: no scheduling in real time, so that tests run beside each other.
+const HEAD: &str = r#"
+[system]
+name = "robot"
+id = 1
+[classes]
+probe = { id = 96 }
+output = { id = 32, text = "Collects what modules say" }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+"#;
+
+/// Waits until there is something, and fails with what was waited for.
+pub(crate) fn wait<T>(what: impl Debug, mut look: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(start.elapsed() < PATIENCE, "waited {PATIENCE:?} in vain: {what:?}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A table's line in a configuration: a probe with these settings and other keys.
+pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
+    let program = super::probe::program();
+    format!(
+        "[[module]]\nname = \"{name}\"\nprogram = {program}\nsettings = {{ record = \"record\", {settings} }}\n{keys}\n"
+    )
+}
+
+pub(crate) const OUTPUT: &str = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\n";
+
+/// Whether a process of this number runs (one that only waits to be reaped does not).
+pub(crate) fn runs(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    // After the name, which may hold anything, comes the state.
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
+}
+
+pub(crate) fn signal(pid: u32, signal: Signal) {
+    kill(Pid::from_raw(pid as i32), signal).unwrap();
+}
+
+/// What a command said.
+#[derive(Debug)]
+pub(crate) struct Said {
+    pub(crate) out: String,
+    pub(crate) err: String,
+    pub(crate) code: Option<i32>,
+}
+
+impl Said {
+    /// It ended well.
+    #[track_caller]
+    pub(crate) fn ok(self) -> String {
+        assert_eq!(self.code, Some(0), "{self:#?}");
+        assert_eq!(self.err, "", "{self:#?}");
+        self.out
+    }
+
+    /// It failed, with words for its user.
+    #[track_caller]
+    pub(crate) fn fails(self) -> String {
+        assert_eq!(self.code, Some(1), "{self:#?}");
+        assert!(!self.err.contains("panicked") && !self.err.is_empty(), "{self:#?}");
+        self.err
+    }
+
+    #[track_caller]
+    pub(crate) fn json(self) -> serde_json::Value {
+        serde_json::from_str(&self.ok()).unwrap()
+    }
+}
+
+/// Where one test's processes live.
+pub(crate) struct Place {
+    /// Configurations and records.
+    folder: TempDir,
+    /// Shared memory.
+    memory: TempDir,
+}
+
+impl Place {
+    pub(crate) fn new() -> Self {
+        let shared = Path::new("/dev/shm");
+        let temp = std::env::temp_dir();
+        let builder = || {
+            let mut builder = tempfile::Builder::new();
+            builder.prefix("rohrpost-e2e-");
+            builder
+        };
+        let memory = builder().tempdir_in(shared).or_else(|_| builder().tempdir_in(&temp)).unwrap();
+        Self { folder: builder().tempdir().unwrap(), memory }
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Where nodes lie.
+    pub(crate) fn memory(&self) -> &Path {
+        self.memory.path()
+    }
+
+    /// Writes a configuration of one node, called `test`.
+    pub(crate) fn config(&self, modules: &[&str]) -> PathBuf {
+        self.config_of("test", "[nodes.main]", modules)
+    }
+
+    pub(crate) fn config_of(&self, installation: &str, nodes: &str, modules: &[&str]) -> PathBuf {
+        let file = self.path(&format!("{installation}.toml"));
+        let text = format!("installation = \"{installation}\"\n{HEAD}{nodes}\n{}", modules.concat());
+        std::fs::write(&file, text).unwrap();
+        file
+    }
+
+    /// Lines of the probes' record.
+    pub(crate) fn record(&self) -> Vec<String> {
+        let text = std::fs::read_to_string(self.path("record")).unwrap_or_default();
+        text.lines().map(str::to_owned).collect()
+    }
+
+    /// Lines of the record that say `what`, after the module's name.
+    pub(crate) fn recorded(&self, what: &str) -> usize {
+        self.record().iter().filter(|line| line.split_once(' ').is_some_and(|(_, rest)| rest == what)).count()
+    }
+
+    /// Numbers that probes counted, in order.
+    pub(crate) fn counted(&self) -> Vec<u32> {
+        self.record().iter().filter_map(|line| line.split_once("count ")?.1.parse().ok()).collect()
+    }
+
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(ROHRPOST);
+        command.args(arguments).env("ROHRPOST_DIR", self.memory()).current_dir(self.folder.path());
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    /// Runs a command to its end.
+    pub(crate) fn say(&self, arguments: &[&str]) -> Said {
+        let mut running = Running::start(self.command(arguments));
+        let status = running.end();
+        Said { out: running.out(), err: running.err(), code: status.code() }
+    }
+
+    /// Starts `rohrpost launch`.
+    pub(crate) fn launch(&self, config: &Path) -> Running {
+        Running::start(self.command(&["launch", config.to_str().unwrap()]))
+    }
+
+    /// Starts it and waits until all modules are on.
+    pub(crate) fn launched(&self, modules: &[&str]) -> (Running, Robot) {
+        let config = self.config(modules);
+        let mut launch = self.launch(&config);
+        let robot = self.robot(&config, "main", &mut launch);
+        robot.wait_on(&mut launch);
+        (launch, robot)
+    }
+
+    /// Waits until a node is there.
+    pub(crate) fn robot(&self, config: &Path, node_name: &str, launch: &mut Running) -> Robot {
+        let installation = Installation::load(config).unwrap();
+        let base = node_directory(&installation.name, node_name);
+        let path = self.memory().join(base.file_name().unwrap());
+        let node = wait(format!("no node at {}", path.display()), || {
+            launch.assert_runs();
+            Node::open(&path).ok().filter(|node| node.launcher() == Some(launch.pid()))
+        });
+        Robot { installation, node, node_name: node_name.into() }
+    }
+
+    /// Nothing of any node is left.
+    #[track_caller]
+    pub(crate) fn assert_empty(&self) {
+        let left: Vec<PathBuf> =
+            std::fs::read_dir(self.memory()).into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
+        assert!(left.is_empty(), "left over: {left:?}");
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        for entry in std::fs::read_dir(self.memory()).into_iter().flatten().flatten() {
+            let Ok(node) = Node::open(&entry.path()) else { continue };
+            for left in node.participants().iter().filter(|left| left.pid != std::process::id()) {
+                let _ = kill(Pid::from_raw(left.pid as i32), Signal::SIGKILL);
+            }
+        }
+    }
+}
+
+/// A node that runs, seen by a test that takes part as a tool.
+pub(crate) struct Robot {
+    pub(crate) installation: Installation,
+    pub(crate) node: Arc<Node>,
+    node_name: String,
+}
+
+impl Robot {
+    pub(crate) fn name(&self, module: &str) -> Name {
+        self.installation.classes.parse_name(module).unwrap().module()
+    }
+
+    pub(crate) fn tool(&self, timeout: Duration) -> ToolLink {
+        ToolLink::join(&self.installation, &self.node, &self.node_name, timeout).unwrap()
+    }
+
+    /// Sends a probe a command, once; waiting for its answer would repeat it.
+    pub(crate) fn begin(&self, tool: &mut ToolLink, module: &str, function: u16, arguments: &impl Serialize) -> u32 {
+        let write = |body: &mut Vec<u8>| append(body, arguments);
+        tool.link.begin(self.name(module), function, ProbingInterface::hash(), PATIENCE, write).unwrap()
+    }
+
+    /// The module's process.
+    pub(crate) fn process(&self, module: &str) -> Option<ParticipantInfo> {
+        let name = self.name(module);
+        self.node.participants().into_iter().find(|p| p.module == name && p.pid != 0)
+    }
+
+    pub(crate) fn state(&self, module: &str) -> &'static str {
+        self.process(module).and_then(|p| p.state).map_or("none", rohrpost::mailbox::ModuleState::name)
+    }
+
+    pub(crate) fn pid(&self, module: &str) -> u32 {
+        self.process(module).unwrap_or_else(|| panic!("{module} does not run")).pid
+    }
+
+    /// Processes of all modules.
+    pub(crate) fn pids(&self) -> Vec<u32> {
+        let modules = self.node.participants().into_iter().filter(|p| p.state.is_some());
+        modules.map(|p| p.pid).filter(|pid| *pid != std::process::id()).collect()
+    }
+
+    pub(crate) fn wait_on(&self, launch: &mut Running) {
+        let names: Vec<String> = self
+            .installation
+            .modules_on(&self.node_name)
+            .filter(|module| module.start == rohrpost::config::Start::On)
+            .map(|module| self.installation.classes.format(module.name))
+            .collect();
+        for name in names {
+            wait(format!("{name} is not on"), || {
+                launch.assert_runs();
+                (self.state(&name) == "on").then_some(())
+            });
+        }
+    }
+
+    /// Packages that wait in a module's command mailbox.
+    pub(crate) fn waiting(&self, module: &str) -> u32 {
+        self.node.look_at(self.name(module)).map_or(0, |mailbox| mailbox.depth)
+    }
+
+    /// Waits until the module runs in another process than this one, and works.
+    pub(crate) fn wait_restarted(&self, module: &str, old_pid: u32) -> ParticipantInfo {
+        wait(format!("{module} is not on again"), || {
+            self.process(module).filter(|p| p.pid != old_pid && p.state == Some(rohrpost::mailbox::ModuleState::On))
+        })
+    }
+}
+
+/// A process, and what it prints.
+pub(crate) struct Running {
+    child: Child,
+    out: Printed,
+    err: Printed,
+}
+
+/// What came through a pipe so far, and the thread that reads it.
+struct Printed {
+    text: Arc<Mutex<String>>,
+    reader: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Printed {
+    fn read(pipe: Option<impl Read + Send + 'static>) -> Self {
+        let text = Arc::new(Mutex::new(String::new()));
+        let kept = text.clone();
+        let reader = pipe.map(|pipe| {
+            std::thread::spawn(move || {
+                let mut pipe = BufReader::new(pipe);
+                let mut line = Vec::new();
+                while let Ok(1..) = pipe.read_until(b'\n', &mut line) {
+                    kept.lock().unwrap().push_str(&String::from_utf8_lossy(&line));
+                    line.clear();
+                }
+            })
+        });
+        Self { text, reader }
+    }
+}
+
+impl Running {
+    pub(crate) fn start(mut command: Command) -> Self {
+        let mut child = command.spawn().unwrap();
+        let (out, err) = (Printed::read(child.stdout.take()), Printed::read(child.stderr.take()));
+        Self { child, out, err }
+    }
+
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    pub(crate) fn out(&self) -> String {
+        self.out.text.lock().unwrap().clone()
+    }
+
+    pub(crate) fn err(&self) -> String {
+        self.err.text.lock().unwrap().clone()
+    }
+
+    pub(crate) fn ended(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().unwrap()
+    }
+
+    #[track_caller]
+    pub(crate) fn assert_runs(&mut self) {
+        if let Some(status) = self.ended() {
+            panic!("it ended with {status}\n{}\n{}", self.out(), self.err());
+        }
+    }
+
+    /// Waits until it has printed this.
+    #[track_caller]
+    pub(crate) fn wait_for(&mut self, text: &str) {
+        let start = Instant::now();
+        while !self.out().contains(text) {
+            assert!(start.elapsed() < PATIENCE, "never printed `{text}`:\n{}\n{}", self.out(), self.err());
+            assert!(self.ended().is_none() || self.out().contains(text), "{}\n{}", self.out(), self.err());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    pub(crate) fn signal(&self, number: Signal) {
+        signal(self.pid(), number);
+    }
+
+    /// Waits for its end, and for all it has printed.
+    #[track_caller]
+    pub(crate) fn end(&mut self) -> ExitStatus {
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = self.ended() {
+                break status;
+            }
+            assert!(start.elapsed() < PATIENCE, "does not end:\n{}\n{}", self.out(), self.err());
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        for printed in [&mut self.out, &mut self.err] {
+            // A process that outlives it may hold the pipe; what it prints is not waited for.
+            let deadline = Instant::now() + Duration::from_secs(5);
+            while printed.reader.as_ref().is_some_and(|reader| !reader.is_finished()) && Instant::now() < deadline {
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            printed.reader = None;
+        }
+        status
+    }
+
+    /// Stops it as Ctrl-C would, and what it has printed.
+    #[track_caller]
+    pub(crate) fn stop(&mut self) -> String {
+        self.signal(Signal::SIGINT);
+        let status = self.end();
+        assert!(status.success(), "{status}\n{}\n{}", self.out(), self.err());
+        self.out()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,118 @@
+//! Launch: starts in order, watches, stops in reverse, leaves nothing.
+
+use crate::harness::{OUTPUT, PATIENCE, Place, probe, runs, signal, wait};
+use crate::probe::WORK;
+use nix::sys::signal::Signal;
+
+#[test]
+fn modules_start_in_order_stop_in_reverse_and_leave_nothing() {
+    for number in [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP] {
+        let place = Place::new();
+        let (mut launch, robot) =
+            place.launched(&[OUTPUT, &probe("probe.2", "", ""), &probe("probe.0", "", ""), &probe("probe.1", "", "")]);
+        let pids = robot.pids();
+        assert_eq!(pids.len(), 4);
+        launch.signal(number);
+        assert!(launch.end().success(), "{number}: {}{}", launch.out(), launch.err());
+        let expected = "probe.2 start,probe.0 start,probe.1 start,probe.2 on,probe.0 on,probe.1 on,probe.1 off,\
+                        probe.0 off,probe.2 off";
+        assert_eq!(place.record().join(","), expected, "{number}");
+        assert!(!pids.iter().any(|pid| runs(*pid)), "{number}: a module outlived its launch");
+        place.assert_empty();
+        assert_eq!((launch.out().as_str(), launch.err().as_str()), ("", ""), "{number}: nothing to tell");
+    }
+}
+
+#[test]
+fn a_module_that_is_to_wait_stays_off_until_it_is_switched_on() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "start = \"off\""), &probe("probe.1", "", "")]);
+    // The second is on, so the first was passed over.
+    assert_eq!(robot.state("probe.0"), "off");
+    assert!(place.say(&["call", "probe.0", "count", "1"]).fails().contains("switch it on"));
+    place.say(&["call", "probe.0", "on"]).ok();
+    assert_eq!(place.say(&["call", "probe.0", "count", "2"]).ok(), "1\n");
+    place.say(&["call", "probe.0", "off"]).ok();
+    assert_eq!(robot.state("probe.0"), "off");
+    launch.stop();
+    assert_eq!(place.counted(), [2]);
+}
+
+#[test]
+fn a_module_that_will_not_stop_is_killed_and_named() {
+    let place = Place::new();
+    let stop_within = "stop-within = \"300 ms\"";
+    let (mut launch, robot) = place.launched(&[
+        &probe("probe.0", "", ""),
+        &probe("probe.1", "ignore-stop = true", stop_within),
+        &probe("probe.2", "", stop_within),
+        &probe("probe.3", "", stop_within),
+    ]);
+    let pids = robot.pids();
+    signal(robot.pid("probe.2"), Signal::SIGSTOP);
+    let mut tool = robot.tool(PATIENCE);
+    robot.begin(&mut tool, "probe.3", WORK, &(60_000u64,));
+    wait("probe.3 works", || (place.recorded("work begins") == 1).then_some(()));
+    tool.close();
+    launch.signal(Signal::SIGTERM);
+    assert!(launch.end().success());
+    for (module, killed) in [("probe.0", false), ("probe.1", true), ("probe.2", true)] {
+        let told = format!("{module} did not stop within 300ms; killed");
+        assert_eq!(launch.out().contains(&told), killed, "{module}: {}", launch.out());
+    }
+    assert!(!pids.iter().any(|pid| runs(*pid)));
+    place.assert_empty();
+}
+
+#[test]
+fn a_second_launch_is_refused_and_the_first_unharmed() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (pid, config) = (robot.pid("probe.0"), place.path("test.toml"));
+    let refused = place.say(&["launch", config.to_str().unwrap()]).fails();
+    assert!(refused.contains(&format!("launched already, by process {}", launch.pid())), "{refused}");
+    assert_eq!(robot.pid("probe.0"), pid);
+    assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
+    launch.stop();
+    assert_eq!(place.recorded("start"), 1);
+    place.assert_empty();
+}
+
+#[test]
+fn what_runs_is_listed_with_state_priority_and_process() {
+    let place = Place::new();
+    let (_launch, robot) =
+        place.launched(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.7", "", "start = \"off\"")]);
+    let list = place.say(&["list", "--json"]).json();
+    assert_eq!((list["installation"].as_str(), list["node"].as_str()), (Some("test"), Some("main")));
+    let modules = list["modules"].as_array().unwrap();
+    for (line, (module, state, priority)) in
+        modules.iter().zip([("output.0", "on", 32), ("probe.0", "on", 96), ("probe.7", "off", 96)])
+    {
+        assert_eq!(line["module"], module);
+        assert_eq!(line["state"], state, "{line}");
+        assert_eq!(line["priority"], priority, "{line}");
+        assert_eq!(line["pid"], robot.pid(module), "{line}");
+        assert_eq!(line["restarts"], 0, "{line}");
+        assert!(line["scheduling"].as_str().unwrap().starts_with("nice "), "{line}");
+    }
+    assert_eq!(modules.len(), 3);
+    let text = place.say(&["list", "--mailboxes"]).ok();
+    assert!(text.starts_with("node main of test\n"), "{text}");
+    for words in ["probe.7", "1.probe.0.0", "commands", "32 x 1024 B", "displace"] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+}
+
+#[test]
+fn a_tool_that_still_runs_is_named_when_launch_ends() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let tool = robot.tool(PATIENCE);
+    let out = launch.stop();
+    assert!(out.contains("somebody still uses") && out.contains("rohrpost clean"), "{out}");
+    tool.close();
+    drop(robot);
+    assert!(place.say(&["clean"]).ok().contains("removed "));
+    place.assert_empty();
+}

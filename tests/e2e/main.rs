@@ -1,0 +1,19 @@
+//! End to end: real processes in shared memory of their own, watched as a user watches them.
+//!
+//! `harness` starts and ends them, `probe` is the module that misbehaves as a test asks it to; each other file is a theme.
+//! Nothing here sleeps for luck: tests wait for what they need to see, with deadlines that a busy computer keeps.
+
+mod crash;
+mod demo;
+mod harness;
+mod launch;
+mod mailboxes;
+mod nodes;
+mod once;
+mod once_wrap;
+mod probe;
+mod restart;
+mod screen;
+mod start;
+mod tools;
+mod tools_data;

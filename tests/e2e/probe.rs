@@ -1,0 +1,241 @@
+//! A module as a user writes one, with settings and functions that make it misbehave.
+//!
+//! It is this test program itself, started by launch with the one test [`module`] to run: so it is built whenever the tests
+//! are, and no program for tests alone is ever installed.
+
+use nix::sys::signal::{SigHandler, Signal, raise, signal};
+use rohrpost::serde::Deserialize;
+use rohrpost::{Context, Module, ModuleError};
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What the configuration says as its program.
+pub(crate) fn program() -> String {
+    let me = std::env::current_exe().unwrap();
+    format!("[{me:?}, \"--exact\", \"probe::module\", \"--nocapture\"]")
+}
+
+/// Not a test: what launch starts. Run as a test it ends at once.
+#[test]
+fn module() {
+    if std::env::var_os("ROHRPOST_MODULE").is_some() {
+        let code = rohrpost::run::<Probe>();
+        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
+    }
+}
+
+/// Numbers of its functions, for commands without a proxy.
+pub(crate) const COUNT: u16 = 16;
+pub(crate) const COUNT_AGAIN: u16 = 17;
+pub(crate) const ABORT: u16 = 19;
+pub(crate) const WORK: u16 = 23;
+
+/// Why a probe refuses.
+#[rohrpost::data]
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum ProbeError {
+    /// It was asked to.
+    Refused {
+        /// In these words.
+        why: String,
+    },
+}
+
+/// Does what tests ask of it.
+#[rohrpost::interface(class = "probe")]
+pub(crate) trait Probing {
+    /// Writes the number into the record and tells how many it has written in this life.
+    #[command(16)]
+    fn count(&mut self, number: u32) -> u64;
+
+    /// The same, and may be run twice.
+    #[command(17, idempotent)]
+    fn count_again(&mut self, number: u32) -> u64;
+
+    /// Refuses, with an error of its own.
+    #[command(18)]
+    fn refuse(&mut self, why: String) -> Result<u32, ProbeError>;
+
+    /// Aborts the process while the command is in hand.
+    #[command(19, idempotent)]
+    fn abort(&mut self);
+
+    /// The same, but must not be run twice.
+    #[command(20)]
+    fn abort_once(&mut self);
+
+    /// Says a line.
+    #[command(21)]
+    fn say(&mut self, level: String, text: String);
+
+    /// Ends the process with this code, a moment after the answer.
+    #[command(22)]
+    fn leave(&mut self, code: i32);
+
+    /// Works for so long, ms; the record has its beginning and its end.
+    #[command(23)]
+    fn work(&mut self, ms: u64);
+
+    /// Takes what a tool can type.
+    #[command(24, idempotent)]
+    fn tell(&mut self, number: i64, ratio: f64, word: String, flag: bool, list: Vec<u16>) -> String;
+
+    /// Counts its periods.
+    #[data(1)]
+    fn beat() -> u64;
+
+    /// Never published.
+    #[data(2)]
+    fn silence() -> u64;
+}
+
+#[derive(Deserialize, Default)]
+#[serde(crate = "rohrpost::serde", deny_unknown_fields, rename_all = "kebab-case", default)]
+pub(crate) struct Settings {
+    /// File that it writes a line to for each thing that happens.
+    record: Option<String>,
+    /// Takes so long to start, ms.
+    slow_ms: u64,
+    /// Publishes `beat` so often.
+    rate_hz: f64,
+    panic_at_start: bool,
+    /// Ends before it is ready.
+    exit_at_start: Option<i32>,
+    refuse_at_start: bool,
+    refuse_on: bool,
+    /// Stops itself as Ctrl-Z would, before it is ready.
+    hang_at_start: bool,
+    /// Does nothing on any signal that asks it to end.
+    ignore_stop: bool,
+}
+
+pub(crate) struct Probe {
+    settings: Settings,
+    record: Option<PathBuf>,
+    me: String,
+    counted: u64,
+    beats: u64,
+    leave: Option<i32>,
+}
+
+impl Probe {
+    fn note(&self, what: &str) {
+        if let Some(record) = &self.record {
+            write_line(record, &format!("{} {what}", self.me));
+        }
+    }
+}
+
+/// One line in one write, so that lines of several processes never mix.
+fn write_line(record: &Path, line: &str) {
+    let mut file = OpenOptions::new().create(true).append(true).open(record).unwrap();
+    file.write_all(format!("{line}\n").as_bytes()).unwrap();
+}
+
+impl Module for Probe {
+    type Settings = Settings;
+    type Interfaces = ProbingInterface;
+
+    fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+        let me = context.installation().classes.format(context.me());
+        let record = settings.record.as_ref().map(|file| context.path(file));
+        let rate_hz = if settings.rate_hz > 0.0 { settings.rate_hz } else { 100.0 };
+        context.set_period(Duration::from_secs_f64(1.0 / rate_hz));
+        let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None };
+        probe.note("start");
+        if probe.settings.panic_at_start {
+            panic!("a probe was asked to panic");
+        }
+        if let Some(code) = probe.settings.exit_at_start {
+            println!("a probe was asked to end with {code}");
+            std::process::exit(code);
+        }
+        if probe.settings.refuse_at_start {
+            return Err(ModuleError::new("a probe was asked not to start"));
+        }
+        if probe.settings.hang_at_start {
+            raise(Signal::SIGSTOP)?;
+        }
+        std::thread::sleep(Duration::from_millis(probe.settings.slow_ms));
+        Ok(probe)
+    }
+
+    fn on(&mut self, _: &mut Context) -> Result<(), ModuleError> {
+        if self.settings.refuse_on {
+            return Err(ModuleError::new("a probe was asked not to work"));
+        }
+        if self.settings.ignore_stop {
+            for number in [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP] {
+                // SAFETY: ignoring runs no code of ours in a handler.
+                unsafe { signal(number, SigHandler::SigIgn) }?;
+            }
+        }
+        self.note("on");
+        Ok(())
+    }
+
+    fn off(&mut self, _: &mut Context) {
+        self.note("off");
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        if let Some(code) = self.leave {
+            std::process::exit(code);
+        }
+        self.beats += 1;
+        if self.settings.rate_hz > 0.0 {
+            context.publish_now(ProbingInterface::BEAT, &self.beats)?;
+        }
+        Ok(())
+    }
+}
+
+impl Probing for Probe {
+    fn count(&mut self, number: u32) -> u64 {
+        self.note(&format!("count {number}"));
+        self.counted += 1;
+        self.counted
+    }
+
+    fn count_again(&mut self, number: u32) -> u64 {
+        self.count(number)
+    }
+
+    fn refuse(&mut self, why: String) -> Result<u32, ProbeError> {
+        Err(ProbeError::Refused { why })
+    }
+
+    fn abort(&mut self) {
+        self.note("abort");
+        std::process::abort();
+    }
+
+    fn abort_once(&mut self) {
+        self.abort();
+    }
+
+    fn say(&mut self, level: String, text: String) {
+        match level.as_str() {
+            "error" => rohrpost::tracing::error!("{text}"),
+            "warn" => rohrpost::tracing::warn!("{text}"),
+            "debug" => rohrpost::tracing::debug!("{text}"),
+            _ => rohrpost::tracing::info!("{text}"),
+        }
+    }
+
+    fn leave(&mut self, code: i32) {
+        self.leave = Some(code);
+    }
+
+    fn work(&mut self, ms: u64) {
+        self.note("work begins");
+        std::thread::sleep(Duration::from_millis(ms));
+        self.note("work ends");
+    }
+
+    fn tell(&mut self, number: i64, ratio: f64, word: String, flag: bool, list: Vec<u16>) -> String {
+        format!("{number} {ratio} {word} {flag} {list:?}")
+    }
+}

@@ -1,0 +1,120 @@
+//! Modules that end, and what launch does then.
+
+use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use nix::sys::signal::Signal;
+use std::time::{Duration, Instant};
+
+#[test]
+fn policies_say_after_which_end_a_module_starts_again() {
+    for (policy, code, again) in [
+        ("never", 0, false),
+        ("never", 3, false),
+        ("on-failure", 0, false),
+        ("on-failure", 3, true),
+        ("always", 0, true),
+        ("always", 3, true),
+    ] {
+        let place = Place::new();
+        let restart = format!("restart = {{ policy = \"{policy}\", backoff = \"50 ms\" }}");
+        let (mut launch, robot) = place.launched(&[&probe("probe.0", "", &restart)]);
+        let pid = robot.pid("probe.0");
+        place.say(&["call", "probe.0", "leave", &code.to_string()]).ok();
+        launch.wait_for(&format!("probe.0 ended with {code}"));
+        if again {
+            assert_eq!(robot.wait_restarted("probe.0", pid).restarts, 1, "{policy}, {code}");
+        } else {
+            assert!(robot.process("probe.0").is_none(), "{policy}, {code}");
+        }
+        launch.signal(Signal::SIGTERM);
+        let (status, given_up) = (launch.end(), !again && code != 0);
+        assert_eq!(status.code(), Some(i32::from(given_up)), "{policy}, {code}: {}", launch.err());
+        assert_eq!(launch.err().contains("probe.0 failed for good: ended with 3"), given_up, "{}", launch.err());
+        assert_eq!(place.recorded("start"), if again { 2 } else { 1 }, "{policy}, {code}");
+        place.assert_empty();
+    }
+}
+
+#[test]
+fn a_killed_module_works_again_and_its_restarts_are_counted() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let mut pid = robot.pid("probe.0");
+    for count in 1..=2 {
+        signal(pid, Signal::SIGKILL);
+        let process = robot.wait_restarted("probe.0", pid);
+        assert_eq!(process.restarts, count);
+        pid = process.pid;
+        assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n", "a new life counts anew");
+    }
+    let list = place.say(&["list", "--json"]).json();
+    assert_eq!(list["modules"][1]["restarts"], 2);
+    assert_eq!(list["modules"][0]["restarts"], 0, "the other module did not notice");
+    let out = launch.stop();
+    assert_eq!(out.matches("probe.0 was killed by signal 9; starts again in").count(), 2, "{out}");
+}
+
+#[test]
+fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
+    let place = Place::new();
+    let restart = "restart = { policy = \"always\", backoff = \"100 ms\", at-most = 3, within = \"60 s\" }";
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", restart), &probe("probe.1", "", "")]);
+    let mut pid = robot.pid("probe.0");
+    for pause in ["100ms", "200ms", "400ms"] {
+        let killed = Instant::now();
+        signal(pid, Signal::SIGKILL);
+        launch.wait_for(&format!("starts again in {pause}"));
+        pid = robot.wait_restarted("probe.0", pid).pid;
+        let least = Duration::from_millis(pause.trim_end_matches("ms").parse().unwrap());
+        assert!(killed.elapsed() >= least, "it came back after {:?}, before {pause}", killed.elapsed());
+    }
+    signal(pid, Signal::SIGKILL);
+    launch.wait_for("probe.0 was killed by signal 9; given up after 3 restarts within 60s");
+    assert_eq!(robot.state("probe.1"), "on", "the others go on");
+    let status = place.say(&["status"]);
+    assert_eq!(status.code, Some(1), "one does not answer: {}", status.out);
+    launch.signal(Signal::SIGINT);
+    assert_eq!(launch.end().code(), Some(1));
+    assert!(launch.err().contains("probe.0 failed for good: was killed by signal 9; given up"), "{}", launch.err());
+    assert_eq!(place.recorded("start"), 5);
+    place.assert_empty();
+}
+
+#[test]
+fn what_a_module_printed_is_told_when_it_ends() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let pid = robot.pid("probe.0");
+    let _ = place.say(&["call", "probe.0", "abort", "--timeout", "0.2"]);
+    launch.wait_for("probe.0 was killed by signal 6");
+    robot.wait_restarted("probe.0", pid);
+    launch.stop();
+}
+
+#[test]
+fn a_stopped_module_does_not_keep_its_launch_from_watching_others() {
+    let place = Place::new();
+    let (mut launch, robot) =
+        place.launched(&[&probe("probe.0", "", "stop-within = \"200 ms\""), &probe("probe.1", "", "")]);
+    signal(robot.pid("probe.0"), Signal::SIGSTOP);
+    let pid = robot.pid("probe.1");
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("probe.1", pid);
+    let status = place.say(&["status", "--timeout", "0.3"]);
+    assert_eq!(status.code, Some(1));
+    let silent = status.out.lines().find(|line| line.starts_with("probe.0")).unwrap();
+    assert!(silent.contains("silent") && silent.contains("no answer from"), "{silent}");
+    launch.stop();
+}
+
+#[test]
+fn launch_stops_while_a_module_waits_to_be_started_again() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"10 min\" }")]);
+    signal(robot.pid("probe.0"), Signal::SIGKILL);
+    launch.wait_for("starts again in 600s");
+    wait("probe.0 is gone", || robot.process("probe.0").is_none().then_some(()));
+    drop(robot);
+    launch.stop();
+    assert_eq!(place.recorded("start"), 1);
+    place.assert_empty();
+}

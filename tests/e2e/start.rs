@@ -1,0 +1,136 @@
+//! What keeps a node from starting, and what is said about it.
+
+use crate::harness::{OUTPUT, Place, probe, wait};
+use nix::sys::signal::Signal;
+
+#[test]
+fn a_module_that_does_not_start_is_named_and_nothing_is_left() {
+    let restart = "restart = { policy = \"on-failure\", at-most = 1, backoff = \"10 ms\" }";
+    for (settings, keys, words) in [
+        ("panic-at-start = true", restart, ["ended with 101", "a probe was asked to panic"]),
+        ("exit-at-start = 3", restart, ["ended with 3", "a probe was asked to end with 3"]),
+        ("refuse-at-start = true", restart, ["ended with 1", "probe.1: a probe was asked not to start"]),
+        ("hang-at-start = true", "ready-within = \"200 ms\"\nrestart = \"never\"", ["killed by signal 9", "probe.1"]),
+        ("speed = 3", restart, ["test.toml:", "speed"]),
+    ] {
+        let place = Place::new();
+        let config = place.config(&[&probe("probe.0", "", ""), &probe("probe.1", settings, keys)]);
+        let said = place.say(&["launch", config.to_str().unwrap()]);
+        assert_eq!(said.code, Some(1), "{settings}: {said:?}");
+        let told = said.err;
+        assert!(told.contains("module probe.1 did not become ready"), "{told}");
+        for words in words {
+            assert!(told.contains(words), "{settings}: no `{words}` in: {told}");
+        }
+        place.assert_empty();
+    }
+}
+
+#[test]
+fn a_slow_module_is_waited_for() {
+    let place = Place::new();
+    let (mut launch, _robot) = place.launched(&[&probe("probe.0", "slow-ms = 1500", ""), &probe("probe.1", "", "")]);
+    assert!(place.record().starts_with(&["probe.0 start".into(), "probe.1 start".into(), "probe.0 on".into()]));
+    launch.stop();
+}
+
+#[test]
+fn launch_can_be_stopped_while_modules_start() {
+    let place = Place::new();
+    let slow = probe("probe.1", "slow-ms = 600000", "ready-within = \"20 min\"\nstop-within = \"200 ms\"");
+    let config = place.config(&[&probe("probe.0", "", ""), &slow]);
+    let mut launch = place.launch(&config);
+    wait("probe.1 starts", || (place.recorded("start") == 2).then_some(()));
+    launch.signal(Signal::SIGINT);
+    assert_eq!(launch.end().code(), Some(1));
+    assert!(launch.err().contains("probe.1 did not become ready: told to stop"), "{}", launch.err());
+    place.assert_empty();
+}
+
+#[test]
+fn a_module_that_does_not_switch_on_is_in_error_and_the_others_work() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "refuse-on = true", ""), &probe("probe.1", "", "")]);
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    wait("probe.1 is on", || (robot.state("probe.1") == "on").then_some(()));
+    launch.wait_for("probe.0 could not be switched on: ");
+    assert!(launch.out().contains("a probe was asked not to work"), "{}", launch.out());
+    let status = place.say(&["status"]);
+    assert_eq!(status.code, Some(1), "somebody is in error");
+    assert!(status.out.contains("error") && status.out.contains("a probe was asked not to work"), "{}", status.out);
+    let refused = place.say(&["call", "probe.0", "count", "1"]).fails();
+    assert!(refused.contains("a probe was asked not to work"), "{refused}");
+    place.say(&["status", "probe.1"]).ok();
+    launch.stop();
+}
+
+#[test]
+fn a_missing_program_is_told_before_anything_starts() {
+    let place = Place::new();
+    let missing = "[[module]]\nname = \"probe.1\"\nprogram = \"rohrpost-nowhere\"\n";
+    let path = "[[module]]\nname = \"probe.2\"\nprogram = \"./nowhere\"\n";
+    let config = place.config(&[&probe("probe.0", "", ""), missing, path]);
+    let told = place.say(&["launch", config.to_str().unwrap()]).fails();
+    for (module, program) in
+        [("probe.1", "`rohrpost-nowhere` is neither in"), ("probe.2", "`./nowhere` is no program at")]
+    {
+        let line = 1 + std::fs::read_to_string(&config).unwrap().split(module).next().unwrap().matches('\n').count();
+        // A module's line is that of its `[[module]]`.
+        let words = format!("test.toml:{}: module `{module}`: {program}", line - 1);
+        assert!(told.contains(&words), "no `{words}` in: {told}");
+    }
+    assert_eq!(place.record().len(), 0, "a module was started");
+    place.assert_empty();
+}
+
+#[test]
+fn an_optional_module_is_left_out_with_a_notice() {
+    let place = Place::new();
+    let missing = "[[module]]\nname = \"probe.1\"\nprogram = \"rohrpost-nowhere\"\noptional = true\n";
+    let config = place.config(&[&probe("probe.0", "", ""), missing, OUTPUT]);
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    wait("output.0 is on", || (robot.state("output.0") == "on").then_some(()));
+    launch.wait_for("left out: ");
+    let out = launch.stop();
+    assert!(out.contains("module `probe.1`: `rohrpost-nowhere` is neither in"), "{out}");
+    place.assert_empty();
+}
+
+#[test]
+fn a_broken_configuration_starts_nothing() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "", "calls = [\"probe.9\"]")]);
+    let file = config.to_str().unwrap();
+    for arguments in [&["launch", file][..], &["check", file], &["list", "--config", file]] {
+        let told = place.say(arguments).fails();
+        assert!(told.contains("test.toml:1") && told.contains("probe.9"), "{arguments:?}: {told}");
+    }
+    let told = place.say(&["launch", "nowhere.toml"]).fails();
+    assert!(told.contains("nowhere.toml"), "{told}");
+    place.assert_empty();
+}
+
+#[test]
+fn check_explains_good_files_and_places_the_mistakes_of_bad_ones() {
+    let place = Place::new();
+    for file in ["demo.toml", "demo-log.toml"] {
+        let path = format!("{}/config/{file}", env!("CARGO_MANIFEST_DIR"));
+        let said = place.say(&["check", &path]).ok();
+        assert!(said.contains("mapper.0") && said.contains("laser.0"), "{said}");
+    }
+    let config = place.config(&[OUTPUT, "[[module]]\nname = \"probe.1\"\nprogram = \"nowhere\"\n"]);
+    let said = place.say(&["check", config.to_str().unwrap()]).ok();
+    assert!(said.contains("note: ") && said.contains("`nowhere`"), "another computer may have it: {said}");
+    let wrong = place.say(&["check", config.to_str().unwrap(), "--node", "other"]).fails();
+    assert!(wrong.contains("main"), "{wrong}");
+    let text = "installation = \"broken\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nlaser = { id = 500 }\n\
+                tool = { id = 16 }\n[nodes.main]\n[[module]]\nname = \"laser.0\"\nbuiltin = \"smi\"\n";
+    let broken = place.path("broken.toml");
+    std::fs::write(&broken, text).unwrap();
+    let told = place.say(&["check", broken.to_str().unwrap()]).fails();
+    for words in ["broken.toml:6: ", "broken.toml:11: ", "did you mean `sim`?"] {
+        assert!(told.contains(words), "no `{words}` in: {told}");
+    }
+}

@@ -1,0 +1,182 @@
+//! What a user types at a node that runs, and what is said to mistakes.
+
+use crate::harness::{OUTPUT, Place, Running, probe, wait};
+use std::process::{Command, Stdio};
+
+/// A node with a collector and a probe.
+fn node(place: &Place) -> Running {
+    place.launched(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]).0
+}
+
+#[test]
+fn a_module_of_ones_own_is_known_by_its_description() {
+    let place = Place::new();
+    let _launch = node(&place);
+    let text = place.say(&["call", "probe.0"]).ok();
+    for words in [
+        "class probe: Does what tests ask of it.",
+        "count <number: u32> -> u64",
+        "Writes the number into the record",
+        "refuse <why: text> -> {Ok: u32}|{Err: {Refused: {why: text}}}",
+        "beat: u64",
+        "every module: on, off, status, get DATA, output-level LEVEL",
+    ] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+    let json = place.say(&["call", "probe.0", "--json"]).json();
+    assert_eq!(json["class"], "probe");
+    assert_eq!(json["functions"][0]["name"], "count");
+}
+
+#[test]
+fn calls_take_arguments_as_people_type_them() {
+    let place = Place::new();
+    let _launch = node(&place);
+    for (arguments, answer) in [
+        (&["count", "7"][..], "1"),
+        (&["tell", "-3", "-0.5", "a word", "true", "[1, 2]"], "\"-3 -0.5 a word true [1, 2]\""),
+        (&["tell", "3", "1e3", "\"{}\"", "false", "[]"], "\"3 1000 {} false []\""),
+        (&["tell", "3", "2", "", "false", "[65535]"], "\"3 2  false [65535]\""),
+        (&["say", "info", "grüß dich"], "ok"),
+        (&["output-level", "debug"], "ok"),
+        (&["count", "8", "--timeout", "60", "--json"], "2"),
+    ] {
+        assert_eq!(place.say(&[&["call", "probe.0"], arguments].concat()).ok(), format!("{answer}\n"));
+    }
+    let status = place.say(&["call", "probe.0", "--json", "status"]).json();
+    assert_eq!(status["state"], "On");
+    let beat = wait("a beat", || place.say(&["call", "probe.0", "get", "beat"]).ok().trim().parse::<u64>().ok());
+    assert!(beat > 0);
+    let refused = place.say(&["call", "probe.0", "refuse", "too late"]);
+    assert_eq!((refused.code, refused.err.as_str()), (Some(1), ""), "{refused:?}");
+    assert!(refused.out.contains("Refused") && refused.out.contains("too late"), "{refused:?}");
+    let refused = place.say(&["call", "--json", "probe.0", "refuse", "too late"]);
+    let json: serde_json::Value = serde_json::from_str(&refused.out).unwrap();
+    assert_eq!((refused.code, &json["Err"]["Refused"]["why"]), (Some(1), &"too late".into()));
+    assert_eq!(place.counted(), [7, 8]);
+}
+
+#[test]
+fn mistakes_are_told_with_what_would_be_right() {
+    let place = Place::new();
+    let _launch = node(&place);
+    for (arguments, words) in [
+        (&["call", "prob.0"][..], &["prob"][..]),
+        (&["call", "probe"], &["probe"]),
+        (&["call", "probe.x", "count", "1"], &["probe.x"]),
+        (&["call", "probe.999", "count", "1"], &["999"]),
+        (&["call", "probe.1", "count", "1"], &["not on this node"]),
+        (&["call", "probe.0", "cuont", "1"], &["no function `cuont`", "count, count_again", "on, off, status"]),
+        (&["call", "probe.0", "count"], &["count <number: u32> takes 1 arguments, not 0"]),
+        (&["call", "probe.0", "count", "1", "2"], &["takes 1 arguments, not 2"]),
+        (&["call", "probe.0", "count", "-1"], &["number: "]),
+        (&["call", "probe.0", "count", "4294967296"], &["number: "]),
+        (&["call", "probe.0", "count", "x"], &["number: "]),
+        (&["call", "probe.0", "tell", "1", "x", "w", "true", "[]"], &["ratio: "]),
+        (&["call", "probe.0", "tell", "1", "1", "w", "maybe", "[]"], &["flag: "]),
+        (&["call", "probe.0", "tell", "1", "1", "w", "true", "[1"], &["list: "]),
+        (&["call", "probe.0", "tell", "1", "1", "w", "true", "[65536]"], &["list: "]),
+        (&["call", "probe.0", "get", "baet"], &["no data `baet`; it has: beat, silence"]),
+        (&["call", "probe.0", "get", "silence"], &["no such data has been made yet"]),
+        (&["call", "probe.0", "output-level", "loud"], &["no level `loud`; there are error, warn, info, debug, trace"]),
+        (&["call", "--timeout=-1", "probe.0", "status"], &["-1 s is no time to wait"]),
+        (&["echo", "probe.0"], &["which data? it has: beat, silence"]),
+        (&["echo", "probe.0", "baet"], &["no data `baet`; it has: beat, silence"]),
+        (&["echo", "probe.0", "silence", "--timeout", "0.2"], &["no data within 200ms"]),
+        (&["echo", "probe.3", "beat"], &["not on this node"]),
+        (&["status", "probe.3"], &[]),
+        (&["log", "--level", "loud"], &["no level `loud`"]),
+        (&["log", "--module", "prob.0"], &["prob"]),
+        (&["list", "--config", "nowhere.toml"], &["nowhere.toml"]),
+    ] {
+        let said = place.say(arguments);
+        if words.is_empty() {
+            assert_eq!((said.code, said.err.as_str()), (Some(1), ""), "{arguments:?}");
+            assert!(said.out.contains("silent"), "{arguments:?}: {}", said.out);
+            continue;
+        }
+        let told = said.fails();
+        for words in words {
+            assert!(told.contains(words), "{arguments:?}: no `{words}` in: {told}");
+        }
+    }
+    assert!(place.counted().is_empty(), "something was called all the same");
+}
+
+#[test]
+fn a_mistaken_command_line_is_usage() {
+    let place = Place::new();
+    for arguments in
+        [&["cal"][..], &["call"], &["echo", "--rate", "fast", "x.0"], &["demo", "--no-gui", "--viewer"], &[]]
+    {
+        let said = place.say(arguments);
+        assert_eq!(said.code, Some(2), "{arguments:?}: {said:?}");
+        assert!(said.err.contains("--help") || said.err.contains("Usage"), "{arguments:?}: {said:?}");
+    }
+    assert!(place.say(&["--help"]).ok().contains("rohrpost demo"));
+    for command in ["check", "launch", "demo", "list", "status", "call", "echo", "log", "clean", "run"] {
+        let help = place.say(&[command, "--help"]).ok();
+        assert!(help.contains("Example"), "{command} has no example:\n{help}");
+    }
+}
+
+#[test]
+fn tools_say_what_to_do_while_nothing_runs() {
+    let place = Place::new();
+    for arguments in [&["list"][..], &["status"], &["call", "probe.0"], &["echo", "probe.0"], &["log"]] {
+        let told = place.say(arguments).fails();
+        assert!(told.contains("no node runs here; launch one: `rohrpost launch FILE`"), "{arguments:?}: {told}");
+    }
+    let config = place.config(&[OUTPUT]);
+    let told = place.say(&["list", "--config", config.to_str().unwrap()]).fails();
+    assert!(told.contains("is it launched?"), "{told}");
+    let told = place.say(&["run", "output"]).fails();
+    assert!(told.contains("--config FILE --name CLASS.INSTANCE"), "{told}");
+    let told = place.say(&["run", "mop", "--config", config.to_str().unwrap(), "--name", "output.0"]).fails();
+    assert!(told.contains("no built-in module `mop`; there are: "), "{told}");
+    place.assert_empty();
+}
+
+#[test]
+fn many_tools_work_at_the_same_time() {
+    let place = Place::new();
+    let mut launch = node(&place);
+    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat", "--json"]));
+    echo.wait_for("\n");
+    let mut calls: Vec<Running> = (1..=8)
+        .map(|number| Running::start(place.command(&["call", "probe.0", "count", &number.to_string()])))
+        .collect();
+    let mut answers: Vec<u64> = Vec::new();
+    for call in &mut calls {
+        assert!(call.end().success(), "{}", call.err());
+        answers.push(call.out().trim().parse().unwrap());
+    }
+    answers.sort_unstable();
+    assert_eq!(answers, (1..=8).collect::<Vec<u64>>(), "each had an answer of its own");
+    echo.stop();
+    let out = launch.stop();
+    assert_eq!(out, "", "every tool has tidied up after itself");
+    place.assert_empty();
+}
+
+#[test]
+fn a_closed_pipe_ends_a_tool_quietly() {
+    let place = Place::new();
+    let _launch = node(&place);
+    for arguments in [&["echo", "probe.0", "beat"][..], &["list"], &["call", "probe.0"], &["log", "--follow"]] {
+        let mut command: Command = place.command(arguments);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        drop(child.stdout.take());
+        if arguments[0] == "log" {
+            // It finds out when there is something to say.
+            wait("the tool ends", || {
+                place.say(&["call", "probe.0", "say", "info", "well"]).ok();
+                child.try_wait().unwrap()
+            });
+        }
+        let done = child.wait_with_output().unwrap();
+        assert!(done.status.success(), "{arguments:?}: {done:?}");
+        assert!(done.stderr.is_empty(), "{arguments:?}: {done:?}");
+    }
+}

@@ -1,0 +1,145 @@
+//! What modules publish and say, as tools show it.
+
+use crate::harness::{OUTPUT, Place, Running, probe, signal, wait};
+use nix::sys::signal::Signal;
+use std::time::Instant;
+
+fn lines(text: &str) -> Vec<serde_json::Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[test]
+fn echo_counts_and_numbers_what_comes() {
+    let place = Place::new();
+    let (_launch, _robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let shown = lines(&place.say(&["echo", "probe.0", "beat", "--count", "5", "--json"]).ok());
+    assert_eq!(shown.len(), 5);
+    for (index, pair) in shown.windows(2).enumerate() {
+        assert_eq!(pair[0]["sequence"], index, "{pair:?}");
+        assert_eq!(pair[0]["value"].as_u64().unwrap() + 1, pair[1]["value"].as_u64().unwrap(), "none is left out");
+        assert!(pair[0]["time_ns"].as_u64() < pair[1]["time_ns"].as_u64(), "{pair:?}");
+        assert_eq!(pair[1]["missed"], 0);
+    }
+    let text = place.say(&["echo", "probe.0", "beat", "-c", "2"]).ok();
+    assert_eq!(text.lines().count(), 2);
+    assert!(text.lines().next().unwrap().contains(" #0 "), "{text}");
+}
+
+#[test]
+fn echo_with_a_rate_shows_the_newest_that_often() {
+    let place = Place::new();
+    let (_launch, _robot) = place.launched(&[&probe("probe.0", "rate-hz = 100.0", "")]);
+    let start = Instant::now();
+    let shown = lines(&place.say(&["echo", "probe.0", "beat", "--rate", "10", "--count", "6", "--json"]).ok());
+    let took = start.elapsed().as_secs_f64();
+    assert!(took >= 0.45, "6 values 0.1 s apart came within {took} s");
+    // Ten beats lie between two of ten a second; a busy computer makes it a few more or less.
+    let values: Vec<u64> = shown.iter().map(|line| line["value"].as_u64().unwrap()).collect();
+    let (first, last) = (values[0], values[5]);
+    assert!((20..=200).contains(&(last - first)), "{values:?}");
+    assert!(values.is_sorted(), "{values:?}");
+}
+
+#[test]
+fn echo_goes_on_when_its_module_is_restarted_and_ends_by_ctrl_c() {
+    let place = Place::new();
+    let restart = "restart = { backoff = \"50 ms\" }";
+    let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", restart)]);
+    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat", "--json"]));
+    let beats = |echo: &Running| lines(echo.out().rsplit_once('\n').map_or("", |(whole, _)| whole));
+    wait("it beats", || (beats(&echo).len() > 20).then_some(()));
+    let pid = robot.pid("probe.0");
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("probe.0", pid);
+    wait("beats of the new life", || {
+        echo.assert_runs();
+        // Its numbers begin anew.
+        let numbers: Vec<_> = beats(&echo).iter().map(|line| line["sequence"].as_u64()).collect();
+        (!numbers.is_sorted()).then_some(())
+    });
+    echo.stop();
+    assert_eq!(echo.err(), "");
+    wait("nobody is subscribed", || {
+        let status = place.say(&["status", "probe.0", "--json"]).json();
+        (status[0]["subscribers"] == 0).then_some(())
+    });
+}
+
+#[test]
+fn what_modules_say_is_kept_and_filtered() {
+    let place = Place::new();
+    let levels = "[output]\nlevels = { \"probe.1\" = \"warn\" }\n";
+    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", ""), levels]);
+    for (module, level, text) in [
+        ("probe.0", "info", "first"),
+        ("probe.0", "debug", "not sent: its level is info"),
+        ("probe.0", "warn", "second"),
+        ("probe.1", "info", "not sent: its level is warn"),
+        ("probe.1", "error", "third"),
+    ] {
+        place.say(&["call", module, "say", level, text]).ok();
+    }
+    let texts = |arguments: &[&str]| -> Vec<String> {
+        let shown = lines(&place.say(&[&["log", "--json"], arguments].concat()).ok());
+        let own = shown.iter().filter(|line| line["text"] != "is on");
+        own.map(|line| format!("{} {} {}", line["module"], line["level"], line["text"]).replace('"', "")).collect()
+    };
+    wait("all lines", || texts(&[]).iter().any(|line| line.contains("third")).then_some(()));
+    assert_eq!(texts(&[]), ["probe.0 info first", "probe.0 warn second", "probe.1 error third"]);
+    assert_eq!(texts(&["--level", "warn"]), ["probe.0 warn second", "probe.1 error third"]);
+    assert_eq!(texts(&["--level", "error"]), ["probe.1 error third"]);
+    assert_eq!(texts(&["--module", "probe.0"]), ["probe.0 info first", "probe.0 warn second"]);
+    assert_eq!(texts(&["--module", "probe.0", "--level", "error"]), [""; 0]);
+    place.say(&["call", "probe.0", "output-level", "debug"]).ok();
+    place.say(&["call", "probe.0", "say", "debug", "fourth"]).ok();
+    wait("the debug line", || texts(&[]).contains(&"probe.0 debug fourth".into()).then_some(()));
+    let text = place.say(&["log", "--level", "error"]).ok();
+    let (time, rest) = text.split_once(' ').unwrap();
+    assert_eq!((time.len(), rest), ("08:36:01.257".len(), "error probe.1: third\n"));
+}
+
+#[test]
+fn a_log_that_is_followed_shows_lines_as_they_come() {
+    let place = Place::new();
+    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let mut log = Running::start(place.command(&["log", "--follow", "--module", "probe.0"]));
+    log.wait_for("probe.0: is on");
+    for text in ["one", "two", "three"] {
+        place.say(&["call", "probe.0", "say", "info", text]).ok();
+        log.wait_for(&format!("info  probe.0: {text}"));
+    }
+    log.stop();
+    assert_eq!(log.err(), "");
+}
+
+#[test]
+fn lines_of_a_module_that_fails_reach_the_log() {
+    let place = Place::new();
+    let restart = "restart = { backoff = \"50 ms\" }";
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
+    let pid = robot.pid("probe.0");
+    place.say(&["call", "probe.0", "leave", "3"]).ok();
+    launch.wait_for("probe.0 ended with 3; starts again in 50ms");
+    robot.wait_restarted("probe.0", pid);
+    wait("it says twice that it is on", || {
+        let text = place.say(&["log", "--module", "probe.0"]).ok();
+        (text.matches("is on").count() == 2).then_some(())
+    });
+}
+
+#[test]
+fn status_shows_each_module() {
+    let place = Place::new();
+    let (_launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]);
+    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));
+    echo.wait_for("\n");
+    let status = place.say(&["status", "--json"]).json();
+    let module = &status[1];
+    assert_eq!((&module["module"], &module["state"]), (&"probe.0".into(), &"On".into()));
+    assert_eq!((&module["subscribers"], &module["missed"]), (&1.into(), &0.into()));
+    assert_eq!(module["incarnation"], robot.process("probe.0").unwrap().incarnation);
+    assert!(module["failure"].is_null());
+    let text = place.say(&["status"]).ok();
+    assert!(text.starts_with("module ") && text.lines().count() == 3, "{text}");
+    echo.stop();
+}
