@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut tool = running.join(seconds(arguments.timeout)?)?;
     let result = answer(arguments, module, &mut tool);
     tool.close();
-    let (text, failed) = result?;
+    let (text, failed) = result.map_err(|error| running.told(module, &*error))?;
     say(text);
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     for name in names {
         let (status, failure) = match tool.status(name) {
             Ok(status) => (Some(status), None),
-            Err(error) => (None, Some(error.to_string())),
+            Err(error) => (None, Some(running.told(name, &error).to_string())),
         };
         lines.push(Line { module: running.text(name), status, failure });
     }

@@ -76,28 +76,32 @@ pub(super) fn is_left_out(module: &ModuleSurvey, installation: &Installation) ->
     module.process.is_none() && installation.module(module.name).is_some_and(|configured| configured.optional)
 }
 
-/// Modules as a table.
+/// Modules as a table, one a line.
 pub(super) fn print_modules(lines: &[ModuleLine]) -> String {
+    modules_table(lines, " ", ">received", |line| line.received.to_string())
+}
+
+/// The same for a terminal of 80 columns: faces below their module, and rates.
+pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
+    modules_table(lines, "\n", ">in/s", |line| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}")))
+}
+
+fn modules_table(lines: &[ModuleLine], gap: &str, received: &str, of: impl Fn(&ModuleLine) -> String) -> String {
     let rows = lines.iter().map(|line| {
-        let mut module = line.module.clone();
-        for face in &line.faces {
-            module.push_str(&format!(" + {face}"));
-        }
+        let faces: Vec<String> = line.faces.iter().map(|face| format!("{gap}+ {face}")).collect();
         [
-            module,
+            line.module.clone() + &faces.concat(),
             line.state.clone(),
             line.priority.to_string(),
             line.scheduling.clone(),
             line.pid.map_or("-".into(), |pid| pid.to_string()),
-            line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}")),
-            line.received.to_string(),
+            of(line),
             line.waiting.to_string(),
             line.lost.to_string(),
             line.restarts.to_string(),
         ]
     });
-    let heads =
-        ["module", "state", ">priority", "scheduling", ">pid", ">in/s", ">received", ">waiting", ">lost", ">restarts"];
+    let heads = ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"];
     table(heads, rows)
 }
 
