@@ -1,8 +1,10 @@
 //! Launch dies: no module drives on, and what is left is cleared away without harm to what lives.
 
-use crate::harness::{PATIENCE, Place, Robot, Running, probe, runs, signal, wait};
+use crate::harness::{PATIENCE, Place, Robot, halt, probe, runs, signal, wait};
 use crate::probe::COUNT;
-use nix::sys::signal::Signal;
+use crate::process::Running;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 
 fn wait_gone(pids: &[u32]) {
     wait(format!("{pids:?} end"), || (!pids.iter().any(|pid| runs(*pid))).then_some(()));
@@ -41,15 +43,14 @@ fn modules_switch_off_and_end_when_launch_is_killed() {
 #[test]
 fn what_waited_for_the_last_run_does_not_drive_the_next() {
     let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
-    let pids = robot.pids();
-    signal(pids[0], Signal::SIGSTOP);
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = \"never\"")]);
     let mut tool = robot.tool(PATIENCE);
+    signal(robot.pid("probe.0"), Signal::SIGKILL);
+    launch.wait_for("probe.0 was killed by signal 9");
     robot.begin(&mut tool, "probe.0", COUNT, &(1u32,));
+    assert_eq!(robot.waiting("probe.0"), 1);
     launch.signal(Signal::SIGKILL);
     launch.end();
-    signal(pids[0], Signal::SIGKILL);
-    wait_gone(&pids);
     tool.close();
     drop(robot);
     let (mut launch, robot) = again(&place);
@@ -63,10 +64,12 @@ fn what_waited_for_the_last_run_does_not_drive_the_next() {
 fn a_module_that_was_stopped_when_launch_died_is_woken_and_switches_off() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", ""), &probe("probe.1", "", "")]);
-    let pids = robot.pids();
-    signal(robot.pid("probe.0"), Signal::SIGSTOP);
+    let (pids, stopped) = (robot.pids(), robot.pid("probe.0"));
+    halt(stopped);
     launch.signal(Signal::SIGKILL);
     launch.end();
+    // Mostly the kernel does this, with SIGHUP before it: not where the new parent is of the same session.
+    let _ = kill(Pid::from_raw(stopped as i32), Signal::SIGCONT);
     wait_gone(&pids);
     assert_eq!(place.recorded("off"), 2);
 }
@@ -84,7 +87,7 @@ fn the_next_launch_ends_a_module_that_would_not_end() {
         wait_gone(&[other]);
         assert!(runs(pid));
         if stopped {
-            signal(pid, Signal::SIGSTOP);
+            halt(pid);
         }
         drop(robot);
         let (mut launch, robot) = again(&place);

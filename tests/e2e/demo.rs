@@ -1,6 +1,7 @@
 //! The demo, as its user sees it.
 
-use crate::harness::{Place, Running, probe, runs, wait};
+use crate::harness::{Place, probe, runs, wait};
+use crate::process::Running;
 use nix::sys::signal::Signal;
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");

@@ -1,6 +1,7 @@
 //! A place of its own for each test: shared memory, files, processes. All of it is gone when the place is dropped.
 
 use crate::probe::ProbingInterface;
+use crate::process::{Running, Said};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost::config::Installation;
@@ -9,10 +10,9 @@ use rohrpost::mailbox::{Node, ParticipantInfo, node_directory};
 use rohrpost::serde::Serialize;
 use rohrpost::{Name, ToolLink};
 use std::fmt::Debug;
-use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::{Arc, Mutex};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -63,39 +63,17 @@ pub(crate) fn runs(pid: u32) -> bool {
     stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
 }
 
+/// Stops a process as Ctrl-Z does, and waits until it stands.
+pub(crate) fn halt(pid: u32) {
+    signal(pid, Signal::SIGSTOP);
+    wait(format!("{pid} stands"), || {
+        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+        stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('T')).then_some(())
+    });
+}
+
 pub(crate) fn signal(pid: u32, signal: Signal) {
     kill(Pid::from_raw(pid as i32), signal).unwrap();
-}
-
-/// What a command said.
-#[derive(Debug)]
-pub(crate) struct Said {
-    pub(crate) out: String,
-    pub(crate) err: String,
-    pub(crate) code: Option<i32>,
-}
-
-impl Said {
-    /// It ended well.
-    #[track_caller]
-    pub(crate) fn ok(self) -> String {
-        assert_eq!(self.code, Some(0), "{self:#?}");
-        assert_eq!(self.err, "", "{self:#?}");
-        self.out
-    }
-
-    /// It failed, with words for its user.
-    #[track_caller]
-    pub(crate) fn fails(self) -> String {
-        assert_eq!(self.code, Some(1), "{self:#?}");
-        assert!(!self.err.contains("panicked") && !self.err.is_empty(), "{self:#?}");
-        self.err
-    }
-
-    #[track_caller]
-    pub(crate) fn json(self) -> serde_json::Value {
-        serde_json::from_str(&self.ok()).unwrap()
-    }
 }
 
 /// Where one test's processes live.
@@ -165,9 +143,7 @@ impl Place {
 
     /// Runs a command to its end.
     pub(crate) fn say(&self, arguments: &[&str]) -> Said {
-        let mut running = Running::start(self.command(arguments));
-        let status = running.end();
-        Said { out: running.out(), err: running.err(), code: status.code() }
+        Running::start(self.command(arguments)).said()
     }
 
     /// Starts `rohrpost launch`.
@@ -283,120 +259,5 @@ impl Robot {
         wait(format!("{module} is not on again"), || {
             self.process(module).filter(|p| p.pid != old_pid && p.state == Some(rohrpost::mailbox::ModuleState::On))
         })
-    }
-}
-
-/// A process, and what it prints.
-pub(crate) struct Running {
-    child: Child,
-    out: Printed,
-    err: Printed,
-}
-
-/// What came through a pipe so far, and the thread that reads it.
-struct Printed {
-    text: Arc<Mutex<String>>,
-    reader: Option<std::thread::JoinHandle<()>>,
-}
-
-impl Printed {
-    fn read(pipe: Option<impl Read + Send + 'static>) -> Self {
-        let text = Arc::new(Mutex::new(String::new()));
-        let kept = text.clone();
-        let reader = pipe.map(|pipe| {
-            std::thread::spawn(move || {
-                let mut pipe = BufReader::new(pipe);
-                let mut line = Vec::new();
-                while let Ok(1..) = pipe.read_until(b'\n', &mut line) {
-                    kept.lock().unwrap().push_str(&String::from_utf8_lossy(&line));
-                    line.clear();
-                }
-            })
-        });
-        Self { text, reader }
-    }
-}
-
-impl Running {
-    pub(crate) fn start(mut command: Command) -> Self {
-        let mut child = command.spawn().unwrap();
-        let (out, err) = (Printed::read(child.stdout.take()), Printed::read(child.stderr.take()));
-        Self { child, out, err }
-    }
-
-    pub(crate) fn pid(&self) -> u32 {
-        self.child.id()
-    }
-
-    pub(crate) fn out(&self) -> String {
-        self.out.text.lock().unwrap().clone()
-    }
-
-    pub(crate) fn err(&self) -> String {
-        self.err.text.lock().unwrap().clone()
-    }
-
-    pub(crate) fn ended(&mut self) -> Option<ExitStatus> {
-        self.child.try_wait().unwrap()
-    }
-
-    #[track_caller]
-    pub(crate) fn assert_runs(&mut self) {
-        if let Some(status) = self.ended() {
-            panic!("it ended with {status}\n{}\n{}", self.out(), self.err());
-        }
-    }
-
-    /// Waits until it has printed this.
-    #[track_caller]
-    pub(crate) fn wait_for(&mut self, text: &str) {
-        let start = Instant::now();
-        while !self.out().contains(text) {
-            assert!(start.elapsed() < PATIENCE, "never printed `{text}`:\n{}\n{}", self.out(), self.err());
-            assert!(self.ended().is_none() || self.out().contains(text), "{}\n{}", self.out(), self.err());
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
-
-    pub(crate) fn signal(&self, number: Signal) {
-        signal(self.pid(), number);
-    }
-
-    /// Waits for its end, and for all it has printed.
-    #[track_caller]
-    pub(crate) fn end(&mut self) -> ExitStatus {
-        let start = Instant::now();
-        let status = loop {
-            if let Some(status) = self.ended() {
-                break status;
-            }
-            assert!(start.elapsed() < PATIENCE, "does not end:\n{}\n{}", self.out(), self.err());
-            std::thread::sleep(Duration::from_millis(5));
-        };
-        for printed in [&mut self.out, &mut self.err] {
-            // A process that outlives it may hold the pipe; what it prints is not waited for.
-            let deadline = Instant::now() + Duration::from_secs(5);
-            while printed.reader.as_ref().is_some_and(|reader| !reader.is_finished()) && Instant::now() < deadline {
-                std::thread::sleep(Duration::from_millis(2));
-            }
-            printed.reader = None;
-        }
-        status
-    }
-
-    /// Stops it as Ctrl-C would, and what it has printed.
-    #[track_caller]
-    pub(crate) fn stop(&mut self) -> String {
-        self.signal(Signal::SIGINT);
-        let status = self.end();
-        assert!(status.success(), "{status}\n{}\n{}", self.out(), self.err());
-        self.out()
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }

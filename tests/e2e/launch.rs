@@ -1,6 +1,6 @@
 //! Launch: starts in order, watches, stops in reverse, leaves nothing.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, probe, runs, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, runs, wait};
 use crate::probe::WORK;
 use nix::sys::signal::Signal;
 
@@ -49,7 +49,7 @@ fn a_module_that_will_not_stop_is_killed_and_named() {
         &probe("probe.3", "", stop_within),
     ]);
     let pids = robot.pids();
-    signal(robot.pid("probe.2"), Signal::SIGSTOP);
+    halt(robot.pid("probe.2"));
     let mut tool = robot.tool(PATIENCE);
     robot.begin(&mut tool, "probe.3", WORK, &(60_000u64,));
     wait("probe.3 works", || (place.recorded("work begins") == 1).then_some(()));

@@ -1,6 +1,6 @@
 //! What becomes of packages when their receiver ends, stops, or chokes on one.
 
-use crate::harness::{PATIENCE, Place, Robot, probe, signal, wait};
+use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::{ABORT, COUNT};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
@@ -26,8 +26,10 @@ fn packages_accepted_while_a_module_was_dead_or_stopped_arrive_in_order() {
         let (mut launch, robot) = place.launched(&[&probe("probe.0", "", restart)]);
         let mut tool = robot.tool(PATIENCE);
         let pid = robot.pid("probe.0");
-        signal(pid, number);
-        if number == Signal::SIGKILL {
+        if number == Signal::SIGSTOP {
+            halt(pid);
+        } else {
+            signal(pid, number);
             wait("probe.0 is dead", || robot.process("probe.0").is_none().then_some(()));
         }
         for count in 1..=20u32 {
@@ -55,7 +57,7 @@ fn what_waited_for_a_stopped_module_reaches_the_same_process() {
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     let pid = robot.pid("probe.0");
-    signal(pid, Signal::SIGSTOP);
+    halt(pid);
     for count in 1..=20u32 {
         throw(&robot, &mut tool, "probe.0", COUNT, &(count,));
     }
@@ -125,7 +127,7 @@ fn a_full_mailbox_says_so_and_counts_it() {
     let keys = "stop-within = \"200 ms\"\n[module.mailbox.commands]\nslots = 4\nfull = \"reject\"";
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);
     let mut tool = robot.tool(PATIENCE);
-    signal(robot.pid("probe.0"), Signal::SIGSTOP);
+    halt(robot.pid("probe.0"));
     for count in 1..=4u32 {
         throw(&robot, &mut tool, "probe.0", COUNT, &(count,));
     }

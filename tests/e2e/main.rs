@@ -1,7 +1,10 @@
 //! End to end: real processes in shared memory of their own, watched as a user watches them.
 //!
-//! `harness` starts and ends them, `probe` is the module that misbehaves as a test asks it to; each other file is a theme.
+//! `harness` gives each test a place of its own, `process` watches what runs there, `probe` is the module that misbehaves as
+//! a test asks it to; each other file is a theme.
 //! Nothing here sleeps for luck: tests wait for what they need to see, with deadlines that a busy computer keeps.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod crash;
 mod demo;
@@ -12,6 +15,7 @@ mod nodes;
 mod once;
 mod once_wrap;
 mod probe;
+mod process;
 mod restart;
 mod screen;
 mod start;

@@ -46,7 +46,7 @@ fn two_nodes_of_one_system_are_apart() {
     assert!(told.contains("which node?") && told.contains("base, arm") && told.contains("--node"), "{told}");
     let mut running = Vec::new();
     for node in ["base", "arm"] {
-        let mut launch = crate::harness::Running::start(place.command(&["launch", file, "--node", node]));
+        let mut launch = crate::process::Running::start(place.command(&["launch", file, "--node", node]));
         let robot = place.robot(&config, node, &mut launch);
         robot.wait_on(&mut launch);
         running.push((launch, robot));

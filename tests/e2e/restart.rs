@@ -1,6 +1,6 @@
 //! Modules that end, and what launch does then.
 
-use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
 use nix::sys::signal::Signal;
 use std::time::{Duration, Instant};
 
@@ -95,7 +95,7 @@ fn a_stopped_module_does_not_keep_its_launch_from_watching_others() {
     let place = Place::new();
     let (mut launch, robot) =
         place.launched(&[&probe("probe.0", "", "stop-within = \"200 ms\""), &probe("probe.1", "", "")]);
-    signal(robot.pid("probe.0"), Signal::SIGSTOP);
+    halt(robot.pid("probe.0"));
     let pid = robot.pid("probe.1");
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.1", pid);

@@ -1,6 +1,7 @@
 //! The live table, in a terminal of its own.
 
-use crate::harness::{Place, Running, probe, runs, wait};
+use crate::harness::{Place, probe, runs, wait};
+use crate::process::Running;
 use nix::pty::{OpenptyResult, Winsize, openpty};
 use nix::sys::signal::Signal;
 use std::fs::File;

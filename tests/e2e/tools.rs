@@ -1,6 +1,7 @@
 //! What a user types at a node that runs, and what is said to mistakes.
 
-use crate::harness::{OUTPUT, Place, Running, probe, wait};
+use crate::harness::{OUTPUT, Place, probe, wait};
+use crate::process::Running;
 use std::process::{Command, Stdio};
 
 /// A node with a collector and a probe.

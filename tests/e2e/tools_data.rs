@@ -1,6 +1,7 @@
 //! What modules publish and say, as tools show it.
 
-use crate::harness::{OUTPUT, Place, Running, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use crate::process::Running;
 use nix::sys::signal::Signal;
 use std::time::Instant;
 

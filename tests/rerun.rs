@@ -1,0 +1,140 @@
+//! Drawings of whole demos, read with Rerun's own command line.
+//!
+//! Behind the feature `rerun-tests`, since they need two programs that nobody else does; `cargo xtask test` brings both.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
+
+/// A program that the environment names.
+fn program(variable: &str) -> PathBuf {
+    let path = std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_file());
+    path.unwrap_or_else(|| {
+        panic!("{variable} names no program; run them by \"cargo xtask test\", which installs Rerun's command line")
+    })
+}
+
+fn ok(what: &str, output: &Output) -> String {
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{what}: {}\n{out}\n{err}", output.status);
+    format!("{out}{err}")
+}
+
+/// A demo that was run to its end: what it said, and how many rows its drawing has of each entity.
+struct Drawing {
+    said: String,
+    rows: BTreeMap<String, u64>,
+}
+
+impl Drawing {
+    fn of(arguments: &[&str]) -> Self {
+        let (rerun, bridge) = (program("ROHRPOST_RERUN"), program("ROHRPOST_BRIDGE"));
+        let folder = tempfile::tempdir().unwrap();
+        let bridges = bridge.parent().unwrap().to_owned();
+        let search = std::env::var_os("PATH").unwrap_or_default();
+        let search = std::env::join_paths(std::iter::once(bridges).chain(std::env::split_paths(&search))).unwrap();
+        let demo = Command::new(env!("CARGO_BIN_EXE_rohrpost"))
+            .args(["demo", "--quiet"])
+            .args(arguments)
+            .env("PATH", search)
+            .env("ROHRPOST_DIR", folder.path().join("memory"))
+            .current_dir(folder.path())
+            .output();
+        let said = ok("demo", &demo.unwrap());
+        assert!(!said.contains("left out"), "the bridge was not found:\n{said}");
+        let file = folder.path().join("rohrpost-demo.rrd");
+        let verified = rrd(&rerun, "verify", &file);
+        assert!(verified.contains("1 file verified without error"), "{verified}");
+        let rows = rows(&rrd(&rerun, "print", &file));
+        // The two commands read the file by ways of their own.
+        let entities: Vec<&String> = rows.keys().collect();
+        assert_eq!(entities, entities_of(&rrd(&rerun, "stats", &file)).iter().collect::<Vec<_>>());
+        Self { said, rows }
+    }
+
+    /// Rows of all entities below this one, together.
+    fn count(&self, entity: &str) -> u64 {
+        let below = format!("{entity}/");
+        let own = |name: &&String| *name == entity || name.starts_with(&below);
+        self.rows.iter().filter(|(name, _)| own(name)).map(|(_, rows)| rows).sum()
+    }
+
+    #[track_caller]
+    fn has(&self, entity: &str, rows: std::ops::RangeInclusive<u64>) {
+        let count = self.count(entity);
+        assert!(rows.contains(&count), "{entity}: {count} rows, not {rows:?}\n{:#?}\n{}", self.rows, self.said);
+    }
+
+    /// What is drawn of every robot: its modules, what they say, and what its packages do.
+    fn has_robot(&self, modules: &[&str], busy: &[&str], charts: std::ops::RangeInclusive<u64>) {
+        for module in modules {
+            self.has(&format!("/modules/{module}"), 1..=4);
+        }
+        for class in busy.iter().chain(&["output", "tool"]) {
+            for entity in [format!("/packages/{class}"), format!("/losses/{class}")] {
+                self.has(&entity, charts.clone());
+            }
+        }
+        // Drawn only for spans in which packages came, so asked of those whose packages come all the time.
+        for class in busy {
+            self.has(&format!("/latency/{class}/p50"), charts.clone());
+            self.has(&format!("/latency/{class}/p99"), charts.clone());
+        }
+        self.has(r"/modules\ now", 1..=10);
+    }
+}
+
+fn rrd(rerun: &Path, command: &str, file: &Path) -> String {
+    let output = Command::new(rerun).args(["rrd", command]).arg(file).env("NO_COLOR", "1").output();
+    ok(&format!("rerun rrd {command}"), &output.unwrap())
+}
+
+/// Lines such as `Chunk(…) with 3 rows (4.6 KiB) - /world/map - data columns: […]`.
+fn rows(printed: &str) -> BTreeMap<String, u64> {
+    let mut all = BTreeMap::new();
+    for line in printed.lines().filter(|line| line.starts_with("Chunk(")) {
+        let (rows, rest) = line.split_once(" with ").unwrap().1.split_once(" rows ").unwrap();
+        let entity = rest.split(" - ").nth(1).unwrap();
+        let digits: String = rows.chars().filter(char::is_ascii_digit).collect();
+        *all.entry(entity.to_owned()).or_default() += digits.parse::<u64>().unwrap();
+    }
+    all
+}
+
+/// The table "Num chunks per entity", lines such as `/world/frame: 18`.
+fn entities_of(stats: &str) -> BTreeSet<String> {
+    let lines = stats.lines().skip_while(|line| !line.starts_with("Num chunks per entity"));
+    lines.filter(|line| line.starts_with('/')).filter_map(|line| Some(line.rsplit_once(": ")?.0.to_owned())).collect()
+}
+
+#[test]
+fn the_simulated_robot_is_drawn() {
+    let drawing = Drawing::of(&["--seconds", "6"]);
+    // Ten a second of scans and of poses, for six seconds less the start; a busy computer draws fewer.
+    drawing.has("/world/scan/laser.0", 15..=70);
+    drawing.has("/world/robot/mapper.0", 15..=75);
+    drawing.has("/world/robot/odometry.0", 15..=75);
+    drawing.has("/world/map/mapper.0", 4..=2000);
+    let modules = ["output.0", "motor.0", "mapper.0", "pilot.0", "gui.0"];
+    drawing.has_robot(&modules, &["pilot", "mapper", "gui"], 4..=14);
+    drawing.has("/output", 1..=100);
+    assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
+}
+
+#[test]
+fn a_log_is_drawn() {
+    let drawing = Drawing::of(&["--log", LOG, "--speed", "2"]);
+    assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
+    assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);
+    assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
+    // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out.
+    drawing.has("/world/scan/laser.0", 18..=22);
+    drawing.has("/world/robot/mapper.0", 18..=24);
+    drawing.has("/world/map/mapper.0", 4..=2000);
+    drawing.has_robot(&["output.0", "mapper.0", "gui.0", "player.0"], &["mapper", "gui"], 4..=30);
+    drawing.has("/output/player.0", 1..=3);
+}
