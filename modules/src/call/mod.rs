@@ -11,4 +11,4 @@ pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope};
 pub use error::{CallError, Fault};
 pub use link::{Caller, Link, Pending};
-pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, Verdict};
+pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, TRANSIT_MAX, Verdict, WINDOW};
