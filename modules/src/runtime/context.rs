@@ -16,6 +16,10 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// Shorter ones leave no time for anything else; longer ones no clock can hold.
+const PERIOD_MIN: Duration = Duration::from_micros(10);
+const PERIOD_MAX: Duration = Duration::from_secs(86_400);
+
 /// Why a module cannot speak to another.
 #[derive(Debug, thiserror::Error)]
 pub enum ContextError {
@@ -106,9 +110,10 @@ impl Context {
         &self.clock
     }
 
-    /// Asks for [`crate::Module::tick`] once in this time, from now on.
+    /// Asks for [`crate::Module::tick`] once in this time, from now on; at least 10 µs, at most a day. Ticks that come too
+    /// late because the one before took too long are left out.
     pub fn set_period(&mut self, period: Duration) {
-        self.period = Some(period.max(Duration::from_micros(1)));
+        self.period = Some(period.clamp(PERIOD_MIN, PERIOD_MAX));
         self.next_tick = Some(Instant::now());
     }
 
