@@ -1,6 +1,6 @@
 //! Single rules as tables, then all of them together in the simulation.
 
-use super::simulation::{Answer, Broken, CALLS, Call, World};
+use super::simulation::{Broken, CALLS, Call, World};
 use super::{CALLERS_MAX, Fault, Name, Once, Request, Verdict};
 use std::collections::BTreeMap;
 

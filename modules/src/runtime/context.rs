@@ -214,7 +214,8 @@ impl Context {
         self.subscriptions.tick(now_ns, |to| {
             match all.iter().find(|newest| (newest.face, newest.number) == (to.face, to.wish.number)) {
                 Some(newest) => deliver(link, faces, newest, to),
-                None => Delivery::Full,
+                // Fresh, so there is one.
+                None => Delivery::Sent,
             }
         });
     }
@@ -233,12 +234,7 @@ fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::
     match link.borrow_mut().send(to.to, &label, &[&head.to_bytes(), &newest.value]) {
         Ok(()) => Delivery::Sent,
         Err(SendError::NoMailbox(_)) => Delivery::Gone,
-        Err(SendError::TooLarge { name, len, max }) => {
-            tracing::error!(
-                "data of {len} bytes do not fit mailbox {name} ({max}); raise `size` of its module's data mailbox"
-            );
-            Delivery::Full
-        }
+        Err(error @ SendError::TooLarge { .. }) => Delivery::TooLarge(error),
         Err(_) => Delivery::Full,
     }
 }
