@@ -28,7 +28,7 @@ pub enum Rate {
 impl Rate {
     /// At most so often a second; each value for 0.
     pub fn hz(hz: f64) -> Self {
-        if hz > 0.0 { Self::Every(Duration::from_secs_f64(1.0 / hz)) } else { Self::Each }
+        if hz > 0.0 { Self::Every(Duration::try_from_secs_f64(1.0 / hz).unwrap_or(Duration::MAX)) } else { Self::Each }
     }
 }
 
