@@ -122,6 +122,14 @@ impl ToolLink {
         self.common(module, if on { common::ON } else { common::OFF }, &())
     }
 
+    /// Begins to switch a module on or off, and returns at once; [`Link::poll`] tells how it went.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn begin_switch(&mut self, module: Name, on: bool) -> Result<u32, CallError> {
+        self.link.begin(module, if on { common::ON } else { common::OFF }, common::HASH, self.timeout, |_| Ok(()))
+    }
+
     /// Asks a module how it is.
     ///
     /// # Errors
