@@ -36,7 +36,9 @@ impl Module for Actor {
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         match settings.manner.as_str() {
             "refuses" => return Err(ModuleError::new("no wheels")),
-            "never-ready" => std::thread::park(),
+            "never-ready" => loop {
+                std::thread::park();
+            },
             "panics" => context.set_period(Duration::from_millis(1)),
             _ => {}
         }
@@ -44,10 +46,12 @@ impl Module for Actor {
     }
 
     fn on(&mut self, _: &mut Context) -> Result<(), ModuleError> {
-        while self.settings.manner == "hangs" {
-            std::thread::park();
+        match self.settings.manner.as_str() {
+            "hangs" => loop {
+                std::thread::park();
+            },
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn off(&mut self, context: &mut Context) {
