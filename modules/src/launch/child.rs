@@ -11,12 +11,17 @@ use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Longest pause before a restart.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
 /// Lines of what a module printed that are kept to be told when it ends.
 const PRINTED_MAX: usize = 12;
+
+/// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes behind
+/// that hold its pipe.
+const PRINTED_WAIT: Duration = Duration::from_millis(50);
 
 /// Where launch stands with a module.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,6 +59,8 @@ pub(super) struct Child {
     restarts: u32,
     backoff: Duration,
     printed: Arc<Mutex<VecDeque<String>>>,
+    /// Reads what the process prints.
+    reader: Option<JoinHandle<()>>,
 }
 
 impl Child {
@@ -84,6 +91,7 @@ impl Child {
             restarts: 0,
             backoff: module.restart.backoff,
             printed: Arc::default(),
+            reader: None,
         }
     }
 
@@ -116,16 +124,20 @@ impl Child {
     pub(super) fn spawn(&mut self) {
         self.since = Instant::now();
         match self.try_spawn() {
-            Ok(process) => {
-                self.process = Some(process);
+            Ok((process, reader)) => {
+                (self.process, self.reader) = (Some(process), Some(reader));
                 self.phase = Phase::Starting;
             }
             Err(error) => self.phase = Phase::Failed(format!("{}: {error}", self.program.display())),
         }
     }
 
-    fn try_spawn(&self) -> io::Result<std::process::Child> {
+    fn try_spawn(&self) -> io::Result<(std::process::Child, JoinHandle<()>)> {
         let (reader, writer) = io::pipe()?;
+        let printed = self.printed.clone();
+        // First: a process without one would be a process that nobody watches.
+        let keep = move || keep_last(reader, &printed);
+        let reader = std::thread::Builder::new().name("printed".into()).spawn(keep)?;
         let process = Command::new(&self.program)
             .args(&self.arguments)
             .env(environment::CONFIG, &self.config)
@@ -137,9 +149,7 @@ impl Child {
             .stderr(writer)
             .process_group(0)
             .spawn()?;
-        let printed = self.printed.clone();
-        std::thread::Builder::new().name("printed".into()).spawn(move || keep_last(reader, &printed))?;
-        Ok(process)
+        Ok((process, reader))
     }
 
     /// Looks after it; what there is to say.
@@ -161,6 +171,8 @@ impl Child {
             Phase::Starting if now - self.since > self.ready_within => {
                 let within = self.ready_within;
                 self.kill(Signal::SIGKILL);
+                // For its end, and then as its policy has it.
+                self.phase = Phase::Waiting;
                 return Some(format!("{} was not ready within {within:?}; killed", self.text));
             }
             Phase::Waiting if self.process.is_none() && now >= self.since => self.spawn(),
@@ -213,7 +225,12 @@ impl Child {
         format!("{} {how}; starts again in {pause:?}{printed}", self.text)
     }
 
-    fn take_printed(&self) -> String {
+    fn take_printed(&mut self) -> String {
+        let deadline = Instant::now() + PRINTED_WAIT;
+        while self.reader.as_ref().is_some_and(|reader| !reader.is_finished()) && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.reader = None;
         let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
         printed.drain(..).map(|line| format!("\n    {line}")).collect()
     }
