@@ -67,3 +67,8 @@ pub use rohrpost_modules::{
 
 /// The tools of the field that our interfaces and types speak: spans and events become output lines.
 pub use tracing;
+
+// The book's code is compiled with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/guide.md")]
+mod guide {}

@@ -2,7 +2,8 @@
 //! scene.rrd`, then `rerun scene.rrd` or `cargo xtask picture scene.rrd scene.png`.
 
 use rohrpost::types::{Cell, LaserScan, OccupancyGrid, Odometry, Pose, Twist};
-use rohrpost_gui_bridge::{Level, Scene, Sink, Value};
+use rohrpost::value::Value;
+use rohrpost_gui_bridge::{Level, Scene, Sink};
 use std::f64::consts::TAU;
 
 const HZ: u64 = 20;

@@ -133,6 +133,14 @@ pub fn base_directory() -> PathBuf {
     }
 }
 
+/// Removes the directory around this user's nodes if it is empty and our own to choose; one that `$ROHRPOST_DIR` names stays.
+pub fn remove_base_if_empty() {
+    if std::env::var_os("ROHRPOST_DIR").is_none() {
+        // Refused when something is in it, as it should be.
+        let _ = fs::remove_dir(base_directory());
+    }
+}
+
 /// The directory of a node.
 pub fn node_directory(installation: &str, node: &str) -> PathBuf {
     base_directory().join(format!("{installation}.{node}"))
@@ -155,9 +163,17 @@ impl Node {
         let failed = |error| NodeError::Io(path.into(), error);
         let made = fs::DirBuilder::new().recursive(true).mode(mode).create(path);
         made.map_err(failed)?;
-        let metadata = fs::symlink_metadata(path).map_err(failed)?;
-        if metadata.uid() != nix::unistd::getuid().as_raw() {
-            return Err(NodeError::Foreign(path.into(), metadata.uid()));
+        let us = nix::unistd::getuid().as_raw();
+        let owner = |path: &Path| fs::symlink_metadata(path).map(|metadata| metadata.uid()).map_err(failed);
+        if owner(path)? != us {
+            return Err(NodeError::Foreign(path.into(), owner(path)?));
+        }
+        // Whoever owns the folder around it could put another directory in its place.
+        if let Some(around) = path.parent().filter(|around| !around.as_os_str().is_empty()) {
+            let owner = owner(around)?;
+            if owner != us && owner != 0 {
+                return Err(NodeError::Foreign(around.into(), owner));
+            }
         }
         fs::set_permissions(path, fs::Permissions::from_mode(mode)).map_err(failed)?;
         Self::open_file(path, true)
@@ -346,11 +362,23 @@ impl Drop for RegistryLock {
     }
 }
 
-/// Opens a file of the node's directory, never through a link.
+/// Opens a file of the node's directory, never through a link. A new file may be used by whom the directory's mode lets in.
 pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
     let mut options = OpenOptions::new();
-    options.read(true).write(true).create(create).mode(0o600);
-    options.custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW).open(path)
+    options.read(true).write(true).mode(0o600).custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW);
+    if !create {
+        return options.open(path);
+    }
+    match options.clone().create_new(true).open(path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => options.open(path),
+        Err(error) => Err(error),
+        Ok(file) => {
+            let around = path.parent().map_or(Ok(0o700), |folder| fs::metadata(folder).map(|found| found.mode()))?;
+            // By the file, not by its name: neither the umask nor anybody else has a say.
+            file.set_permissions(fs::Permissions::from_mode(around & 0o666))?;
+            Ok(file)
+        }
+    }
 }
 
 /// Opens a file of the node's directory to look at it: never through a link, never waiting for a pipe's other end.

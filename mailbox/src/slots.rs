@@ -163,13 +163,15 @@ impl<'a> Slots<'a> {
         }
     }
 
-    /// Takes the slot of the newest of the least important packages, if `priority` outranks it.
+    /// Takes the slot of the newest of the least important packages, if `priority` outranks it, or one that was freed
+    /// since the search for one: whoever outranks all is not refused because the receiver is quick.
     fn displace(&self, by: Claimant, priority: Priority) -> Option<Claim> {
         for _ in 0..DISPLACE_LOOKS_MAX {
             let words = (0..self.count).map(|slot| (slot, self.load(slot)));
-            let ready = words.filter(|(_, word)| word.is_ready() && priority.outranks(word.priority()));
-            let (slot, last) = ready.min_by_key(|(_, word)| word.rank())?;
-            let word = Word::filling(by, Some(last.priority()));
+            let usable =
+                words.filter(|(_, word)| *word == FREE || word.is_ready() && priority.outranks(word.priority()));
+            let (slot, last) = usable.min_by_key(|(_, word)| (*word != FREE, word.rank()))?;
+            let word = Word::filling(by, (last != FREE).then(|| last.priority()));
             step!("displace: chosen");
             if self.change(slot, last, word) {
                 step!("displace: claimed");

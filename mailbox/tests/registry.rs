@@ -114,6 +114,18 @@ fn nobody_else_may_enter() {
 }
 
 #[test]
+fn a_wider_mode_lets_others_use_the_files_too() {
+    let ground = Ground::new();
+    let path = ground.path().join("shared");
+    let node = Node::create(&path, 0o770).unwrap();
+    let participant = Participant::join(&node, Name::NONE).unwrap();
+    let _receiver = participant.receiver(MAILBOX, shape(4)).unwrap();
+    let mode = |name: &str| fs::metadata(path.join(name)).unwrap().mode() & 0o777;
+    assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, 0o770);
+    assert_eq!((mode("node"), mode(&format!("{:08x}.mbx", MAILBOX.raw()))), (0o660, 0o660));
+}
+
+#[test]
 fn files_that_are_no_mailboxes_are_told_from_those_that_are() {
     let whole = {
         let ground = Ground::new();

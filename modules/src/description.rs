@@ -59,8 +59,8 @@ pub struct DataItem {
 }
 
 impl Description {
-    /// Tells interfaces apart: callers and servers must have the same. Numbers, names of functions and types count; texts
-    /// do not. A mistake goes unseen once in four billion; malice is not what it is for.
+    /// Tells interfaces apart: callers and servers must have the same. Numbers, types, and names of functions and arguments
+    /// count (to swap two numbers is a mistake that types do not show); texts do not. A mistake goes unseen once in four billion; malice is not what it is for.
     pub fn hash(&self) -> u32 {
         let mut bare = self.clone();
         bare.text.clear();

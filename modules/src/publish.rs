@@ -1,10 +1,12 @@
 //! The publishing side of continuous data: who wants what, how often, and until when. Knows no clock and no mailbox.
 
 use crate::common::Subscribe;
-use rohrpost_mailbox::{Name, Priority};
+use rohrpost_mailbox::{Name, Priority, SendError};
 
 /// Subscriptions of one module at a time.
 pub(crate) const SUBSCRIPTIONS_MAX: usize = 64;
+/// A subscriber that wants data more often gets it so often: the period is its word, the work is ours.
+const PERIOD_MIN_US: u32 = 100;
 
 /// The newest value of one kind of data.
 #[derive(Default)]
@@ -31,6 +33,8 @@ pub(crate) struct Subscription {
     due_ns: u64,
     /// Whether a value has come since the last was sent.
     fresh: bool,
+    /// It was said that its mailbox is too small; once is enough.
+    told: bool,
 }
 
 /// Tells what became of one delivery.
@@ -39,6 +43,8 @@ pub(crate) enum Delivery {
     Sent,
     /// The subscriber's mailbox was full.
     Full,
+    /// The subscriber's mailbox takes no value of this size.
+    TooLarge(SendError),
     /// The subscriber is gone.
     Gone,
 }
@@ -58,23 +64,27 @@ impl Subscriptions {
         face: usize,
         to: Name,
         priority: Priority,
-        wish: Subscribe,
+        mut wish: Subscribe,
         now_ns: u64,
     ) -> bool {
+        wish.period_us = if wish.period_us == 0 { 0 } else { wish.period_us.max(PERIOD_MIN_US) };
         let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms) * 1_000_000);
         let due_ns = if wish.period_us == 0 { 0 } else { now_ns };
         if let Some(known) = self.list.iter_mut().find(|s| s.to == to && s.wish.id == wish.id) {
             known.ends_ns = ends_ns;
             let changed = (known.wish.number, known.wish.period_us, known.face) != (wish.number, wish.period_us, face);
-            known.due_ns = if changed { due_ns } else { known.due_ns };
+            if changed {
+                // What was fresh was another's.
+                (known.due_ns, known.fresh, known.told) = (due_ns, false, false);
+            }
             (known.face, known.wish, known.priority) = (face, wish, priority);
             return true;
         }
         if self.list.len() >= SUBSCRIPTIONS_MAX {
             return false;
         }
-        let (sequence, missed, fresh) = (0, 0, false);
-        self.list.push(Subscription { face, wish, to, priority, sequence, missed, ends_ns, due_ns, fresh });
+        let (sequence, missed, fresh, told) = (0, 0, false, false);
+        self.list.push(Subscription { face, wish, to, priority, sequence, missed, ends_ns, due_ns, fresh, told });
         true
     }
 
@@ -150,7 +160,12 @@ impl Subscription {
     fn settle(&mut self, delivery: Delivery) -> bool {
         match delivery {
             Delivery::Sent => self.sequence = self.sequence.wrapping_add(1),
-            Delivery::Full => {
+            Delivery::Full | Delivery::TooLarge(_) => {
+                if let Delivery::TooLarge(error) = delivery
+                    && !std::mem::replace(&mut self.told, true)
+                {
+                    tracing::error!("data {} cannot be delivered: {error}", self.wish.number);
+                }
                 // The number is used up, so that the subscriber sees the gap.
                 self.sequence = self.sequence.wrapping_add(1);
                 self.missed = self.missed.saturating_add(1);
@@ -238,6 +253,43 @@ mod tests {
         assert_eq!(all.len(), 1);
         tick(&mut all, 2000 * MS);
         assert_eq!(all.len(), 0);
+    }
+
+    #[test]
+    fn no_period_is_too_short_to_live_with() {
+        let mut all = Subscriptions::default();
+        let hasty = Subscribe { period_us: 1, lease_ms: u32::MAX, ..wish(0) };
+        assert!(all.subscribe(0, Name::new(1, 9, 0, 2), Priority(9), hasty, 1));
+        let mut now_ns = 1;
+        for _ in 0..1000 {
+            tick(&mut all, now_ns);
+            let next_ns = all.next_ns().unwrap();
+            assert!(next_ns >= now_ns + 1000 * u64::from(PERIOD_MIN_US), "never due again at once");
+            now_ns = next_ns;
+        }
+    }
+
+    #[test]
+    fn nothing_is_due_that_was_ticked() {
+        // Whatever was slept through, what comes next lies in the future: else the loop would not sleep.
+        for (period_ms, late_ms) in [(1, 0), (1, 1), (7, 6), (7, 7), (7, 100), (999, 998), (0, 500)] {
+            let mut all = subscribed(period_ms);
+            let now_ns = 1 + late_ms * MS;
+            tick(&mut all, now_ns);
+            assert!(all.next_ns().is_none_or(|next_ns| next_ns > now_ns), "period {period_ms}, {late_ms} late");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_a_gap_and_keeps_the_subscription() {
+        let mut all = subscribed(0);
+        let too_large = || {
+            let name = Name::new(1, 9, 0, 2);
+            Delivery::TooLarge(SendError::TooLarge { name, len: 9, max: 8 })
+        };
+        publish(&mut all, too_large);
+        publish(&mut all, too_large);
+        assert_eq!((all.len(), all.list[0].sequence, all.missed(), all.list[0].told), (1, 2, 2, true));
     }
 
     #[test]

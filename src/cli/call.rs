@@ -4,7 +4,7 @@ use super::target::Target;
 use super::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::description::{Description, Function};
-use rohrpost::value::{Value, decode, describe_type, encode, parse_argument};
+use rohrpost::value::{Value, decode, describe_result, describe_type, encode, parse_argument};
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut tool = running.join(seconds(arguments.timeout)?)?;
     let result = answer(arguments, module, &mut tool);
     tool.close();
-    let (text, failed) = result?;
+    let (text, failed) = result.map_err(|error| running.told(module, &*error))?;
     say(text);
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
@@ -157,7 +157,7 @@ fn listing(description: &Description) -> String {
         text.push_str(&format!(
             "  {} -> {}\n      {}\n",
             usage(function),
-            describe_type(&function.result),
+            describe_result(&function.result),
             function.text
         ));
     }

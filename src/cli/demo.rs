@@ -12,11 +12,12 @@ use rohrpost::{Class, Name};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 const SIMULATION: &str = include_str!("../../config/demo.toml");
 const LOG: &str = include_str!("../../config/demo-log.toml");
 const BUILDING: &str = include_str!("../../config/building.map");
+const GUI: &str = "gui";
 /// After the end of a log, so long for the last packages to be mapped and drawn.
 const SETTLE: Duration = Duration::from_secs(2);
 /// Functions asked for in the summary; their numbers in the interfaces.
@@ -57,13 +58,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let file = configuration(arguments, folder.path())?;
     let installation = Arc::new(Installation::load(&file)?);
     let node = choose_node(&installation, None)?.name.clone();
+    let (drawing, begun) = (drawing(&installation), SystemTime::now());
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
     let outcome = watch(arguments, &mut launch);
     let summary = summary(&mut launch);
     let code = end(launch);
     outcome?;
     say(summary?.trim_end());
+    let is_new = |path: &PathBuf| path.metadata().and_then(|file| file.modified()).is_ok_and(|at| at >= begun);
+    if let Some(path) = drawing.filter(is_new) {
+        let path = path.canonicalize().unwrap_or(path);
+        let here = std::env::current_dir().unwrap_or_default();
+        let path = path.strip_prefix(here).unwrap_or(&path).display();
+        say(format_args!("drawing: {path} (to open it: rerun {path})"));
+    }
     Ok(code)
+}
+
+/// The file that the GUI will write, if it writes one.
+fn drawing(installation: &Installation) -> Option<PathBuf> {
+    let class = installation.classes.id(GUI)?;
+    let gui = installation.modules.iter().find(|module| module.name.class() == class)?;
+    let file = gui.settings.get("file").filter(|_| !gui.settings.contains_key("viewer"))?;
+    Some(installation.resolve(file.as_str()?))
 }
 
 /// Until the time is over, the log is over, or it is told to stop.
@@ -124,7 +141,7 @@ fn configuration(arguments: &Arguments, temporary: &Path) -> Result<PathBuf, Fai
 }
 
 fn is_gui(name: &str) -> bool {
-    name.split('.').next() == Some("gui")
+    name.split('.').next() == Some(GUI)
 }
 
 /// Paths that started from the file's folder must find their way from another one; then what the command line says.

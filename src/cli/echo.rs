@@ -44,21 +44,27 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let module = running.module(&arguments.name)?;
     let mut tool = running.join(PATIENCE)?;
+    let result = echo(arguments, module, &mut tool);
+    tool.close();
+    result.map(|()| ExitCode::SUCCESS).map_err(|error| running.told(module, &*error))
+}
+
+fn echo(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(), Failure> {
     let description = tool.describe(module)?;
-    let item = choose(&description, arguments.data.as_deref())?;
+    let item =
+        choose(&description, arguments.data.as_deref()).map_err(|error| format!("{}: {error}", arguments.name))?;
     let rate_us = if arguments.rate > 0.0 { (1e6 / arguments.rate) as u32 } else { 0 };
     let wish = Subscribe { number: item.number, id: 1, period_us: rate_us, lease_ms: LEASE.as_millis() as u32 };
-    let result = follow(arguments, module, &description, item, wish, &mut tool);
+    let result = follow(arguments, module, &description, item, wish, tool);
     // The module may have ended meanwhile; its lease would end anyway.
     let _ = tool.common::<()>(module, UNSUBSCRIBE, &(wish.id,));
-    tool.close();
-    result.map(|()| ExitCode::SUCCESS)
+    result
 }
 
 fn choose<'a>(description: &'a Description, name: Option<&str>) -> Result<&'a DataItem, Failure> {
     let names = || description.data.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", ");
     match (name, &description.data[..]) {
-        (_, []) => Err("it publishes no data".into()),
+        (_, []) => Err("publishes no data".into()),
         (None, [only]) => Ok(only),
         (None, _) => Err(format!("which data? it has: {}", names()).into()),
         (Some(name), _) => {

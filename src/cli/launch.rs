@@ -1,6 +1,6 @@
 //! `rohrpost launch`: the modules of a node, with a live table.
 
-use super::summary::{ModuleLine, module_lines, print_modules};
+use super::summary::{ModuleLine, module_lines, print_modules_live};
 use super::{Failure, say};
 use rohrpost::config::Installation;
 use rohrpost::launch::{Launch, choose_node, events};
@@ -60,6 +60,7 @@ fn say_all(notes: &[String]) {
 pub(super) struct View {
     /// Draw the table over and over in one place.
     live: bool,
+    begun: Instant,
     next: Instant,
     last: Option<Survey>,
     notes: Vec<String>,
@@ -71,7 +72,7 @@ const NOTES_MAX: usize = 8;
 impl View {
     pub(super) fn new(quiet: bool) -> Self {
         let live = !quiet && std::io::stdout().is_terminal();
-        Self { live, next: Instant::now(), last: None, notes: Vec::new() }
+        Self { live, begun: Instant::now(), next: Instant::now(), last: None, notes: Vec::new() }
     }
 
     /// How long to watch until the next drawing.
@@ -97,19 +98,21 @@ impl View {
         let lines = module_lines(launch.installation(), &survey, self.last.as_ref(), |name| {
             (launch.restarts(name), launch.phase(name).cloned())
         });
-        self.draw(&lines);
+        self.draw(&launch.installation().name, &lines);
         self.last = Some(survey);
         Ok(())
     }
 
-    fn draw(&mut self, lines: &[ModuleLine]) {
+    fn draw(&mut self, installation: &str, lines: &[ModuleLine]) {
         let excess = self.notes.len().saturating_sub(NOTES_MAX);
         self.notes.drain(..excess);
-        // Home, then each line cleared to its end, then all below: no flicker.
-        let text = format!("{}\n{}\n", print_modules(lines), self.notes.join("\n"));
+        let head = format!("{installation}, {} s. Ctrl-C stops it.", self.begun.elapsed().as_secs());
+        // Home, then each line cleared to its end, then all below: no flicker. Lines that are too long are cut off, not
+        // wrapped: else the table would be no table.
+        let text = format!("{head}\n\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
         let text = text.replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };
-        let _ = write!(std::io::stdout(), "{first}\x1b[H{text}\x1b[J");
+        let _ = write!(std::io::stdout(), "{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J");
         let _ = std::io::stdout().flush();
     }
 

@@ -59,9 +59,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     say(format_args!("node {} of {}\n", listing.node, listing.installation));
-    say(print_modules(&listing.modules));
+    say(print_modules(&listing.modules).trim_end());
     if arguments.mailboxes {
-        say(print_mailboxes(&listing.mailboxes));
+        say(format_args!("\n{}", print_mailboxes(&listing.mailboxes).trim_end()));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,5 +1,6 @@
 //! `rohrpost status`.
 
+use super::summary::is_left_out;
 use super::table::{table, time};
 use super::target::Target;
 use super::{Failure, say};
@@ -38,7 +39,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(name) => vec![running.module(name)?],
         None => {
             let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
-            survey.modules.iter().map(|module| module.name).collect()
+            let asked = survey.modules.iter().filter(|module| !is_left_out(module, &running.installation));
+            asked.map(|module| module.name).collect()
         }
     };
     let mut tool = running.join(super::call::seconds(arguments.timeout)?)?;
@@ -46,7 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     for name in names {
         let (status, failure) = match tool.status(name) {
             Ok(status) => (Some(status), None),
-            Err(error) => (None, Some(error.to_string())),
+            Err(error) => (None, Some(running.told(name, &error).to_string())),
         };
         lines.push(Line { module: running.text(name), status, failure });
     }

@@ -5,7 +5,7 @@ use rohrpost::Name;
 use rohrpost::config::Installation;
 use rohrpost::launch::Phase;
 use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, ParticipantInfo};
-use rohrpost::survey::Survey;
+use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
 
 /// A module, as the tables show it.
@@ -31,12 +31,12 @@ pub(super) fn module_lines(
     earlier: Option<&Survey>,
     launch: impl Fn(Name) -> (u32, Option<Phase>),
 ) -> Vec<ModuleLine> {
-    let line = |module: &rohrpost::survey::ModuleSurvey| {
+    let line = |module: &ModuleSurvey| {
         let (restarts, phase) = launch(module.name);
         ModuleLine {
             module: installation.classes.format(module.name),
             faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
-            state: state(module.process.as_ref(), phase.as_ref()),
+            state: state(module, phase.as_ref(), installation),
             priority: module.name.class().0,
             scheduling: scheduling(module.process.as_ref()),
             pid: module.process.as_ref().map(|process| process.pid),
@@ -60,38 +60,48 @@ fn scheduling(process: Option<&ParticipantInfo>) -> String {
     }
 }
 
-fn state(process: Option<&ParticipantInfo>, phase: Option<&Phase>) -> String {
-    match (process, phase) {
+fn state(module: &ModuleSurvey, phase: Option<&Phase>, installation: &Installation) -> String {
+    match (&module.process, phase) {
         (_, Some(Phase::Failed(_))) => "failed".into(),
         (_, Some(Phase::Ended)) => "ended".into(),
         (_, Some(Phase::Waiting)) => "waiting".into(),
         (Some(process), _) => process.state.map_or("-", ModuleState::name).into(),
+        (None, _) if is_left_out(module, installation) => "left out".into(),
         (None, _) => "dead".into(),
     }
 }
 
-/// Modules as a table.
+/// Whether a module does not run and need not: it is optional, and its program most likely not there.
+pub(super) fn is_left_out(module: &ModuleSurvey, installation: &Installation) -> bool {
+    module.process.is_none() && installation.module(module.name).is_some_and(|configured| configured.optional)
+}
+
+/// Modules as a table, one a line.
 pub(super) fn print_modules(lines: &[ModuleLine]) -> String {
+    modules_table(lines, " ", ">received", |line| line.received.to_string())
+}
+
+/// The same for a terminal of 80 columns: faces below their module, and rates.
+pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
+    modules_table(lines, "\n", ">in/s", |line| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}")))
+}
+
+fn modules_table(lines: &[ModuleLine], gap: &str, received: &str, of: impl Fn(&ModuleLine) -> String) -> String {
     let rows = lines.iter().map(|line| {
-        let mut module = line.module.clone();
-        for face in &line.faces {
-            module.push_str(&format!(" + {face}"));
-        }
+        let faces: Vec<String> = line.faces.iter().map(|face| format!("{gap}+ {face}")).collect();
         [
-            module,
+            line.module.clone() + &faces.concat(),
             line.state.clone(),
             line.priority.to_string(),
             line.scheduling.clone(),
             line.pid.map_or("-".into(), |pid| pid.to_string()),
-            line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}")),
-            line.received.to_string(),
+            of(line),
             line.waiting.to_string(),
             line.lost.to_string(),
             line.restarts.to_string(),
         ]
     });
-    let heads =
-        ["module", "state", ">priority", "scheduling", ">pid", ">in/s", ">received", ">waiting", ">lost", ">restarts"];
+    let heads = ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"];
     table(heads, rows)
 }
 

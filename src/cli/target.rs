@@ -78,6 +78,11 @@ impl Running {
         Ok(self.installation.classes.parse_name(text)?.module())
     }
 
+    /// An error about a module, with its name as users write it: the lower layers know numbers only.
+    pub(super) fn told(&self, module: Name, error: &dyn std::error::Error) -> Failure {
+        error.to_string().replace(&module.to_string(), &self.text(module)).into()
+    }
+
     /// A name as users write it.
     pub(super) fn text(&self, name: Name) -> String {
         self.installation.classes.format(name)

@@ -6,7 +6,7 @@ use syn::parse::{Parse, ParseStream};
 use syn::spanned::Spanned;
 use syn::{
     Attribute, Error, Expr, ExprLit, FnArg, GenericArgument, Ident, ItemTrait, Lit, LitInt, LitStr, Meta, Pat,
-    PathArguments, Result, ReturnType, Token, TraitItem, TraitItemFn, Type,
+    PathArguments, Result, ReturnType, Signature, Token, TraitItem, TraitItemFn, Type,
 };
 
 const ARGUMENTS_MAX: usize = 8;
@@ -74,7 +74,7 @@ struct Command {
 }
 
 struct Data {
-    number: u16,
+    number: LitInt,
     name: Ident,
     text: String,
     ty: Type,
@@ -93,13 +93,15 @@ pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<Token
             commands.push(command(number?, &function)?);
             kept.push(TraitItem::Fn(function));
         } else if let Some(number) = take_attribute(&mut function, "data") {
-            data.push(data_item(&number?, &function)?);
+            data.push(data_item(number?, &function)?);
         } else {
             return Err(Error::new(function.span(), "write #[command(16)] or #[data(1)] before it"));
         }
     }
     item.items = kept;
     distinct(commands.iter().map(|command| &command.number.number))?;
+    distinct(data.iter().map(|item| &item.number))?;
+    distinct_names(commands.iter().map(|command| &command.name).chain(data.iter().map(|item| &item.name)))?;
     let interface = interface(&item, &class, &krate, &commands, &data)?;
     let proxy = proxy(&item, &krate, &commands, &data);
     Ok(quote! { #item #interface #proxy })
@@ -120,6 +122,7 @@ fn command(number: Number, function: &TraitItemFn) -> Result<Command> {
         return Err(Error::new(body.span(), "functions of an interface have no body here; the module gives it"));
     }
     let signature = &function.sig;
+    plain(signature)?;
     let mut arguments = signature.inputs.iter();
     match arguments.next() {
         Some(FnArg::Receiver(receiver)) if receiver.mutability.is_some() && receiver.reference.is_some() => {}
@@ -131,9 +134,7 @@ fn command(number: Number, function: &TraitItemFn) -> Result<Command> {
         let Pat::Ident(name) = &*argument.pat else {
             return Err(Error::new(argument.pat.span(), "write a plain name"));
         };
-        if let Type::Reference(reference) = &*argument.ty {
-            return Err(Error::new(reference.span(), "arguments travel to another process; take an owned value"));
-        }
+        owned(&argument.ty, "arguments travel to another process; take an owned value")?;
         names.push(name.ident.clone());
         types.push((*argument.ty).clone());
     }
@@ -144,19 +145,43 @@ fn command(number: Number, function: &TraitItemFn) -> Result<Command> {
         ReturnType::Default => syn::parse_quote!(()),
         ReturnType::Type(_, ty) => (**ty).clone(),
     };
+    owned(&result, "results travel to another process; return an owned value")?;
     Ok(Command { number, name: signature.ident.clone(), text: text_of(&function.attrs), names, types, result })
 }
 
-fn data_item(number: &Number, function: &TraitItemFn) -> Result<Data> {
+/// Nothing that another process could not see or wait for.
+fn plain(signature: &Signature) -> Result<()> {
+    let generics = &signature.generics;
+    if !generics.params.is_empty() || generics.where_clause.is_some() {
+        return Err(Error::new(signature.ident.span(), "functions of an interface have no generics; write the types"));
+    }
+    match &signature.asyncness {
+        Some(word) => Err(Error::new(word.span(), "functions are not async; callers wait, or begin and wait later")),
+        None => Ok(()),
+    }
+}
+
+fn owned(ty: &Type, text: &str) -> Result<()> {
+    match ty {
+        Type::Reference(reference) => Err(Error::new(reference.span(), text)),
+        _ => Ok(()),
+    }
+}
+
+fn data_item(number: Number, function: &TraitItemFn) -> Result<Data> {
     let value: u16 = number.number.base10_parse()?;
+    if number.idempotent {
+        return Err(Error::new(number.number.span(), "data are not run; `idempotent` is for commands"));
+    }
     if value == 0 || value > 16384 {
         return Err(Error::new(number.number.span(), "data have numbers from 1 to 16384"));
     }
     let (true, ReturnType::Type(_, ty)) = (function.sig.inputs.is_empty(), &function.sig.output) else {
         return Err(Error::new(function.sig.span(), "data are declared as `fn name() -> Type;`"));
     };
+    owned(ty, "data travel to other processes; name an owned type")?;
     let text = text_of(&function.attrs);
-    Ok(Data { number: value, name: function.sig.ident.clone(), text, ty: (**ty).clone() })
+    Ok(Data { number: number.number, name: function.sig.ident.clone(), text, ty: (**ty).clone() })
 }
 
 fn distinct<'a>(numbers: impl Iterator<Item = &'a LitInt>) -> Result<()> {
@@ -167,6 +192,22 @@ fn distinct<'a>(numbers: impl Iterator<Item = &'a LitInt>) -> Result<()> {
             return Err(Error::new(number.span(), "this number is taken"));
         }
         seen.push(value);
+    }
+    Ok(())
+}
+
+/// A proxy has functions of all these names, and some of its own.
+fn distinct_names<'a>(names: impl Iterator<Item = &'a Ident>) -> Result<()> {
+    let mut seen = Vec::new();
+    for name in names {
+        let text = name.to_string();
+        if ["new", "with_timeout"].contains(&text.as_str()) {
+            return Err(Error::new(name.span(), format!("`{text}` is a function of every proxy; choose another name")));
+        }
+        if seen.contains(&text) {
+            return Err(Error::new(name.span(), "this name is taken: functions and data share one proxy"));
+        }
+        seen.push(text);
     }
     Ok(())
 }
@@ -219,11 +260,13 @@ fn interface(
         }
     });
     let arms = commands.iter().map(|command| {
-        let Command { number: Number { number, .. }, name, names, types, .. } = command;
+        let Command { number: Number { number, .. }, name, types, .. } = command;
+        // Not their own names: an argument may be called `reply`.
+        let values: Vec<Ident> = (0..types.len()).map(|n| format_ident!("__value{n}")).collect();
         quote! {
             #number => {
-                let (#(#names,)*): (#(#types,)*) = #krate::read_arguments(arguments)?;
-                #krate::write_result(reply, &module.#name(#(#names),*))
+                let (#(#values,)*): (#(#types,)*) = #krate::read_arguments(arguments)?;
+                #krate::write_result(reply, &module.#name(#(#values),*))
             }
         }
     });
@@ -345,3 +388,7 @@ fn proxy(item: &ItemTrait, krate: &TokenStream, commands: &[Command], data: &[Da
         }
     }
 }
+
+#[cfg(test)]
+#[path = "interface_tests.rs"]
+mod tests;

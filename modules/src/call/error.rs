@@ -33,8 +33,8 @@ pub enum Fault {
     /// The command was too old when its turn came. It was not run.
     #[error("the command was older than its validity when its turn came")]
     Expired,
-    /// Too many callers, or too many calls of one caller, are being remembered. It was not run.
-    #[error("the server remembers as many calls as it can; wait for earlier ones")]
+    /// Too many callers are being remembered, or there are too many subscriptions. It was not run.
+    #[error("the server has no room for more callers or subscriptions; try again later, or end some")]
     Busy,
     /// The module has no such data yet.
     #[error("no such data has been made yet")]
@@ -53,6 +53,9 @@ pub enum CallError<E = Infallible> {
     /// The command could not be sent, and was not run.
     #[error(transparent)]
     NotSent(#[from] SendError),
+    /// Too many calls to this module, or in all, are under way. The command was not sent.
+    #[error("too many calls to {0} are under way; wait for earlier ones, or give them up")]
+    TooMany(Name),
     /// The server did not run it.
     #[error("{0}: {1}")]
     Fault(Name, Fault),
@@ -73,6 +76,7 @@ impl CallError {
         match self {
             Self::Timeout(name, time) => CallError::Timeout(name, time),
             Self::NotSent(error) => CallError::NotSent(error),
+            Self::TooMany(name) => CallError::TooMany(name),
             Self::Fault(name, fault) => CallError::Fault(name, fault),
             Self::BadReply(name, text) => CallError::BadReply(name, text),
             Self::BadArguments(text) => CallError::BadArguments(text),

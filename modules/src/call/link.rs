@@ -10,6 +10,14 @@ use std::time::{Duration, Instant};
 
 /// A command whose answer does not come is sent again after this share of its time: three tries in all.
 const REPEATS: u32 = 3;
+/// Calls under way at a time, to all servers together.
+pub const CALLS_MAX: usize = 64;
+/// Envelopes tell no longer time; a longer timeout is cut to it, so that a command's age always is the truth.
+const TIMEOUT_MAX: Duration = Duration::from_micros(u32::MAX as u64);
+/// Ways into other mailboxes that are kept open; the first goes when there are more. A node has no more participants.
+const SENDERS_MAX: usize = 256;
+/// Answers taken in one go: a flood of them must not keep whoever waits from seeing its time go by.
+const BURST: usize = 64;
 
 /// A module's or tool's way to all others: sends packages, and matches replies to calls.
 pub struct Link {
@@ -36,6 +44,7 @@ struct Call {
     began: Instant,
     timeout: Duration,
     repeat_at: Instant,
+    repeated: bool,
     answer: Option<Head>,
 }
 
@@ -88,7 +97,11 @@ impl Link {
         let sender = match self.senders.iter().position(|sender| sender.name() == to) {
             Some(at) => &mut self.senders[at],
             None => {
-                self.senders.push(self.participant.sender(to)?);
+                let sender = self.participant.sender(to)?;
+                if self.senders.len() >= SENDERS_MAX {
+                    self.senders.remove(0);
+                }
+                self.senders.push(sender);
                 let last = self.senders.len() - 1;
                 &mut self.senders[last]
             }
@@ -104,7 +117,7 @@ impl Link {
     /// Sends a command and returns at once; [`Link::wait`] fetches the answer. `arguments` are postcard.
     ///
     /// # Errors
-    /// [`CallError::NotSent`], or [`CallError::Fault`] with `Busy` when too many calls are under way.
+    /// [`CallError::NotSent`], [`CallError::BadArguments`], or [`CallError::TooMany`] when too many calls are under way.
     pub fn begin(
         &mut self,
         to: Name,
@@ -113,9 +126,12 @@ impl Link {
         timeout: Duration,
         arguments: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
     ) -> Result<u32, CallError> {
-        if self.calls.len() >= REPLIES_KEPT {
-            return Err(CallError::Fault(self.me, Fault::Busy));
+        // Counted for each server: one that hangs must not keep us from calling others.
+        let there = self.calls.iter().filter(|call| call.to == to).count();
+        if there >= REPLIES_KEPT || self.calls.len() >= CALLS_MAX {
+            return Err(CallError::TooMany(to));
         }
+        let timeout = timeout.min(TIMEOUT_MAX);
         let sequence = self.next_sequence;
         self.next_sequence = self.next_sequence.wrapping_add(1);
         let mut body = self.spare.pop().unwrap_or_default();
@@ -128,11 +144,14 @@ impl Link {
         };
         body.clear();
         body.extend_from_slice(&envelope.to_bytes());
-        arguments(&mut body).map_err(|error| CallError::BadArguments(error.to_string()))?;
+        if let Err(error) = arguments(&mut body) {
+            self.spare.push(body);
+            return Err(CallError::BadArguments(error.to_string()));
+        }
         let began = Instant::now();
         let kind = Type::command(function);
-        let call =
-            Call { sequence, to, body, kind, began, timeout, repeat_at: began + timeout / REPEATS, answer: None };
+        let repeat_at = began + timeout / REPEATS;
+        let call = Call { sequence, to, body, kind, began, timeout, repeat_at, repeated: false, answer: None };
         match self.send(to, &self.label(kind, sequence), &[&call.body]) {
             Ok(()) => {
                 self.calls.push(call);
@@ -183,12 +202,18 @@ impl Link {
         }
     }
 
-    /// The outcome of a call without a result, if it is known by now; none while it is under way.
+    /// The outcome of a call without a result, if it is known by now; none while it is under way. Repeats the command when
+    /// it is time.
     pub fn poll(&mut self, sequence: u32) -> Option<Result<(), CallError>> {
         let at = self.calls.iter().position(|call| call.sequence == sequence)?;
-        let call = &self.calls[at];
-        let over = call.answer.is_some() || call.began.elapsed() >= call.timeout;
-        over.then(|| self.finish(at, |_| Ok(())))
+        let (call, now) = (&self.calls[at], Instant::now());
+        if call.answer.is_some() || now >= call.began + call.timeout {
+            return Some(self.finish(at, |_| Ok(())));
+        }
+        if now >= call.repeat_at {
+            self.repeat(at, now);
+        }
+        None
     }
 
     fn finish<T>(&mut self, at: usize, read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>) -> Result<T, CallError> {
@@ -215,15 +240,21 @@ impl Link {
     /// Moves the answers that have come to their calls. Answers to nobody (late, or to an earlier life) are dropped.
     pub fn collect(&mut self) {
         let incarnation = self.participant.incarnation();
-        while let Some(package) = self.replies.try_receive() {
+        for _ in 0..BURST {
+            let Some(package) = self.replies.try_receive() else { return };
+            let head = package.head();
             let Ok((envelope, result)) = ReplyEnvelope::split(package.body()) else { continue };
-            let mine = envelope.incarnation == incarnation;
-            let call = self.calls.iter_mut().find(|call| {
-                // The sequence number, not the 16-bit id, tells calls apart: ids wrap.
-                mine && call.sequence == envelope.sequence && call.to.module() == package.head().from.module()
-            });
-            if let Some(call) = call.filter(|call| call.answer.is_none()) {
-                call.answer = Some(*package.head());
+            // The sequence number, not the 16-bit id, tells calls apart: ids wrap.
+            let its = |call: &&mut Call| {
+                (call.sequence, call.to.module()) == (envelope.sequence, head.from.module())
+                    && head.kind.0 == -call.kind.0
+                    && call.answer.is_none()
+            };
+            let call = self.calls.iter_mut().find(its).filter(|_| envelope.incarnation == incarnation);
+            // One try that was refused says nothing of the others that are under way.
+            let refused = |call: &Call| call.repeated && head.options.has(Options::ERROR) && is_busy(result);
+            if let Some(call) = call.filter(|call| !refused(call)) {
+                call.answer = Some(*head);
                 call.body.clear();
                 call.body.extend_from_slice(result);
             }
@@ -233,6 +264,7 @@ impl Link {
     fn repeat(&mut self, at: usize, now: Instant) {
         let call = &mut self.calls[at];
         call.repeat_at = now + call.timeout / REPEATS;
+        call.repeated = true;
         // Age 0 means a first try, so a repeat is at least 1 µs old.
         let age_us = micros(now - call.began).max(1);
         call.body[CallEnvelope::BYTES - 4..CallEnvelope::BYTES].copy_from_slice(&age_us.to_le_bytes());
@@ -242,6 +274,10 @@ impl Link {
         let _ = self.send(to, &self.label(kind, sequence), &[&body]);
         self.calls[at].body = body;
     }
+}
+
+fn is_busy(fault: &[u8]) -> bool {
+    matches!(postcard::from_bytes(fault), Ok(Fault::Busy))
 }
 
 /// A call that was begun: [`Pending::wait`] for its result. Dropped, it is given up (the server may run it all the same).

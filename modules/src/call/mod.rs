@@ -10,5 +10,5 @@ mod once;
 pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope};
 pub use error::{CallError, Fault};
-pub use link::{Caller, Link, Pending};
-pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, Verdict};
+pub use link::{CALLS_MAX, Caller, Link, Pending};
+pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, TRANSIT_MAX, Verdict, WINDOW};

@@ -1,17 +1,30 @@
 //! At most once: decides whether a command runs, is answered from memory, or is refused. Knows no clock and no mailbox.
 //!
 //! A caller repeats a command whose answer does not come. What one incarnation of the server has run, it never runs again:
-//! it remembers the last [`REPLIES_KEPT`] answers of each caller and which sequence numbers they belong to. A server that was
-//! restarted remembers nothing; it can tell, though, that a command was first tried before its own start, and then says that
-//! the outcome is unknown, unless the function is idempotent.
+//! of each caller it remembers which of the last [`WINDOW`] numbers it has run, and the last [`REPLIES_KEPT`] answers. A
+//! server that was restarted remembers nothing; it can tell, though, that a command was first tried before its own start,
+//! and then says that the outcome is unknown, unless the function is idempotent.
+//!
+//! A command's age counts its wait with the caller and in the server's mailbox, but not its way in between. So whoever
+//! carries packages drops those that were under way for longer than [`TRANSIT_MAX`], and drops copies. One thing nobody can
+//! tell: a first try that is overtaken by its own repeat, and is on the wire while the server runs that repeat and is
+//! restarted, looks new to the next server.
 
 use super::Fault;
 use rohrpost_mailbox::Name;
+use std::time::Duration;
 
 /// Callers remembered at a time.
 pub const CALLERS_MAX: usize = 64;
-/// Answers remembered of each; a caller has at most so many calls under way.
+/// Answers remembered of each; a caller has at most so many calls under way to one server.
 pub const REPLIES_KEPT: usize = 8;
+/// Numbers of each caller of which it is known whether they were run. More than answers, since a caller counts all its
+/// calls, and those to others come in between.
+pub const WINDOW: u32 = u128::BITS;
+/// Longest time that a command is on its way between two nodes, uncounted by its age.
+pub const TRANSIT_MAX: Duration = Duration::from_secs(2);
+const TRANSIT_MAX_NS: u64 = TRANSIT_MAX.as_nanos() as u64;
+const _: () = assert!(WINDOW as usize > REPLIES_KEPT, "an answer that is kept belongs to a number that is known");
 
 /// A command as it came in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -52,11 +65,23 @@ struct Memory {
     incarnation: u32,
     /// Highest sequence number that was run.
     last: u32,
+    /// Which numbers were run: bit n is `last - n`.
+    run: u128,
     /// Answers, the latest at `next - 1`.
     answers: [Answer; REPLIES_KEPT],
     next: usize,
     /// No repeat can come after this, ns on the server's clock.
     until_ns: u64,
+}
+
+/// Where a command stands among those that are remembered of its caller.
+enum Place {
+    /// It was run.
+    WasRun,
+    /// It was not run by this server.
+    New,
+    /// Of an earlier life of the caller, or older than what is remembered.
+    Before,
 }
 
 #[derive(Default)]
@@ -83,22 +108,24 @@ impl Once {
     pub fn judge(&mut self, request: &Request, now_ns: u64) -> Verdict<'_> {
         let known = self.callers.iter().position(|caller| caller.from == request.from);
         if let Some(at) = known {
-            // Incarnations count upwards and may wrap.
-            let newer = request.incarnation.wrapping_sub(self.callers[at].incarnation) as i32;
-            if newer < 0 {
-                return Verdict::Ignore;
+            match self.callers[at].place(request) {
+                Place::WasRun => return self.callers[at].again(request.sequence),
+                Place::Before if now_ns <= self.callers[at].until_ns => return Verdict::Ignore,
+                // Nothing of what is remembered can be repeated any more: the caller's numbers have begun anew (its computer's
+                // clock was reset), or have gone half way round since it last called.
+                Place::Before | Place::New => {}
             }
-            if newer == 0 && self.callers[at].knows(request.sequence) {
-                return self.callers[at].again(request.sequence);
-            }
-        }
-        if request.age_ns > request.valid_for_ns {
-            return Verdict::Refuse(Fault::Expired);
         }
         // First tried before this server lived, or in the hands of one that died.
-        let before_us = request.repeat && request.age_ns > now_ns.saturating_sub(self.started_ns);
+        let oldest_ns = request.age_ns.saturating_add(TRANSIT_MAX_NS);
+        let before_us = request.repeat && oldest_ns > now_ns.saturating_sub(self.started_ns);
         if (before_us || request.redelivered) && !request.idempotent {
             return Verdict::Refuse(Fault::Interrupted);
+        }
+        if request.age_ns > request.valid_for_ns {
+            // To say `Expired` is to say that it was not run. Of a repeat that is unknown, and nobody waits for it any more.
+            let first = !request.repeat && !request.redelivered;
+            return if first { Verdict::Refuse(Fault::Expired) } else { Verdict::Ignore };
         }
         if known.is_none() && !self.make_room(now_ns) {
             return Verdict::Refuse(Fault::Busy);
@@ -115,20 +142,8 @@ impl Once {
                 self.callers.len() - 1
             }
         };
-        let memory = &mut self.callers[at];
-        if memory.incarnation != request.incarnation {
-            memory.begin(request);
-        }
-        let left_ns = request.valid_for_ns.saturating_sub(request.age_ns);
-        memory.until_ns = memory.until_ns.max(now_ns.saturating_add(left_ns));
-        let newer = request.sequence.wrapping_sub(memory.last) as i32 > 0;
-        memory.last = if newer { request.sequence } else { memory.last };
-        let answer = &mut memory.answers[memory.next];
-        memory.next = (memory.next + 1) % REPLIES_KEPT;
-        answer.sequence = Some(request.sequence);
-        answer.error = error;
-        answer.body.clear();
-        answer.body.extend_from_slice(body);
+        let left_ns = request.valid_for_ns.saturating_sub(request.age_ns).saturating_add(TRANSIT_MAX_NS);
+        self.callers[at].note(request, error, body, now_ns.saturating_add(left_ns));
     }
 
     /// Forgets a caller of whom no repeat can come any more, if there is no room for another. Never one of whom it can:
@@ -154,6 +169,7 @@ impl Memory {
             from: request.from,
             incarnation: request.incarnation,
             last: 0,
+            run: 0,
             answers: Default::default(),
             next: 0,
             until_ns: 0,
@@ -165,14 +181,45 @@ impl Memory {
     /// A new life of the same caller: its numbers begin anew.
     fn begin(&mut self, request: &Request) {
         self.incarnation = request.incarnation;
-        self.last = request.sequence.wrapping_sub(1);
+        self.last = request.sequence;
+        self.run = 0;
         self.answers.iter_mut().for_each(|answer| answer.sequence = None);
     }
 
-    /// Whether it was run, or is so old that it may have been.
-    fn knows(&self, sequence: u32) -> bool {
-        let behind = self.last.wrapping_sub(sequence) as i32;
-        behind >= REPLIES_KEPT as i32 || self.answers.iter().any(|answer| answer.sequence == Some(sequence))
+    /// Incarnations and numbers count upwards and wrap.
+    fn place(&self, request: &Request) -> Place {
+        match request.incarnation.wrapping_sub(self.incarnation) as i32 {
+            ..0 => return Place::Before,
+            1.. => return Place::New,
+            0 => {}
+        }
+        match self.last.wrapping_sub(request.sequence) as i32 {
+            ..0 => Place::New,
+            behind if behind as u32 >= WINDOW => Place::Before,
+            behind if self.run & 1 << behind != 0 => Place::WasRun,
+            _ => Place::New,
+        }
+    }
+
+    /// Remembers that a command was run.
+    fn note(&mut self, request: &Request, error: bool, body: &[u8], until_ns: u64) {
+        if request.incarnation != self.incarnation || matches!(self.place(request), Place::Before) {
+            self.begin(request);
+        }
+        self.until_ns = self.until_ns.max(until_ns);
+        match request.sequence.wrapping_sub(self.last) as i32 {
+            ahead @ 1.. => {
+                self.run = self.run.checked_shl(ahead as u32).unwrap_or(0) | 1;
+                self.last = request.sequence;
+            }
+            behind => self.run |= 1 << behind.unsigned_abs(),
+        }
+        let answer = &mut self.answers[self.next];
+        self.next = (self.next + 1) % REPLIES_KEPT;
+        answer.sequence = Some(request.sequence);
+        answer.error = error;
+        answer.body.clear();
+        answer.body.extend_from_slice(body);
     }
 
     fn again(&self, sequence: u32) -> Verdict<'_> {
@@ -183,3 +230,10 @@ impl Memory {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "once_simulation.rs"]
+mod simulation;
+#[cfg(test)]
+#[path = "once_tests.rs"]
+mod tests;

@@ -16,11 +16,12 @@ use std::time::{Duration, Instant};
 
 /// Longest pause before a restart.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
-/// So long, after a module has ended, for its last words to come through the pipe. A program that it started may hold the
-/// pipe open.
-const LAST_WORDS: Duration = Duration::from_millis(100);
 /// Lines of what a module printed that are kept to be told when it ends.
 const PRINTED_MAX: usize = 12;
+
+/// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes behind
+/// that hold its pipe.
+const PRINTED_WAIT: Duration = Duration::from_millis(100);
 
 /// Where launch stands with a module.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,7 +59,7 @@ pub(super) struct Child {
     restarts: u32,
     backoff: Duration,
     printed: Arc<Mutex<VecDeque<String>>>,
-    /// Fills `printed` until the pipe closes.
+    /// Reads what the process prints.
     reader: Option<JoinHandle<()>>,
 }
 
@@ -123,16 +124,20 @@ impl Child {
     pub(super) fn spawn(&mut self) {
         self.since = Instant::now();
         match self.try_spawn() {
-            Ok(process) => {
-                self.process = Some(process);
+            Ok((process, reader)) => {
+                (self.process, self.reader) = (Some(process), Some(reader));
                 self.phase = Phase::Starting;
             }
             Err(error) => self.phase = Phase::Failed(format!("{}: {error}", self.program.display())),
         }
     }
 
-    fn try_spawn(&mut self) -> io::Result<std::process::Child> {
+    fn try_spawn(&self) -> io::Result<(std::process::Child, JoinHandle<()>)> {
         let (reader, writer) = io::pipe()?;
+        let printed = self.printed.clone();
+        // First: a process without one would be a process that nobody watches.
+        let keep = move || keep_last(reader, &printed);
+        let reader = std::thread::Builder::new().name("printed".into()).spawn(keep)?;
         let process = Command::new(&self.program)
             .args(&self.arguments)
             .env(environment::CONFIG, &self.config)
@@ -144,10 +149,7 @@ impl Child {
             .stderr(writer)
             .process_group(0)
             .spawn()?;
-        let printed = self.printed.clone();
-        let reader = std::thread::Builder::new().name("printed".into()).spawn(move || keep_last(reader, &printed))?;
-        self.reader = Some(reader);
-        Ok(process)
+        Ok((process, reader))
     }
 
     /// Looks after it; what there is to say.
@@ -169,6 +171,8 @@ impl Child {
             Phase::Starting if now - self.since > self.ready_within => {
                 let within = self.ready_within;
                 self.kill(Signal::SIGKILL);
+                // For its end, and then as its policy has it.
+                self.phase = Phase::Waiting;
                 return Some(format!("{} was not ready within {within:?}; killed", self.text));
             }
             Phase::Waiting if self.process.is_none() && now >= self.since => self.spawn(),
@@ -222,10 +226,11 @@ impl Child {
     }
 
     fn take_printed(&mut self) -> String {
-        let deadline = Instant::now() + LAST_WORDS;
+        let deadline = Instant::now() + PRINTED_WAIT;
         while self.reader.as_ref().is_some_and(|reader| !reader.is_finished()) && Instant::now() < deadline {
             std::thread::sleep(Duration::from_millis(1));
         }
+        self.reader = None;
         let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
         printed.drain(..).map(|line| format!("\n    {line}")).collect()
     }

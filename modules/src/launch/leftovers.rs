@@ -1,42 +1,44 @@
 //! What an earlier launch left behind.
 
+use super::LaunchError;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost_config::Installation;
+use rohrpost_config::{Installation, Module};
 use rohrpost_mailbox::{Node, NodeError};
 use std::fs;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// A process that was killed ends within this time, or never (it waits for a broken disk, say).
+const KILL_TIME: Duration = Duration::from_secs(5);
+
 /// File in a node's directory that tells tools which configuration runs: its path, then the node's name.
 pub const CONFIG_FILE: &str = "config";
 
 /// Ends modules of this node that still live though no launch watches them, and removes mailboxes that nobody owns.
-pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str) -> Result<Vec<String>, NodeError> {
+pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str) -> Result<Vec<String>, LaunchError> {
     let ours = || {
-        let mine = |pid: u32| pid != std::process::id();
+        // Who joins or leaves just now has no number in the table; 0 would be our own process group.
+        let other = |pid: u32| pid != std::process::id() && pid != 0;
         let named = |name| installation.modules_on(node_name).any(|module| module.name == name);
-        node.participants().into_iter().filter(move |p| named(p.module) && mine(p.pid)).collect::<Vec<_>>()
+        node.participants().into_iter().filter(move |p| named(p.module) && other(p.pid)).collect::<Vec<_>>()
     };
     let mut notes = Vec::new();
     for participant in ours() {
         let name = installation.classes.format(participant.module);
         notes.push(format!("{name} (process {}) was left over from an earlier launch; ended", participant.pid));
-        let _ = kill(Pid::from_raw(participant.pid as i32), Signal::SIGTERM);
+        send(participant.pid, Signal::SIGTERM);
     }
     let patience = installation.modules_on(node_name).map(|module| module.stop_within).max().unwrap_or_default();
     let deadline = Instant::now() + patience;
-    let mut killed = false;
     loop {
         let left = ours();
-        if left.is_empty() {
-            break;
+        let Some(first) = left.first() else { break };
+        if Instant::now() >= deadline + KILL_TIME {
+            return Err(LaunchError::Leftover(installation.classes.format(first.module), first.pid));
         }
-        if Instant::now() >= deadline && !killed {
-            killed = true;
-            for participant in left {
-                let _ = kill(Pid::from_raw(participant.pid as i32), Signal::SIGKILL);
-            }
+        if Instant::now() >= deadline {
+            left.iter().for_each(|participant| send(participant.pid, Signal::SIGKILL));
         }
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -45,6 +47,22 @@ pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str
         node.remove_orphan(name)?;
     }
     Ok(notes)
+}
+
+fn send(pid: u32, signal: Signal) {
+    // What stands in shared memory is a claim: numbers that mean a group, or all, are nobody's.
+    if let Some(pid) = i32::try_from(pid).ok().filter(|pid| *pid > 1) {
+        // Gone already, or another user's: the loop sees whether it still lives.
+        let _ = kill(Pid::from_raw(pid), signal);
+    }
+}
+
+/// Removes the mailboxes of a module that is not started again: whoever sends there is told so, instead of filling them.
+pub(super) fn remove_mailboxes(node: &Node, module: &Module) -> Result<(), NodeError> {
+    for name in node.mailboxes()?.into_iter().filter(|name| module.names().any(|own| own == name.module())) {
+        node.remove_orphan(name)?;
+    }
+    Ok(())
 }
 
 /// Says in the node's directory which configuration runs.

@@ -20,7 +20,9 @@ use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
 use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as ConfiguredTime};
-use rohrpost_mailbox::{LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns};
+use rohrpost_mailbox::{
+    LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
+};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -28,6 +30,11 @@ use std::time::{Duration, Instant};
 
 /// Modules answer launch within this time.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// While a module starts it is looked after so often, and while it is switched on: an answer takes moments.
+const LOOK_STARTING: Duration = Duration::from_millis(5);
+const LOOK_SWITCHING: Duration = Duration::from_millis(1);
+/// Notes that are kept for who asks; the oldest go first.
+const NOTES_MAX: usize = 1000;
 
 /// Why a node could not be launched.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +54,9 @@ pub enum LaunchError {
     /// Programs that are not there.
     #[error("{0}")]
     Programs(String),
+    /// A module of an earlier launch.
+    #[error("module {0} of an earlier launch, process {1}, cannot be killed; end it by hand (is it another user's?)")]
+    Leftover(String, u32),
     /// A module that would not start.
     #[error("module {0} did not become ready: {1}")]
     NotReady(String, String),
@@ -66,6 +76,8 @@ pub struct Launch {
     node_name: String,
     node: Arc<Node>,
     children: Vec<Child>,
+    /// Of each child: the call that switches it on, while it is under way.
+    switching: Vec<Option<u32>>,
     tool: ToolLink,
     lock: LaunchLock,
     _time: TimeKeeper,
@@ -89,6 +101,7 @@ pub fn choose_node<'a>(installation: &'a Installation, name: Option<&str>) -> Re
 
 impl Launch {
     /// Makes the node and starts its modules one after the other, each when the one before is ready; then switches them on.
+    /// The collector of output is switched on as soon as it is ready.
     /// `executable` is the `rohrpost` command, which holds the built-in modules.
     ///
     /// # Errors
@@ -113,13 +126,15 @@ impl Launch {
         let time = begin_time(&node, &installation)?;
         leftovers::note_config(&node, &installation, node_name)?;
         let tool = ToolLink::join(&installation, &node, node_name, PATIENCE)?;
-        let children = installation
+        let children: Vec<Child> = installation
             .modules_on(node_name)
             .filter(|module| missing.iter().all(|program| program.module != module.name))
             .map(|module| Child::new(module, &installation, &executable))
             .collect();
         let node_name = node_name.to_owned();
-        let mut launch = Self { installation, node_name, node, children, tool, lock, _time: time, events, notes };
+        let switching = vec![None; children.len()];
+        let mut launch =
+            Self { installation, node_name, node, children, switching, tool, lock, _time: time, events, notes };
         match launch.start_all() {
             Ok(()) => Ok(launch),
             Err(error) => {
@@ -133,8 +148,9 @@ impl Launch {
         for index in 0..self.children.len() {
             self.children[index].spawn();
             loop {
-                let stop = matches!(self.events.recv_timeout(Duration::from_millis(5)), Ok(Event::Stop));
-                self.step(index);
+                let stop = matches!(self.events.recv_timeout(LOOK_STARTING), Ok(Event::Stop));
+                // Those that were started before may end meanwhile.
+                (0..=index).for_each(|index| self.step(index));
                 let child = &self.children[index];
                 match child.phase() {
                     Phase::Ready | Phase::Ended => break,
@@ -143,9 +159,21 @@ impl Launch {
                     _ => {}
                 }
             }
+            // At once: switched off, the collector would drop what the others say while they start.
+            if Some(self.children[index].name().class()) == self.installation.classes.id(crate::output::CLASS) {
+                self.switch_on(index);
+            }
         }
+        // One after the other, so that each finds those on that it needs.
         for index in 0..self.children.len() {
             self.switch_on(index);
+            while self.switching[index].is_some() {
+                if matches!(self.events.recv_timeout(LOOK_SWITCHING), Ok(Event::Stop)) {
+                    return Err(LaunchError::NotReady(self.children[index].text().into(), "told to stop".into()));
+                }
+                (0..self.children.len()).for_each(|index| self.step(index));
+                self.switch_on(index);
+            }
         }
         Ok(())
     }
@@ -153,27 +181,64 @@ impl Launch {
     /// Moves one module on.
     fn step(&mut self, index: usize) {
         let child = &mut self.children[index];
-        if let Some(note) = child.step(&self.node, Instant::now()) {
-            self.notes.push(note);
+        let over = |child: &Child| matches!(child.phase(), Phase::Ended | Phase::Failed(_));
+        let was_over = over(child);
+        let note = child.step(&self.node, Instant::now());
+        if !was_over && over(child) {
+            self.give_up(index);
+        }
+        self.note(note);
+    }
+
+    /// A module is not started again: its mailboxes go.
+    fn give_up(&mut self, index: usize) {
+        let Some(module) = self.installation.module(self.children[index].name()) else { return };
+        if let Err(error) = leftovers::remove_mailboxes(&self.node, module) {
+            self.note(Some(error.to_string()));
         }
     }
 
+    fn note(&mut self, note: Option<String>) {
+        self.notes.extend(note);
+        let excess = self.notes.len().saturating_sub(NOTES_MAX);
+        self.notes.drain(..excess);
+    }
+
+    /// Switches a module on that is ready, or looks how far that is. Never waits: one that hangs must not keep the others
+    /// from being watched.
     fn switch_on(&mut self, index: usize) {
         let child = &mut self.children[index];
+        let call = self.switching[index].take();
         if *child.phase() != Phase::Ready {
+            // It ended meanwhile.
+            call.into_iter().for_each(|call| self.tool.link.forget(call));
             return;
         }
-        if child.wants_on()
-            && let Err(error) = self.tool.switch(child.name(), true)
-        {
-            self.notes.push(format!("{} could not be switched on: {error}", child.text()));
-        }
+        let answer = match call {
+            None if !child.wants_on() => Some(Ok(())),
+            None => match self.tool.begin_switch(child.name(), true) {
+                Ok(call) => return self.switching[index] = Some(call),
+                Err(error) => Some(Err(error)),
+            },
+            Some(call) => {
+                self.tool.link.collect();
+                let answer = self.tool.link.poll(call);
+                self.switching[index] = answer.is_none().then_some(call);
+                answer
+            }
+        };
+        let Some(answer) = answer else { return };
         child.runs();
+        let note = answer.err().map(|error| format!("{} could not be switched on: {error}", child.text()));
+        self.note(note);
     }
 
     /// Watches for at most `period`, or until something happens; false when it is time to stop.
     pub fn watch(&mut self, period: Duration) -> bool {
-        let stop = match self.events.recv_timeout(period) {
+        let starting = self.children.iter().any(|child| matches!(child.phase(), Phase::Starting | Phase::Ready));
+        let look = if starting { LOOK_STARTING } else { Duration::MAX };
+        let look = if self.switching.iter().any(Option::is_some) { LOOK_SWITCHING } else { look };
+        let stop = match self.events.recv_timeout(period.min(look)) {
             Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => true,
             Ok(Event::Child) | Err(RecvTimeoutError::Timeout) => false,
         };
@@ -236,7 +301,7 @@ impl Launch {
         tool.close();
         drop(lock);
         match node.remove_if_dead() {
-            Ok(true) => {}
+            Ok(true) => remove_base_if_empty(),
             Ok(false) => notes.push(format!(
                 "somebody still uses {}; `rohrpost clean` removes it when they have ended",
                 node.path().display()

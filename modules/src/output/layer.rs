@@ -19,6 +19,8 @@ use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 const WAITING_MAX: usize = 256;
 /// How often a collector that was not there is looked for again.
 const RETRY: Duration = Duration::from_millis(200);
+/// How soon one that had no room is tried again.
+const RETRY_FULL: Duration = Duration::from_millis(20);
 
 static OUTPUT: OnceLock<Output> = OnceLock::new();
 
@@ -75,7 +77,8 @@ pub fn install(participant: &Arc<Participant>, installation: &Installation, me: 
         // Fails only if the program set one of its own; then that one has the lines.
         let _ = tracing::subscriber::set_global_default(subscriber);
         std::panic::set_hook(Box::new(|panic| {
-            tracing::error!("panicked: {panic}");
+            // Its own words are: panicked at FILE:LINE:COLUMN, and below them the reason.
+            tracing::error!("{panic}");
             drain();
         }));
     }
@@ -123,7 +126,7 @@ pub fn drain() {
 /// When to call [`drain`] again, if lines wait.
 pub fn retry_at() -> Option<Instant> {
     let output = OUTPUT.get().filter(|output| !output.waiting.is_empty())?;
-    Some(Instant::now() + RETRY.min(Duration::from_millis(20)).max(output.patience()))
+    Some(Instant::now() + RETRY_FULL.max(output.patience()))
 }
 
 impl Output {
@@ -133,10 +136,14 @@ impl Output {
         }
         let line = OutputLine { time_ns: self.clock.now().ns, module: self.me.raw(), level, lost: 0, text };
         if self.waiting.push(line).is_err() {
-            self.lost_now.fetch_add(1, Ordering::Relaxed);
-            self.lost.fetch_add(1, Ordering::Relaxed);
+            self.lose_one();
         }
         self.drain();
+    }
+
+    fn lose_one(&self) {
+        self.lost_now.fetch_add(1, Ordering::Relaxed);
+        self.lost.fetch_add(1, Ordering::Relaxed);
     }
 
     fn patience(&self) -> Duration {
@@ -148,7 +155,11 @@ impl Output {
 
     /// Whoever finds the way taken leaves its line to the one who has it: nobody waits.
     fn drain(&self) {
-        while !self.waiting.is_empty() {
+        // Bounded: a thread that says more and more must not keep this one at it.
+        for _ in 0..WAITING_MAX {
+            if self.waiting.is_empty() {
+                return;
+            }
             let mut way = match self.way.try_lock() {
                 Ok(way) => way,
                 Err(TryLockError::Poisoned(way)) => way.into_inner(),
@@ -157,10 +168,10 @@ impl Output {
             if !way.open(self.to) {
                 return;
             }
-            while let Some(line) = self.waiting.pop() {
-                if !self.send(&mut way, line) {
-                    return;
-                }
+            if let Some(line) = self.waiting.pop()
+                && !self.send(&mut way, line)
+            {
+                return;
             }
             // Released, then looked at again: a line that came while it was held has nobody else.
         }
@@ -183,14 +194,19 @@ impl Output {
             }
             Err(error) => {
                 self.lost_now.fetch_add(line.lost, Ordering::Relaxed);
-                if let SendError::NoMailbox(_) = error {
+                if let SendError::TooLarge { .. } = error {
+                    // It never will fit, and those behind it may.
+                    self.lose_one();
+                    return true;
+                }
+                let gone = matches!(error, SendError::NoMailbox(_));
+                if gone {
                     way.sender = None;
                 }
-                way.retry_at = Some(Instant::now() + RETRY);
+                way.retry_at = Some(Instant::now() + if gone { RETRY } else { RETRY_FULL });
                 // Back to the end of the queue: its time tells where it belongs.
                 if self.waiting.push(OutputLine { lost: 0, ..line }).is_err() {
-                    self.lost_now.fetch_add(1, Ordering::Relaxed);
-                    self.lost.fetch_add(1, Ordering::Relaxed);
+                    self.lose_one();
                 }
                 false
             }

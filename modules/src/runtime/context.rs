@@ -16,6 +16,10 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// Shorter ones leave no time for anything else; longer ones no clock can hold.
+const PERIOD_MIN: Duration = Duration::from_micros(10);
+const PERIOD_MAX: Duration = Duration::from_secs(86_400);
+
 /// Why a module cannot speak to another.
 #[derive(Debug, thiserror::Error)]
 pub enum ContextError {
@@ -106,9 +110,10 @@ impl Context {
         &self.clock
     }
 
-    /// Asks for [`crate::Module::tick`] once in this time, from now on.
+    /// Asks for [`crate::Module::tick`] once in this time, from now on; at least 10 µs, at most a day. Ticks that come too
+    /// late because the one before took too long are left out.
     pub fn set_period(&mut self, period: Duration) {
-        self.period = Some(period.max(Duration::from_micros(1)));
+        self.period = Some(period.clamp(PERIOD_MIN, PERIOD_MAX));
         self.next_tick = Some(Instant::now());
     }
 
@@ -209,7 +214,8 @@ impl Context {
         self.subscriptions.tick(now_ns, |to| {
             match all.iter().find(|newest| (newest.face, newest.number) == (to.face, to.wish.number)) {
                 Some(newest) => deliver(link, faces, newest, to),
-                None => Delivery::Full,
+                // Fresh, so there is one.
+                None => Delivery::Sent,
             }
         });
     }
@@ -228,12 +234,7 @@ fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::
     match link.borrow_mut().send(to.to, &label, &[&head.to_bytes(), &newest.value]) {
         Ok(()) => Delivery::Sent,
         Err(SendError::NoMailbox(_)) => Delivery::Gone,
-        Err(SendError::TooLarge { name, len, max }) => {
-            tracing::error!(
-                "data of {len} bytes do not fit mailbox {name} ({max}); raise `size` of its module's data mailbox"
-            );
-            Delivery::Full
-        }
+        Err(error @ SendError::TooLarge { .. }) => Delivery::TooLarge(error),
         Err(_) => Delivery::Full,
     }
 }

@@ -1,6 +1,6 @@
 //! One name under which a module's process is reached: its command mailbox, its interface, and what it has run.
 
-use crate::call::Once;
+use crate::call::{Fault, Once};
 use crate::description::Description;
 use crate::interface::{ServeFunction, Served};
 use rohrpost_mailbox::{Name, Receiver};
@@ -17,6 +17,8 @@ pub(crate) struct Face<M> {
 pub(crate) struct Offer<M> {
     /// Numbers of functions that may be run twice.
     pub(crate) idempotent: Vec<u16>,
+    /// Numbers of its data.
+    pub(crate) data: Vec<u16>,
     /// None: the module serves no interface under this name, only the common functions.
     pub(crate) serve: Option<ServeFunction<M>>,
     pub(crate) hash: u32,
@@ -32,10 +34,17 @@ impl<M> Face<M> {
         };
         let hash = description.hash();
         let idempotent = description.functions.iter().filter(|f| f.idempotent).map(|f| f.number).collect();
+        let data = description.data.iter().map(|item| item.number).collect();
         // Writing to a growing vector does not fail.
         let description = postcard::to_stdvec(&description).unwrap_or_default();
-        let offer = Offer { idempotent, serve, hash, description };
+        let offer = Offer { idempotent, data, serve, hash, description };
         Self { name, commands, once: Once::new(started_ns), offer }
+    }
+}
+
+impl<M> Offer<M> {
+    pub(crate) fn require_data(&self, number: u16) -> Result<(), Fault> {
+        if self.data.contains(&number) { Ok(()) } else { Err(Fault::Unknown(number)) }
     }
 }
 

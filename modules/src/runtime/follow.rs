@@ -11,6 +11,9 @@ use std::time::{Duration, Instant};
 const LEASE: Duration = Duration::from_secs(3);
 /// It is renewed three times in a lease; one that is refused or unanswered is asked for again sooner.
 const RENEW: Duration = Duration::from_secs(1);
+/// The answer to a renewal has come by then, or is not waited for: before the next renewal.
+const ANSWER: Duration = Duration::from_millis(600);
+const _: () = assert!(ANSWER.as_millis() < RENEW.as_millis() && RENEW.as_millis() * 2 < LEASE.as_millis());
 const RETRY: Duration = Duration::from_millis(100);
 
 /// How often a subscriber wants data.
@@ -25,7 +28,7 @@ pub enum Rate {
 impl Rate {
     /// At most so often a second; each value for 0.
     pub fn hz(hz: f64) -> Self {
-        if hz > 0.0 { Self::Every(Duration::from_secs_f64(1.0 / hz)) } else { Self::Each }
+        if hz > 0.0 { Self::Every(Duration::try_from_secs_f64(1.0 / hz).unwrap_or(Duration::MAX)) } else { Self::Each }
     }
 }
 
@@ -96,10 +99,14 @@ impl Followings {
                 followed.call = None;
                 followed.answered(answer, now);
             }
-            if followed.call.is_none() && followed.next <= now {
+            if followed.next <= now {
                 followed.next = now + RENEW;
+            } else {
+                continue;
+            }
+            if followed.call.is_none() {
                 let write = |body: &mut Vec<u8>| append(body, &followed.wish);
-                match link.begin(followed.from, SUBSCRIBE, followed.interface, RENEW, write) {
+                match link.begin(followed.from, SUBSCRIBE, followed.interface, ANSWER, write) {
                     Ok(call) => followed.call = Some(call),
                     Err(error) => followed.answered(Err(error), now),
                 }

@@ -14,6 +14,9 @@ use std::time::Duration;
 /// Packages of subscribed data that may wait for a tool.
 const DATA_SLOTS: u16 = 128;
 
+/// Longest description that is asked for, bytes.
+const DESCRIPTION_MAX: usize = 1 << 20;
+
 /// Why a tool cannot take part.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
@@ -119,6 +122,14 @@ impl ToolLink {
         self.common(module, if on { common::ON } else { common::OFF }, &())
     }
 
+    /// Begins to switch a module on or off, and returns at once; [`Link::poll`] tells how it went.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn begin_switch(&mut self, module: Name, on: bool) -> Result<u32, CallError> {
+        self.link.begin(module, if on { common::ON } else { common::OFF }, common::HASH, self.timeout, |_| Ok(()))
+    }
+
     /// Asks a module how it is.
     ///
     /// # Errors
@@ -143,6 +154,11 @@ impl ToolLink {
         let mut bytes = Vec::new();
         loop {
             let part: DescriptionPart = self.common(module, common::DESCRIBE, &(bytes.len() as u32,))?;
+            // What it says of itself is a claim.
+            if part.total as usize > DESCRIPTION_MAX {
+                let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
+                return Err(CallError::BadReply(module, text));
+            }
             let last = part.bytes.is_empty();
             bytes.extend_from_slice(&part.bytes);
             if bytes.len() >= part.total as usize || last {

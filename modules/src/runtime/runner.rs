@@ -10,13 +10,20 @@ use crate::interface::Interfaces;
 use crate::module::{Module, ModuleError};
 use crate::output;
 use rohrpost_mailbox::{Kind, ModuleState, Participant, Receiver, monotonic_ns, wait_any};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Packages handled between two looks at the clock: a flood of them must not keep ticks and renewals waiting.
+/// Packages of one mailbox handled before the others' turn, and the time after which no further one is begun: neither a
+/// flood nor slow handlers must keep ticks, renewals, other mailboxes and the end waiting.
 const BURST: usize = 32;
+const BURST_TIME: Duration = Duration::from_millis(2);
+/// A loop that has not slept for so long is made to, for this short time: the kernel ends a real-time process that works
+/// without pause (RLIMIT_RTTIME), and a flood, or a period too short for its work, is no reason to be ended.
+const AWAKE_MAX: Duration = Duration::from_millis(250);
+const PAUSE: Duration = Duration::from_micros(50);
 
 /// Runs a module until it is told to end; the whole of a module's `main`.
 ///
@@ -40,8 +47,14 @@ pub fn run<M: Module>() -> ExitCode {
 /// See [`StartError`].
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
     let mut running = start.join::<M>()?;
-    running.turn_on_if_wanted();
-    running.go();
+    let worked = catch_unwind(AssertUnwindSafe(|| {
+        running.turn_on_if_wanted();
+        running.go();
+    }));
+    if let Err(panic) = worked {
+        running.panicked(&*panic);
+        std::panic::resume_unwind(panic);
+    }
     running.end();
     Ok(())
 }
@@ -61,6 +74,16 @@ impl<M: Module> Life<M> {
             Self { module, participant, state: ModuleState::Starting, error: String::new(), started: Instant::now() };
         life.enter(ModuleState::Off);
         life
+    }
+
+    /// What a handler left half done is not to be trusted; but what it drives must be made safe.
+    fn panicked(&mut self, text: &str, context: &mut Context) {
+        self.error = format!("panicked: {text}");
+        self.enter(ModuleState::Error);
+        // Whatever its state: it may have panicked half way on.
+        if catch_unwind(AssertUnwindSafe(|| self.module.off(context))).is_err() {
+            tracing::error!("panicked again on the way to its safe state");
+        }
     }
 
     fn enter(&mut self, state: ModuleState) {
@@ -139,11 +162,14 @@ pub(crate) struct Running<M> {
     pub(crate) turn_on: bool,
     /// Nobody else removes its mailboxes.
     pub(crate) by_hand: bool,
+    /// Empty; kept for its memory, so that going to sleep allocates nothing.
+    pub(crate) receivers: Vec<&'static mut Receiver>,
 }
 
 impl<M: Module> Running<M> {
     fn turn_on_if_wanted(&mut self) {
-        if self.turn_on {
+        // It may have been told to end while it was being made.
+        if self.turn_on && !self.stop.load(Ordering::Acquire) {
             // A failure is in the module's state and output.
             let _ = self.life.turn_on(&mut self.context);
         }
@@ -151,25 +177,39 @@ impl<M: Module> Running<M> {
 
     fn go(&mut self) {
         let mut server = Server::new();
+        let mut awake_since = Instant::now();
         while !self.stop.load(Ordering::Acquire) {
             let mut busy = self.commands(&mut server);
             busy |= self.take_data();
             self.periodic();
             output::drain();
+            let before = Instant::now();
             if !busy {
                 self.sleep();
+            }
+            if before.elapsed() >= PAUSE {
+                awake_since = Instant::now();
+            } else if awake_since.elapsed() >= AWAKE_MAX {
+                std::thread::sleep(PAUSE);
+                awake_since = Instant::now();
             }
         }
     }
 
+    /// A handler panicked; the process is about to end, and launch to start it again.
+    fn panicked(&mut self, panic: &(dyn std::any::Any + Send)) {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told");
+        self.life.panicked(text, &mut self.context);
+        output::drain();
+    }
+
     fn commands(&mut self, server: &mut Server) -> bool {
-        let mut handled = 0;
+        let mut any = false;
         for (index, face) in self.faces.iter_mut().enumerate() {
-            while handled < BURST && server.handle(face, index, &mut self.life, &mut self.context) {
-                handled += 1;
-            }
+            any |= burst(|| server.handle(face, index, &mut self.life, &mut self.context));
         }
-        handled > 0
+        any
     }
 
     /// Hands out what came to the data mailbox and to the module's own; while the module is off it is dropped.
@@ -214,12 +254,13 @@ impl<M: Module> Running<M> {
         let output = output::retry_at();
         let deadline = [tick, renewal, delivery, output].into_iter().flatten().min();
         let mut link = self.context.link.borrow_mut();
-        let mut receivers: Vec<&mut Receiver> = Vec::with_capacity(self.faces.len() + self.context.own.len() + 2);
+        let mut receivers = empty(std::mem::take(&mut self.receivers));
         receivers.extend(self.faces.iter_mut().map(|face| &mut face.commands));
         receivers.push(&mut self.data);
         receivers.extend(&mut self.context.own);
         receivers.push(link.replies());
         wait_any(&mut receivers, deadline, || self.stop.load(Ordering::Acquire));
+        self.receivers = empty(receivers);
     }
 
     fn end(mut self) {
@@ -233,6 +274,8 @@ impl<M: Module> Running<M> {
         if !self.by_hand {
             return;
         }
+        // With it go its proxies, which hold the link.
+        drop(self.life);
         let commands = self.faces.into_iter().map(|face| face.commands);
         for mailbox in commands.chain([self.data]).chain(self.context.own) {
             mailbox.close();
@@ -246,12 +289,12 @@ impl<M: Module> Running<M> {
 /// Hands out a burst of packages of one mailbox; false when there was none.
 fn take<M: Module>(mailbox: &mut Receiver, life: &mut Life<M>, context: &mut Context) -> bool {
     let local = mailbox.name().local();
-    for handled in 0..BURST {
-        let Some(package) = mailbox.try_receive() else { return handled > 0 };
+    burst(|| {
+        let Some(package) = mailbox.try_receive() else { return false };
         let head = package.head();
         let (Kind::Data(number), Some((data, value))) = (head.kind.kind(), DataHead::split(package.body())) else {
             tracing::warn!("{} sent {} a package that is no data ({:?})", head.from, head.to, head.kind.kind());
-            continue;
+            return true;
         };
         if local == rohrpost_mailbox::local::DATA {
             context.followings.note(head.from, head.id, &data);
@@ -261,8 +304,29 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Life<M>, context: &mut Con
             let result = life.module.received(context, &received);
             life.check(result, context);
         }
+        true
+    })
+}
+
+/// Does one thing after the other until there is none, or it is others' turn; false when there was none.
+fn burst(mut handle: impl FnMut() -> bool) -> bool {
+    let began = Instant::now();
+    for handled in 0..BURST {
+        if !handle() {
+            return handled > 0;
+        }
+        if began.elapsed() >= BURST_TIME {
+            break;
+        }
     }
     true
+}
+
+/// The same memory without what was in it, for things that live for another time. Collecting in place is how the standard
+/// library does this; were it not, it would allocate, and `tests/hot_path.rs` would tell.
+fn empty<'a>(mut receivers: Vec<&mut Receiver>) -> Vec<&'a mut Receiver> {
+    receivers.clear();
+    receivers.into_iter().map(|_| -> &'a mut Receiver { unreachable!("it is empty") }).collect()
 }
 
 /// What a module serves, in the order of its faces.

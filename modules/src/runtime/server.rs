@@ -153,9 +153,10 @@ impl Call<'_> {
                 Ok(())
             }
             common::STATUS => write_result(reply, &life.status(context)),
-            common::GET_DATA => self.get_data(context, reply),
+            common::GET_DATA => self.get_data(offer, context, reply),
             common::SUBSCRIBE => {
                 let (wish,): (Subscribe,) = read_arguments(self.arguments)?;
+                offer.require_data(wish.number)?;
                 let to = self.head.from.with_local(local::DATA);
                 let now_ns = monotonic_ns();
                 let room = context.subscriptions.subscribe(self.index, to, self.head.priority, wish, now_ns);
@@ -181,8 +182,9 @@ impl Call<'_> {
         }
     }
 
-    fn get_data(&self, context: &Context, reply: &mut Vec<u8>) -> Result<(), Fault> {
+    fn get_data<M>(&self, offer: &Offer<M>, context: &Context, reply: &mut Vec<u8>) -> Result<(), Fault> {
         let (number,): (u16,) = read_arguments(self.arguments)?;
+        offer.require_data(number)?;
         let is_it = |newest: &&crate::publish::Newest| (newest.face, newest.number) == (self.index, number);
         let newest = context.newest.iter().find(is_it).ok_or(Fault::NothingYet)?;
         // A tuple of the time and the value: in postcard just the one after the other.

@@ -19,6 +19,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+/// For a process that is ended by force to say so.
+const LAST_WORDS: Duration = Duration::from_millis(20);
+
 /// Environment by which launch tells a module what it is.
 pub(crate) mod environment {
     pub(crate) const CONFIG: &str = "ROHRPOST_CONFIG";
@@ -135,7 +138,6 @@ impl Start {
         let stop = stop_on_signals(&participant, module.stop_within)?;
         output::install(&participant, &installation, self.name, self.launcher.is_some());
         schedule(installation.scheduling(self.name.class()));
-        let started_ns = monotonic_ns();
         let mut served = served::<M>();
         let mut faces = Vec::new();
         for name in module.names() {
@@ -145,6 +147,8 @@ impl Start {
                 return Err(StartError::Face(installation.classes.format(name), text, class));
             }
             let commands = participant.receiver(name.with_local(local::COMMANDS), shape(&module.mailboxes.commands))?;
+            // Whoever had this mailbox before has ended by now, and ran nothing after this.
+            let started_ns = monotonic_ns();
             faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)), started_ns));
         }
         let data = participant.receiver(self.name.with_local(local::DATA), shape(&module.mailboxes.data))?;
@@ -157,7 +161,8 @@ impl Start {
         let made = M::new(settings, &mut context).map_err(|error| StartError::Module(text, error.to_string()))?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
-        Ok(Running { life: Life::new(made, participant), faces, data, context, stop, turn_on, by_hand })
+        let life = Life::new(made, participant);
+        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, receivers: Vec::new() })
     }
 }
 
@@ -196,7 +201,10 @@ fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<A
             flag.store(true, Ordering::Release);
             participant.ring();
             std::thread::sleep(within);
-            output::print(&format_args!("does not stop within {within:?}; ended"));
+            // Whoever hangs may hang while it prints; then nobody else can, and the end must not wait for that.
+            let say = move || output::print(&format_args!("does not stop within {within:?}; ended"));
+            let _ = std::thread::Builder::new().spawn(say);
+            std::thread::sleep(LAST_WORDS);
             std::process::exit(1);
         }
     };

@@ -31,7 +31,7 @@ pub use decode::decode;
 pub use encode::encode;
 pub use error::{WalkError, WalkProblem};
 pub use show::{LIST_SHOWN, Shown, numbers};
-pub use types::{describe_type, is_word};
+pub use types::{describe_result, describe_type, is_word};
 
 use postcard_schema::Schema;
 use postcard_schema::schema::owned::OwnedNamedType;

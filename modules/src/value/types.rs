@@ -5,6 +5,29 @@ use postcard_schema::schema::owned::{
     OwnedDataModelType as Ty, OwnedDataModelVariant as VariantTy, OwnedNamedType, OwnedNamedValue, OwnedNamedVariant,
 };
 
+/// What a function returns, as people read it: its value, or its own error; `ok` where there is no value.
+///
+/// ```
+/// use rohrpost_modules::value::{Data, describe_result};
+/// assert_eq!(describe_result(&<Result<(), u8>>::schema()), "ok, or error u8");
+/// assert_eq!(describe_result(&f64::schema()), "f64");
+/// ```
+pub fn describe_result(ty: &OwnedNamedType) -> String {
+    let value = |ty: &OwnedNamedType| if is_empty(ty, 0) { "ok".to_owned() } else { describe_type(ty) };
+    match &ty.ty {
+        Ty::Enum(variants) if ty.name.starts_with("Result<") => {
+            let inner = variants.iter().map(|variant| match &variant.ty {
+                VariantTy::NewtypeVariant(inner) => value(inner),
+                // So postcard-schema describes the two variants of a `Result`.
+                VariantTy::TupleVariant(inner) if inner.len() == 1 => value(&inner[0]),
+                _ => "ok".to_owned(),
+            });
+            inner.collect::<Vec<_>>().join(", or error ")
+        }
+        _ => value(ty),
+    }
+}
+
 /// Whether one word names any value of this type: a number, a bool, text, a character, or an enum whose variants
 /// carry nothing. Maps with such keys are [`Value::Map`](super::Value::Map)s.
 ///

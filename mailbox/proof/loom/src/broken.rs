@@ -1,0 +1,497 @@
+//! The models' names, and the variants of the slot core that must fail in one of them.
+
+/// Each model and the bound on its preemptions: how often loom may take the processor from a thread that could go on.
+pub(crate) const MODELS: &[(&str, usize)] = &[
+    ("a_body_is_handed_over_whole", 3),
+    ("everything_arrives_once_and_in_order", 2),
+    ("a_second_package_never_passes_the_first", 3),
+    ("publishing_gives_the_order", 3),
+    ("the_more_important_goes_first", 2),
+    ("who_is_displaced_is_counted_and_not_received", 2),
+    ("displacing_keeps_the_order", 2),
+    ("who_outranks_all_is_not_refused", 3),
+    ("two_displace_two", 3),
+    ("no_wake_up_is_lost", 3),
+    ("no_wake_up_is_lost_between_two", 2),
+    ("no_wake_up_is_lost_when_displaced", 2),
+    ("a_retired_mailbox_keeps_nothing", 3),
+    ("a_retired_mailbox_keeps_nothing_of_the_dead", 2),
+    ("a_retired_mailbox_counts_the_displaced", 3),
+    ("a_replaced_mailbox_hides_no_loss", 3),
+    ("a_sender_dies_with_a_claim", 2),
+    ("a_sender_dies_with_a_ticket", 2),
+    ("a_sender_dies_without_its_hint", 2),
+    ("a_sender_dies_after_its_hint", 2),
+    ("a_displacer_dies", 2),
+    ("a_package_without_hint_is_found_in_turn", 3),
+    ("a_package_in_dead_hands_is_delivered_once_more", 2),
+];
+
+/// A change of the real source. `from` must be there exactly once, so that a variant cannot rot unseen.
+pub(crate) struct Edit {
+    pub(crate) file: &'static str,
+    pub(crate) from: &'static str,
+    pub(crate) to: &'static str,
+}
+
+const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
+    Edit { file, from, to }
+}
+
+/// A mistake that one could make.
+pub(crate) struct Broken {
+    pub(crate) name: &'static str,
+    pub(crate) edits: &'static [Edit],
+    /// The model that fails.
+    pub(crate) caught_by: &'static str,
+    /// What the failure says.
+    pub(crate) says: &'static str,
+}
+
+/// Two threads touch a body, and nothing orders them.
+const RACE: &str = "Causality violation";
+/// A promise was not kept.
+const WRONG: &str = "assertion";
+/// The receiver sleeps for ever: nobody will ring.
+const ENDLESS: &str = "maximum number of branches";
+
+const FENCE_E: &str = "of a sender and a new owner likewise.\n        fence(Ordering::SeqCst);\n";
+const NO_FENCE_E: &str = "of a sender and a new owner likewise.\n";
+
+pub(crate) const BROKEN: &[Broken] = &[
+    // ---- the word hands the body over: (A) to (D) ----
+    // The important sender's write of the body races with that of the unimportant one, which it displaces.
+    Broken {
+        name: "publish_without_release",
+        edits: &[edit(
+            "slots",
+            "if !self.change(slot, claim.word, word) {",
+            "if self.word(slot).compare_exchange(claim.word.0, word.0, Ordering::Acquire, Ordering::Relaxed).is_err() {",
+        )],
+        caught_by: "who_is_displaced_is_counted_and_not_received",
+        says: RACE,
+    },
+    // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All four must
+    // go for a race on the body: the hint's Acquire or the ticket counter's, which are there for other reasons, hands
+    // the body over as well as the word's.
+    Broken {
+        name: "receiver_without_acquire",
+        edits: &[
+            edit(
+                "slots",
+                "self.change(slot, seen, word).then_some",
+                "self.word(slot).compare_exchange(seen.0, word.0, Ordering::Release, Ordering::Relaxed).is_ok().then_some",
+            ),
+            edit(
+                "slots",
+                "Word(self.word(slot).load(Ordering::Acquire))",
+                "Word(self.word(slot).load(Ordering::Relaxed))",
+            ),
+            edit("queue", "ticket.load(Ordering::Acquire)", "ticket.load(Ordering::Relaxed)"),
+            edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)"),
+        ],
+        caught_by: "a_body_is_handed_over_whole",
+        says: WRONG,
+    },
+    // The sender's next write of the body races with the receiver's read.
+    Broken {
+        name: "release_without_release",
+        edits: &[edit(
+            "slots",
+            "let freed = self.change(taken.slot, taken.word, FREE);",
+            "let freed = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, Ordering::Relaxed).is_ok();",
+        )],
+        caught_by: "a_body_is_handed_over_whole",
+        says: RACE,
+    },
+    // The same race, seen from the other side.
+    Broken {
+        name: "claim_without_acquire",
+        edits: &[edit(
+            "slots",
+            "&& self.change(slot, FREE, word) {",
+            "&& self.word(slot).compare_exchange(FREE.0, word.0, Ordering::Release, Ordering::Relaxed).is_ok() {",
+        )],
+        caught_by: "a_body_is_handed_over_whole",
+        says: RACE,
+    },
+    // Two senders have one slot.
+    Broken {
+        name: "claim_without_compare",
+        edits: &[edit(
+            "slots",
+            "&& self.change(slot, FREE, word) {",
+            "&& { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
+        )],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // ---- hints ----
+    // The receiver swaps the hint, finds the slot still Filling, and never looks again.
+    Broken {
+        name: "hint_before_word",
+        edits: &[
+            edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
+            edit(
+                "slots",
+                "        let word = Word::ready(priority, ticket);\n",
+                "        let word = Word::ready(priority, ticket);\n        self.hint(slot);\n",
+            ),
+        ],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // The same, by reordering: the hint is seen before the word it speaks of.
+    Broken {
+        name: "hint_without_release",
+        edits: &[edit(
+            "slots",
+            "fetch_or(1 << (slot % 64), Ordering::Release)",
+            "fetch_or(1 << (slot % 64), Ordering::Relaxed)",
+        )],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // And from the receiver's side.
+    Broken {
+        name: "hint_without_acquire",
+        edits: &[edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)")],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // A hint set between the look at its word and the swap is wiped out.
+    Broken {
+        name: "hints_cleared_after_the_look",
+        edits: &[
+            edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.load(Ordering::Acquire)"),
+            edit(
+                "queue",
+                "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            }\n",
+                "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            }\n            if fresh != 0 { hints.swap(0, Ordering::AcqRel); }\n",
+            ),
+        ],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // ---- order ----
+    // The receiver looks at slot 0, which is free; then both packages are published; then it sees the second in slot 1.
+    Broken {
+        name: "no_horizon",
+        edits: &[edit("queue", "if word.ticket() < horizon {", "if word.ticket() < u64::MAX {")],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+    // The counter is read, but not what was published before: slot 0 looks free still.
+    Broken {
+        name: "horizon_without_acquire",
+        edits: &[edit("queue", "ticket.load(Ordering::Acquire)", "ticket.load(Ordering::Relaxed)")],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+    // The same from the other side. Only without fence (E): it stands between a sender's hint and its next ticket.
+    Broken {
+        name: "ticket_without_release",
+        edits: &[
+            edit("slots", "ticket.fetch_add(1, Ordering::AcqRel)", "ticket.fetch_add(1, Ordering::Acquire)"),
+            edit("slots", FENCE_E, NO_FENCE_E),
+        ],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+    // A deferred slot must be looked at again though its hint is gone.
+    Broken {
+        name: "too_young_is_forgotten",
+        edits: &[edit("queue", "else { self.defer(slot) }", "else { }")],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // Claimed first, published second: the order would be that of claiming, and T no longer a horizon.
+    Broken {
+        name: "ticket_at_claim",
+        edits: &[
+            edit(
+                "slots",
+                "    pub(crate) slot: usize,\n    word: Word,\n",
+                "    pub(crate) slot: usize,\n    word: Word,\n    ticket: u64,\n",
+            ),
+            edit(
+                "slots",
+                "return Ok(Claim { slot, word });",
+                "return Ok(Claim { slot, word, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
+            ),
+            edit(
+                "slots",
+                "return Some(Claim { slot, word });",
+                "return Some(Claim { slot, word, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
+            ),
+            edit("slots", "let ticket = self.hot.ticket.fetch_add(1, Ordering::AcqRel);", "let ticket = claim.ticket;"),
+        ],
+        caught_by: "publishing_gives_the_order",
+        says: WRONG,
+    },
+    // The rank without the priority.
+    Broken {
+        name: "first_come_first_served",
+        edits: &[edit(
+            "word",
+            "(self.priority().0 as u64) << LOST | (TICKET - self.ticket())",
+            "TICKET - self.ticket()",
+        )],
+        caught_by: "the_more_important_goes_first",
+        says: WRONG,
+    },
+    // ---- displacing ----
+    // The receiver has taken the package meanwhile: it is received and counted as lost.
+    Broken {
+        name: "displace_without_compare",
+        edits: &[edit(
+            "slots",
+            "if self.change(slot, last, word) {",
+            "if { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
+        )],
+        caught_by: "who_is_displaced_is_counted_and_not_received",
+        says: WRONG,
+    },
+    // The receiver's entry is stale: it takes whatever lies in the slot, here a package still being written.
+    Broken {
+        name: "take_without_compare",
+        edits: &[edit(
+            "slots",
+            "self.change(slot, seen, word).then_some",
+            "{ self.word(slot).swap(word.0, Ordering::AcqRel); true }.then_some",
+        )],
+        caught_by: "who_is_displaced_is_counted_and_not_received",
+        says: RACE,
+    },
+    // The receiver takes the last package that could be displaced, and the mailbox is empty: still it is called full.
+    Broken {
+        name: "displace_overlooks_freed_slots",
+        edits: &[edit("slots", "*word == FREE || word.is_ready()", "word.is_ready()")],
+        caught_by: "who_outranks_all_is_not_refused",
+        says: WRONG,
+    },
+    // The loss shows nowhere.
+    Broken {
+        name: "displaced_not_counted",
+        edits: &[edit("slots", "(last != FREE).then(|| last.priority())", "None")],
+        caught_by: "two_displace_two",
+        says: WRONG,
+    },
+    // ---- sleeping ----
+    // Neither sees the other: the sender reads the old `sleeping`, the receiver the old hints.
+    Broken {
+        name: "no_fence_e",
+        edits: &[edit("slots", FENCE_E, NO_FENCE_E)],
+        caught_by: "no_wake_up_is_lost",
+        says: ENDLESS,
+    },
+    Broken {
+        name: "no_fence_f",
+        edits: &[edit(
+            "slots",
+            "Pairs with (E).\n        fence(Ordering::SeqCst);\n    }\n\n    /// Says that the receiver does not sleep.",
+            "Pairs with (E).\n    }\n\n    /// Says that the receiver does not sleep.",
+        )],
+        caught_by: "no_wake_up_is_lost",
+        says: ENDLESS,
+    },
+    // Rung after the last look, the receiver sleeps on the rung bell.
+    Broken {
+        name: "bell_read_after_the_last_look",
+        edits: &[
+            edit("rig", "        let seen = self.mailbox.bell.load(Ordering::Acquire);\n", ""),
+            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(self.mailbox.bell.load(Ordering::Acquire));"),
+        ],
+        caught_by: "no_wake_up_is_lost",
+        says: ENDLESS,
+    },
+    // Published after the last look and before it says that it sleeps.
+    Broken {
+        name: "drowsy_after_the_last_look",
+        edits: &[
+            edit("rig", "        slots.drowsy();\n", ""),
+            edit("rig", "self.mailbox.sleep(seen);", "slots.drowsy();\n            self.mailbox.sleep(seen);"),
+        ],
+        caught_by: "no_wake_up_is_lost",
+        says: ENDLESS,
+    },
+    // The bell before the word `sleeping` is looked at: the receiver sleeps again between ring and clearing, and the
+    // other sender sees it awake.
+    Broken {
+        name: "the_waker_clears_sleeping",
+        edits: &[edit(
+            "rig",
+            "                    self.mailbox.ring();\n",
+            "                    self.mailbox.ring();\n                    slots.awake();\n",
+        )],
+        caught_by: "no_wake_up_is_lost_between_two",
+        says: ENDLESS,
+    },
+    // ---- giving up ----
+    // Neither sees the other: an accepted package stays in a mailbox that nobody receives from.
+    Broken {
+        name: "no_fence_e_at_retirement",
+        edits: &[edit("slots", FENCE_E, NO_FENCE_E)],
+        caught_by: "a_retired_mailbox_keeps_nothing",
+        says: WRONG,
+    },
+    Broken {
+        name: "no_fence_g",
+        edits: &[edit(
+            "slots",
+            "last look at the words. Pairs with (E).\n        fence(Ordering::SeqCst);\n",
+            "last look at the words. Pairs with (E).\n",
+        )],
+        caught_by: "a_retired_mailbox_keeps_nothing",
+        says: WRONG,
+    },
+    // What a sender displaced, and has not counted yet when the counters are carried over.
+    Broken {
+        name: "settles_nothing",
+        edits: &[edit(
+            "slots",
+            "lost(priority);\n                step!(\"settle: counted\");",
+            "step!(\"settle: counted\");",
+        )],
+        caught_by: "a_replaced_mailbox_hides_no_loss",
+        says: "hidden",
+    },
+    // Retired between claim and publishing.
+    Broken {
+        name: "retirement_seen_only_at_claim",
+        edits: &[edit("slots", "if self.is_retired() && self.change(slot, word, claim.word) {", "if false {")],
+        caught_by: "a_retired_mailbox_keeps_nothing",
+        says: WRONG,
+    },
+    // Found by the owner and sent anew elsewhere: twice.
+    Broken {
+        name: "taken_back_without_compare",
+        edits: &[edit(
+            "slots",
+            "if self.is_retired() && self.change(slot, word, claim.word) {",
+            "if self.is_retired() && { self.word(slot).swap(claim.word.0, Ordering::AcqRel); true } {",
+        )],
+        caught_by: "a_retired_mailbox_keeps_nothing",
+        says: WRONG,
+    },
+    // ---- deaths ----
+    // The slot is given to another while its filler still writes.
+    Broken {
+        name: "reclaims_the_living",
+        edits: &[edit("slots", "if dead(by) {", "if dead(by) || true {")],
+        caught_by: "a_sender_dies_with_a_claim",
+        says: WRONG,
+    },
+    // A slot less with every death.
+    Broken {
+        name: "reclaims_nothing",
+        edits: &[edit("slots", "freed += usize::from(self.change(slot, word, FREE));", "freed += 0;")],
+        caught_by: "a_sender_dies_with_a_ticket",
+        says: WRONG,
+    },
+    // An accepted package is gone, and no counter knows.
+    Broken {
+        name: "reclaim_forgets_the_displaced",
+        edits: &[edit("slots", "displaced.into_iter().for_each(&mut lost);", "let _ = (displaced, &mut lost);")],
+        caught_by: "a_displacer_dies",
+        says: WRONG,
+    },
+    // Who died between word and hint has told nobody.
+    Broken {
+        name: "rescan_looks_nowhere",
+        edits: &[edit("queue", "(0..slots.count()).for_each(|slot| self.defer(slot));", "let _ = slots;")],
+        caught_by: "a_sender_dies_without_its_hint",
+        says: WRONG,
+    },
+    // The same, when no death was noticed.
+    Broken {
+        name: "no_look_in_turn",
+        edits: &[edit("queue", "if self.receives.is_multiple_of(RESCAN_EVERY) {", "if false {")],
+        caught_by: "a_package_without_hint_is_found_in_turn",
+        says: WRONG,
+    },
+    // The package that a dead receiver had in hand stays there for ever.
+    Broken {
+        name: "adoption_leaves_taken",
+        edits: &[edit(
+            "slots",
+            "            if word.state() != State::Taken {\n                continue;",
+            "            if true {\n                continue;",
+        )],
+        caught_by: "a_package_in_dead_hands_is_delivered_once_more",
+        says: WRONG,
+    },
+    // A package that kills its receiver kills each of its successors.
+    Broken {
+        name: "redelivery_unmarked",
+        edits: &[edit("word", "READY << STATE | REDELIVERED)", "READY << STATE)")],
+        caught_by: "a_package_in_dead_hands_is_delivered_once_more",
+        says: WRONG,
+    },
+];
+
+/// Lines of the mailbox that the models write again, in the order in which they must stand there.
+pub(crate) struct Mirrored {
+    pub(crate) file: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) lines: &'static [&'static str],
+}
+
+pub(crate) const MIRRORED: &[Mirrored] = &[
+    Mirrored {
+        file: "receiver",
+        what: "models::Receiver::wait does the same, change both",
+        lines: &[
+            "pub fn wait_any(",
+            "let seen = bell.load(Ordering::Acquire);",
+            ".drowsy());",
+            ".may_have())",
+            "doorbell::sleep(bell, seen,",
+            ".awake());",
+        ],
+    },
+    Mirrored {
+        file: "receiver",
+        what: "models::a_retired_mailbox_keeps_nothing does the same, change both",
+        lines: &[
+            "pub fn close(",
+            "slots.retire();",
+            "self.queue.rescan(&slots);",
+            "self.queue.take(&slots)",
+            "slots.release(taken);",
+        ],
+    },
+    Mirrored {
+        file: "receiver",
+        what: "models::Receiver::search does the same, change both",
+        lines: &["fn search(", "slots.reclaim(", "self.queue.rescan(&slots);"],
+    },
+    Mirrored {
+        file: "registry",
+        what: "models::a_retired_mailbox_keeps_nothing does the same, change both",
+        lines: &[
+            "fn retire(",
+            "slots.retire();",
+            "slots.adopt(",
+            "queue.rescan(&slots);",
+            "queue.take(&slots)",
+            "slots.release(taken);",
+        ],
+    },
+    Mirrored {
+        file: "sender",
+        what: "models::Sender::send does the same, change both",
+        lines: &[
+            "fn publish(",
+            "self.count_displaced(&claim);",
+            ".publish(claim, label.priority)",
+            "if wake {",
+            "self.wake();",
+        ],
+    },
+    Mirrored {
+        file: "doorbell",
+        what: "models::Mailbox::ring does the same, change both",
+        lines: &["fn ring(", "bell.fetch_add(1, Ordering::Release);", "FUTEX_WAKE"],
+    },
+];

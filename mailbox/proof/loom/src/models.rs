@@ -1,0 +1,342 @@
+//! The models. Each is one small program, run by loom in every order of its threads' steps and with every stale value
+//! that a load may read. This file is compiled beside the real slot core and beside each broken one.
+
+use crate::name::Priority;
+use crate::rig::{Mailbox, Sent, of_first, sorted};
+use crate::slots::{Full, Published};
+use crate::step::{dies_at, reached};
+use crate::sync::Ordering;
+use loom::thread;
+
+// ---- sending and receiving ----
+
+/// One slot, used again and again: the body goes from sender to receiver and the slot back, without a race.
+pub(crate) fn a_body_is_handed_over_whole() {
+    let mailbox = Mailbox::new(1);
+    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let mut receiver = mailbox.receiver();
+    let mut received = receiver.take_times(2);
+    let accepted = sender.join().unwrap();
+    received.extend(receiver.drain());
+    assert_eq!(received, accepted);
+    assert!(mailbox.all_free());
+}
+
+/// Two senders, enough slots: everything arrives, once, and each sender's packages in its order.
+pub(crate) fn everything_arrives_once_and_in_order() {
+    let mailbox = Mailbox::new(3);
+    let twice = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let once = mailbox.send_from(2, Full::Reject, &[(10, 3)]);
+    let mut receiver = mailbox.receiver();
+    let mut received = receiver.take_times(1);
+    assert_eq!((twice.join().unwrap(), once.join().unwrap()), (vec![1, 2], vec![3]));
+    received.extend(receiver.drain());
+    assert_eq!(of_first(&received), [1, 2]);
+    assert_eq!(sorted(received), [1, 2, 3]);
+}
+
+/// The receiver looks at slots that it was not told of, and meets the second package before it could see the first.
+pub(crate) fn a_second_package_never_passes_the_first() {
+    let mailbox = Mailbox::new(2);
+    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let mut receiver = mailbox.receiver();
+    receiver.search();
+    let mut received = receiver.take_times(1);
+    assert_eq!(sender.join().unwrap(), [1, 2]);
+    received.extend(receiver.drain());
+    assert_eq!(received, [1, 2]);
+}
+
+/// Two claims of one sender, published the other way round: the order is that of publishing.
+pub(crate) fn publishing_gives_the_order() {
+    let mailbox = Mailbox::new(2);
+    let slots = mailbox.slots();
+    let mut sender = mailbox.sender(1, Full::Reject);
+    let claims = [1, 2].map(|_| slots.claim(sender.by, &mut sender.cursor, Priority(10), Full::Reject).unwrap());
+    for (claim, body) in claims.into_iter().rev().zip([1, 2]) {
+        // SAFETY: the claim is ours.
+        mailbox.bodies[claim.slot].with_mut(|cell| unsafe { *cell = body });
+        assert_eq!(slots.publish(claim, Priority(10)), Published::Accepted { wake: false });
+    }
+    assert_eq!(mailbox.receiver().drain(), [1, 2]);
+}
+
+/// Of what waits, the more important goes first, also before what the receiver has seen long ago.
+pub(crate) fn the_more_important_goes_first() {
+    let mailbox = Mailbox::new(3);
+    let low = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let high = mailbox.send_from(2, Full::Reject, &[(20, 3)]);
+    let mut receiver = mailbox.receiver();
+    let first = receiver.take();
+    low.join().unwrap();
+    high.join().unwrap();
+    let rest = receiver.drain();
+    let expected: &[u8] = match first {
+        None => &[3, 1, 2],
+        Some(1) => &[3, 2],
+        Some(3) => &[1, 2],
+        other => panic!("{other:?} came first"),
+    };
+    assert_eq!(rest, expected);
+}
+
+// ---- full mailboxes ----
+
+/// One slot, wanted by an unimportant sender, an important one and the receiver.
+pub(crate) fn who_is_displaced_is_counted_and_not_received() {
+    let mailbox = Mailbox::new(1);
+    let low = mailbox.send_from(1, Full::Displace, &[(10, 10)]);
+    let high = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let mut receiver = mailbox.receiver();
+    let mut seen = receiver.take_times(1);
+    let accepted = [low.join().unwrap(), high.join().unwrap()].concat();
+    seen.extend(receiver.drain());
+    seen.extend(mailbox.displaced());
+    assert_eq!(sorted(seen), accepted, "received or displaced, never both, never neither");
+    assert!(mailbox.all_free());
+}
+
+/// Slots change their packages while the receiver has them in its heap: what is left still comes in order.
+pub(crate) fn displacing_keeps_the_order() {
+    let mailbox = Mailbox::new(2);
+    mailbox.sender(1, Full::Reject).send(10, 1);
+    let low = mailbox.send_from(1, Full::Reject, &[(10, 2)]);
+    let high = mailbox.send_from(2, Full::Displace, &[(20, 3)]);
+    let mut receiver = mailbox.receiver();
+    let mut received = receiver.take_times(1);
+    let accepted = 1 + low.join().unwrap().len() + high.join().unwrap().len();
+    received.extend(receiver.drain());
+    assert!(of_first(&received).is_sorted());
+    assert_eq!(received.len() + mailbox.displaced().len(), accepted);
+    assert!(mailbox.all_free());
+}
+
+/// Two slots, both full, a receiver that empties them, and one sender who outranks all: there is always room for it.
+pub(crate) fn who_outranks_all_is_not_refused() {
+    let mailbox = Mailbox::new(2);
+    mailbox.sender(1, Full::Displace).send_all(&[(10, 10), (11, 11)]);
+    let high = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let mut receiver = mailbox.receiver();
+    let mut seen = receiver.take_times(2);
+    assert_eq!(high.join().unwrap(), [20]);
+    seen.extend(receiver.drain());
+    seen.extend(mailbox.displaced());
+    assert_eq!(sorted(seen), [10, 11, 20]);
+    assert!(mailbox.all_free());
+}
+
+/// Two slots, both full: the newest of the least important gives way, once for each that is more important.
+pub(crate) fn two_displace_two() {
+    let mailbox = Mailbox::new(2);
+    mailbox.sender(1, Full::Displace).send_all(&[(10, 10), (11, 11)]);
+    let one = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let other = mailbox.send_from(3, Full::Displace, &[(21, 21)]);
+    let accepted = [vec![10, 11], one.join().unwrap(), other.join().unwrap()].concat();
+    assert_eq!(accepted, [10, 11, 20, 21]);
+    let mut seen = mailbox.receiver().drain();
+    assert_eq!(seen, [21, 20]);
+    seen.extend(mailbox.displaced());
+    assert_eq!(sorted(seen), accepted, "received or displaced, never both, never neither");
+    assert!(mailbox.all_free());
+}
+
+// ---- sleeping ----
+
+/// A receiver that sleeps whenever there is nothing gets everything. No assertion: a lost wake-up never ends.
+pub(crate) fn no_wake_up_is_lost() {
+    let mailbox = Mailbox::new(2);
+    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let mut receiver = mailbox.receiver();
+    assert_eq!([receiver.receive(), receiver.receive()], [Some(1), Some(2)]);
+    sender.join().unwrap();
+}
+
+/// The same with two senders: the wake-up for one is none for the other.
+pub(crate) fn no_wake_up_is_lost_between_two() {
+    let mailbox = Mailbox::new(2);
+    let one = mailbox.send_from(1, Full::Reject, &[(10, 1)]);
+    let other = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let mut receiver = mailbox.receiver();
+    assert_eq!(sorted([receiver.receive(), receiver.receive()].into_iter().flatten().collect()), [1, 2]);
+    one.join().unwrap();
+    other.join().unwrap();
+}
+
+/// The package for which the receiver would wake is displaced: that which took its place wakes it. So does, without any
+/// package, whoever has other work for the receiver; here the sender that was refused.
+pub(crate) fn no_wake_up_is_lost_when_displaced() {
+    let mailbox = Mailbox::new(1);
+    let low = mailbox.send_from(1, Full::Displace, &[(10, 10)]);
+    let high = mailbox.clone();
+    let high = thread::spawn(move || {
+        if high.sender(2, Full::Displace).send(20, 20) != Sent::Accepted {
+            high.other.store(1, Ordering::Relaxed);
+            high.ring();
+        }
+    });
+    let mut receiver = mailbox.receiver();
+    while receiver.receive() == Some(10) {}
+    low.join().unwrap();
+    high.join().unwrap();
+}
+
+// ---- giving up ----
+
+/// The owner gives the mailbox up while somebody sends: what was accepted is in its last look, what was not is back in
+/// its sender's hands.
+pub(crate) fn a_retired_mailbox_keeps_nothing() {
+    let mailbox = Mailbox::new(2);
+    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.retire();
+    owner.queue.rescan(&slots);
+    let found = owner.drain();
+    assert_eq!(found, sender.join().unwrap(), "the last look finds what was accepted, and nothing else");
+    assert!(mailbox.all_free());
+}
+
+/// As above; the owner before had died with a package in hand.
+pub(crate) fn a_retired_mailbox_keeps_nothing_of_the_dead() {
+    let mailbox = Mailbox::new(2);
+    mailbox.sender(1, Full::Reject).send(20, 1);
+    assert!(dies_at("take: taken", || _ = mailbox.receiver().take()));
+    let sender = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.retire();
+    slots.adopt(|_| unreachable!("it is handed out for the second time only"));
+    owner.queue.rescan(&slots);
+    let found = owner.drain();
+    assert_eq!(found, [vec![1], sender.join().unwrap()].concat());
+    assert!(mailbox.all_free());
+}
+
+/// As above, with a displacement on the way: the victim was accepted, so its loss is counted, also if the package that
+/// displaced it goes elsewhere.
+pub(crate) fn a_retired_mailbox_counts_the_displaced() {
+    let mailbox = Mailbox::new(1);
+    mailbox.sender(1, Full::Displace).send(10, 10);
+    let sender = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.retire();
+    owner.queue.rescan(&slots);
+    let mut seen = owner.drain();
+    let accepted = [vec![10], sender.join().unwrap()].concat();
+    seen.extend(mailbox.displaced());
+    assert_eq!(sorted(seen), accepted);
+    assert!(mailbox.all_free());
+}
+
+/// The same, when the counters go on elsewhere: what is counted by the time the owner has settled is all that anyone will
+/// ever see of this mailbox, so the victim must be in hand or counted by then.
+pub(crate) fn a_replaced_mailbox_hides_no_loss() {
+    let mailbox = Mailbox::new(1);
+    mailbox.sender(1, Full::Displace).send(10, 10);
+    let sender = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.retire();
+    owner.queue.rescan(&slots);
+    let mut seen = owner.drain();
+    slots.settle(|priority| seen.push(priority.0));
+    seen.extend(mailbox.displaced());
+    sender.join().unwrap();
+    assert!(seen.contains(&10), "hidden");
+}
+
+// ---- deaths ----
+
+/// A sender dies at `step`; another sends and the receiver searches meanwhile. The dead one's package arrives if it was
+/// a package, its slot is usable again, and the other one notices nothing.
+fn a_sender_dies(step: &'static str, arrives: bool) {
+    let mailbox = Mailbox::new(2);
+    let dead = mailbox.dies_sending(1, step, &(10, 1));
+    let living = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let mut receiver = mailbox.receiver();
+    receiver.search();
+    let mut received = receiver.take_times(1);
+    assert!(dead.join().unwrap(), "{step}");
+    assert_eq!(living.join().unwrap(), [2]);
+    receiver.search();
+    received.extend(receiver.drain());
+    assert_eq!(sorted(received), if arrives { vec![1, 2] } else { vec![2] });
+    assert!(mailbox.all_free());
+}
+
+pub(crate) fn a_sender_dies_with_a_claim() {
+    a_sender_dies("claim: claimed", false);
+}
+
+pub(crate) fn a_sender_dies_with_a_ticket() {
+    a_sender_dies("publish: ticket", false);
+}
+
+pub(crate) fn a_sender_dies_without_its_hint() {
+    a_sender_dies("publish: ready", true);
+}
+
+pub(crate) fn a_sender_dies_after_its_hint() {
+    a_sender_dies("publish: hint", true);
+}
+
+/// The dead one had displaced a package: the loss is counted, by whoever frees the slot if not by the dead.
+///
+/// At least once: who dies between counting and publishing has counted it, and whoever frees the slot cannot know.
+pub(crate) fn a_displacer_dies() {
+    let mailbox = Mailbox::new(1);
+    mailbox.sender(3, Full::Displace).send(10, 10);
+    let dead = mailbox.dies_sending(1, "displace: claimed", &(20, 20));
+    let living = mailbox.send_from(2, Full::Displace, &[(15, 15)]);
+    let mut receiver = mailbox.receiver();
+    let mut seen = receiver.take_times(1);
+    receiver.search();
+    let died = dead.join().unwrap();
+    let mut accepted = [vec![10], living.join().unwrap()].concat();
+    receiver.search();
+    seen.extend(receiver.drain());
+    seen.extend(mailbox.displaced());
+    // Not reached when the receiver was quicker: then the slot was free and nobody had to give way.
+    accepted.extend((!died && seen.contains(&20)).then_some(20));
+    assert_eq!(sorted(seen), accepted);
+    assert!(mailbox.all_free());
+}
+
+/// Every slot is looked at without a hint after so many receives, deaths or not.
+pub(crate) fn a_package_without_hint_is_found_in_turn() {
+    let mailbox = Mailbox::new(2);
+    assert!(dies_at("publish: ready", || {
+        mailbox.sender(1, Full::Reject).send(10, 1);
+    }));
+    let living = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let mut receiver = mailbox.receiver();
+    let mut received = receiver.take_times(1);
+    living.join().unwrap();
+    received.extend(receiver.take_times(2 * 16));
+    assert_eq!(sorted(received), [1, 2]);
+}
+
+/// A receiver dies with a package in hand, its successor too, while somebody sends: the package is handed out twice,
+/// the second time marked, then it is poison. The other package arrives once.
+pub(crate) fn a_package_in_dead_hands_is_delivered_once_more() {
+    let mailbox = Mailbox::new(2);
+    mailbox.sender(1, Full::Reject).send(20, 1);
+    assert!(dies_at("take: taken", || _ = mailbox.receiver().take()));
+    let sender = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.adopt(|_| unreachable!("it is handed out for the second time only"));
+    owner.search();
+    assert!(dies_at("take: taken", || _ = owner.take()));
+    let in_hand = slots.load(0);
+    assert_eq!((in_hand.priority(), in_hand.is_redelivered()), (Priority(20), true));
+    let mut poisoned = Vec::new();
+    let mut owner = mailbox.receiver();
+    slots.adopt(|priority| poisoned.push(priority.0));
+    owner.search();
+    assert_eq!(poisoned, [20]);
+    sender.join().unwrap();
+    assert_eq!(owner.drain(), [2]);
+    assert!(mailbox.all_free());
+}

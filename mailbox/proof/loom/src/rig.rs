@@ -1,0 +1,236 @@
+//! What the models are made of: a small mailbox around the real slot core, its senders and its receiver.
+//!
+//! What is around the core in the mailbox (`Sender`, `Receiver`, `wait_any`, the bell) maps memory and sleeps, so it is
+//! written here again, small; `build.rs` fails when the lines that matter are no longer there in this order.
+
+use crate::name::Priority;
+use crate::queue::Queue;
+use crate::slots::{Full, HINT_WORDS, Hot, NoSlot, Published, Slots};
+use crate::step::{dies_at, reached};
+use crate::sync::{AtomicU32, AtomicU64, Ordering};
+use crate::word::{Claimant, FREE, Word};
+use loom::cell::UnsafeCell;
+use loom::thread::{self, JoinHandle};
+use std::sync::{Arc, Mutex};
+
+/// A mailbox whose bodies are one number each, watched by loom for races.
+pub(super) struct Mailbox {
+    pub(super) hot: Hot,
+    pub(super) words: Vec<AtomicU64>,
+    pub(super) bodies: Vec<UnsafeCell<u8>>,
+    pub(super) bell: AtomicU32,
+    /// Not 0: the receiver has something else to do. Whoever says so rings.
+    pub(super) other: AtomicU32,
+    /// One bit for each dead participant.
+    pub(super) dead: AtomicU32,
+    /// Priorities counted as displaced. Not loom's, so that counting adds no order to the model.
+    pub(super) displaced: Mutex<Vec<u8>>,
+}
+
+// SAFETY: the bodies are the only part that is not Sync by itself, and loom reports every race on them.
+unsafe impl Sync for Mailbox {}
+
+impl Mailbox {
+    pub(super) fn new(slots: usize) -> Arc<Self> {
+        reached("mailbox: new");
+        let hot = Hot {
+            ticket: AtomicU64::new(0),
+            sleeping: AtomicU32::new(0),
+            retired: AtomicU32::new(0),
+            ready: [(); HINT_WORDS].map(|()| AtomicU64::new(0)),
+        };
+        Arc::new(Self {
+            hot,
+            words: (0..slots).map(|_| AtomicU64::new(FREE.0)).collect(),
+            bodies: (0..slots).map(|_| UnsafeCell::new(0)).collect(),
+            bell: AtomicU32::new(0),
+            other: AtomicU32::new(0),
+            dead: AtomicU32::new(0),
+            displaced: Mutex::default(),
+        })
+    }
+
+    pub(super) fn slots(&self) -> Slots<'_> {
+        Slots::new(&self.hot, &self.words, 1, self.words.len())
+    }
+
+    pub(super) fn sender(&self, participant: u16, full: Full) -> Sender<'_> {
+        Sender { mailbox: self, by: Claimant { participant, incarnation: 1 }, cursor: 0, full }
+    }
+
+    pub(super) fn receiver(&self) -> Receiver<'_> {
+        Receiver { mailbox: self, queue: Queue::new(self.words.len()) }
+    }
+
+    /// Sends these packages (priority, body) from a thread of its own; returns the bodies of the accepted ones.
+    pub(super) fn send_from(self: &Arc<Self>, participant: u16, full: Full, packages: &'static [(u8, u8)]) -> JoinHandle<Vec<u8>> {
+        let mailbox = self.clone();
+        thread::spawn(move || mailbox.sender(participant, full).send_all(packages))
+    }
+
+    /// A sender that dies at this step of sending one package.
+    pub(super) fn dies_sending(
+        self: &Arc<Self>,
+        participant: u16,
+        step: &'static str,
+        package: &'static (u8, u8),
+    ) -> JoinHandle<bool> {
+        let mailbox = self.clone();
+        thread::spawn(move || {
+            let died = dies_at(step, || {
+                mailbox.sender(participant, Full::Displace).send(package.0, package.1);
+            });
+            // The kernel releases the lock by which others see it alive.
+            mailbox.dead.fetch_or(u32::from(died) << participant, Ordering::Release);
+            died
+        })
+    }
+
+    pub(super) fn is_dead(&self, by: Claimant) -> bool {
+        self.dead.load(Ordering::Acquire) >> by.participant & 1 != 0
+    }
+
+    pub(super) fn count_displaced(&self, priority: Priority) {
+        self.displaced.lock().unwrap().push(priority.0);
+    }
+
+    pub(super) fn displaced(&self) -> Vec<u8> {
+        self.displaced.lock().unwrap().clone()
+    }
+
+    pub(super) fn all_free(&self) -> bool {
+        (0..self.words.len()).all(|slot| self.slots().load(slot) == FREE)
+    }
+
+    pub(super) fn ring(&self) {
+        self.bell.fetch_add(1, Ordering::Release);
+    }
+
+    /// A futex that never returns early: who is not rung does not wake, and loom gives up on a program without end.
+    pub(super) fn sleep(&self, seen: u32) {
+        while self.bell.load(Ordering::Relaxed) == seen {
+            thread::yield_now();
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Sent {
+    Accepted,
+    Refused,
+    Retired,
+    Reclaimed,
+}
+
+pub(super) struct Sender<'a> {
+    pub(super) mailbox: &'a Mailbox,
+    pub(super) by: Claimant,
+    pub(super) cursor: usize,
+    pub(super) full: Full,
+}
+
+impl Sender<'_> {
+    pub(super) fn send(&mut self, priority: u8, body: u8) -> Sent {
+        let slots = self.mailbox.slots();
+        let claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full) {
+            Ok(claim) => claim,
+            Err(NoSlot::Full) => return Sent::Refused,
+            Err(NoSlot::Retired) => return Sent::Retired,
+        };
+        let cell = &self.mailbox.bodies[claim.slot];
+        // SAFETY: the claim is ours; if that were wrong, loom would tell.
+        cell.with_mut(|cell| unsafe { *cell = body });
+        claim.displaced().into_iter().for_each(|priority| self.mailbox.count_displaced(priority));
+        match slots.publish(claim, Priority(priority)) {
+            Published::Accepted { wake } => {
+                if wake {
+                    self.mailbox.ring();
+                }
+                Sent::Accepted
+            }
+            Published::Retired => {
+                // SAFETY: the claim is ours again; the real sender copies the body to the mailbox that took the place.
+                assert_eq!(cell.with(|cell| unsafe { *cell }), body);
+                slots.abandon(claim);
+                Sent::Retired
+            }
+            Published::Reclaimed => Sent::Reclaimed,
+        }
+    }
+
+    pub(super) fn send_all(&mut self, packages: &[(u8, u8)]) -> Vec<u8> {
+        packages.iter().filter(|(priority, body)| self.send(*priority, *body) == Sent::Accepted).map(|p| p.1).collect()
+    }
+}
+
+pub(super) struct Receiver<'a> {
+    pub(super) mailbox: &'a Mailbox,
+    pub(super) queue: Queue,
+}
+
+impl Receiver<'_> {
+    /// One package, read where it lies.
+    pub(super) fn take(&mut self) -> Option<u8> {
+        self.take_with(|_| ())
+    }
+
+    pub(super) fn take_with(&mut self, look: impl FnOnce(Word)) -> Option<u8> {
+        let slots = self.mailbox.slots();
+        let taken = self.queue.take(&slots)?;
+        look(taken.word);
+        // SAFETY: taken by us; if that were wrong, loom would tell.
+        let body = self.mailbox.bodies[taken.slot].with(|cell| unsafe { *cell });
+        slots.release(taken);
+        Some(body)
+    }
+
+    pub(super) fn take_times(&mut self, times: usize) -> Vec<u8> {
+        (0..times).filter_map(|_| self.take()).collect()
+    }
+
+    pub(super) fn drain(&mut self) -> Vec<u8> {
+        std::iter::from_fn(|| self.take()).collect()
+    }
+
+    /// None when there is something else to do.
+    pub(super) fn receive(&mut self) -> Option<u8> {
+        loop {
+            if let Some(body) = self.take() {
+                return Some(body);
+            }
+            if self.mailbox.other.load(Ordering::Relaxed) != 0 {
+                return None;
+            }
+            self.wait();
+        }
+    }
+
+    pub(super) fn wait(&mut self) {
+        let slots = self.mailbox.slots();
+        let seen = self.mailbox.bell.load(Ordering::Acquire);
+        slots.drowsy();
+        if self.mailbox.other.load(Ordering::Relaxed) == 0 && !self.queue.may_have_more(&slots) {
+            self.mailbox.sleep(seen);
+        }
+        slots.awake();
+    }
+
+    /// Frees what the dead left, and looks at every slot.
+    pub(super) fn search(&mut self) -> usize {
+        let slots = self.mailbox.slots();
+        reached("search: before");
+        let freed = slots.reclaim(|by| self.mailbox.is_dead(by), |priority| self.mailbox.count_displaced(priority));
+        self.queue.rescan(&slots);
+        freed
+    }
+}
+
+/// What the sender of 1 and 2 sent.
+pub(super) fn of_first(received: &[u8]) -> Vec<u8> {
+    received.iter().copied().filter(|body| *body <= 2).collect()
+}
+
+pub(super) fn sorted(mut bodies: Vec<u8>) -> Vec<u8> {
+    bodies.sort_unstable();
+    bodies
+}

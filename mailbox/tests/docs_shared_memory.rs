@@ -1,0 +1,102 @@
+//! What `docs/src/shared-memory.md` says lies where it says: read from the files by number alone.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod common;
+
+use common::{Ground, HIGH, LOW, MAILBOX, label};
+use rohrpost_mailbox::{Full, ModuleState, Name, Participant, Shape, TimeKeeper, TimeSource};
+use std::time::Duration;
+
+struct Bytes(Vec<u8>);
+
+impl Bytes {
+    fn u32(&self, at: usize) -> u32 {
+        u32::from_ne_bytes(self.0[at..at + 4].try_into().unwrap())
+    }
+
+    fn u64(&self, at: usize) -> u64 {
+        u64::from_ne_bytes(self.0[at..at + 8].try_into().unwrap())
+    }
+}
+
+fn file(ground: &Ground, name: &str) -> Bytes {
+    Bytes(std::fs::read(ground.path().join(name)).unwrap())
+}
+
+#[test]
+fn a_mailbox_is_as_documented() {
+    for (slots, word_bytes) in [(64, 64), (65, 8)] {
+        let ground = Ground::new();
+        let max_age = Some(Duration::from_secs(9));
+        let shape = Shape { slots, body_bytes_max: 100, full: Full::Reject, max_age, claims: 3 };
+        let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
+        let mut sender = ground.sender();
+        sender.send(&label(LOW, 0), &[b"first"]).unwrap();
+        sender.send(&label(HIGH, 0), &[b"taken"]).unwrap();
+        let package = receiver.try_receive().unwrap();
+        let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
+        assert!(there.0.starts_with(b"rohrpost") && there.0.len().is_multiple_of(4096));
+        let identity = [8, 12, 16, 20, 24, 28].map(|at| there.u32(at));
+        assert_eq!(identity, [1, MAILBOX.raw(), u32::from(slots), 100, 1, 3]);
+        assert_eq!((there.u64(32), there.u32(64), there.u32(68)), (9_000_000_000, 0, std::process::id()));
+        assert_eq!((there.u32(72), there.u32(76), there.u64(128)), (0, 2, 2), "adoptions, most waiting, ticket");
+        assert_eq!((there.u32(136), there.u32(140), there.u32(320)), (0, 0, 256 + u32::from(HIGH.0)));
+        assert_eq!(there.u64(328), 1, "received of the first row");
+        let words = 4096 + (usize::from(slots) * word_bytes).next_multiple_of(64);
+        let mut seen = Vec::new();
+        for slot in 0..usize::from(slots) {
+            let (word, at) = (there.u64(4096 + slot * word_bytes), words + slot * 128);
+            if word != 0 {
+                let (priority, redelivered, ticket) = (word >> 54 & 0xff, word >> 53 & 1, word & ((1 << 53) - 1));
+                seen.push((word >> 62, priority, redelivered, ticket, there.0[at + 24..at + 29].to_vec()));
+                assert_eq!((there.u32(at + 8), there.0[at + 8 + 14]), (MAILBOX.raw(), priority as u8));
+            }
+        }
+        let expected =
+            [(2, u64::from(LOW.0), 0, 0, b"first".to_vec()), (3, u64::from(HIGH.0), 0, 1, b"taken".to_vec())];
+        assert_eq!(seen, expected);
+        drop(package);
+    }
+}
+
+#[test]
+fn a_filling_word_names_its_participant() {
+    let ground = Ground::new();
+    let shape = Shape { slots: 1, body_bytes_max: 8, ..Shape::default() };
+    let _receiver = ground.join().receiver(MAILBOX, shape).unwrap();
+    let filler = ground.join();
+    let (mut first, mut second) = (ground.sender(), filler.sender(MAILBOX).unwrap());
+    first.send(&label(LOW, 0), &[b"lost"]).unwrap();
+    let _loan = second.loan(HIGH).unwrap();
+    let word = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw())).u64(4096);
+    assert_eq!((word >> 62, word >> 61 & 1, word >> 53 & 0xff, word >> 48 & 0x1f), (1, 1, u64::from(LOW.0), 0));
+    let entry = 64 + 64 * (word >> 32 & 0xffff) as usize;
+    assert_eq!(word as u32, filler.incarnation());
+    assert_eq!(file(&ground, "node").u32(entry), filler.incarnation());
+}
+
+#[test]
+fn the_node_and_its_time_are_as_documented() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let me = Participant::join(&node, Name::new(1, 200, 0, 0)).unwrap();
+    me.set_state(ModuleState::On);
+    me.set_restarts(7);
+    let _receiver = me.receiver(MAILBOX, Shape::default()).unwrap();
+    me.ring();
+    node.announce_death();
+    let there = file(&ground, "node");
+    assert!(there.0.starts_with(b"rohrpost") && there.0.len() == 16448);
+    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [1, 1, 1, me.incarnation()]);
+    let entry = [0, 4, 8, 12, 16, 20].map(|at| there.u32(64 + at));
+    assert_eq!(entry, [me.incarnation(), std::process::id(), 2, 0x01c8_0000, 3, 7]);
+    assert!(there.u64(64 + 24) > 0);
+
+    let _keeper = TimeKeeper::begin(&node, TimeSource::Log, 1_000, 2.0).unwrap();
+    let there = file(&ground, "time");
+    assert_eq!((there.0.len(), there.u64(0), there.u32(8)), (192, 1, std::process::id()));
+    let record = 64 + 64 * (there.u64(0) % 2) as usize;
+    let fields = [0, 8, 24, 32, 40, 48].map(|at| there.u64(record + at));
+    assert_eq!(fields, [1, 3, 1_000, 2_000_000_000, 0, 0]);
+}

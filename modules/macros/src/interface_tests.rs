@@ -1,0 +1,77 @@
+//! What a person reads who writes an interface that cannot be.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use super::{expand, quote};
+use proc_macro2::TokenStream;
+
+fn error(attributes: &TokenStream, item: &TokenStream) -> String {
+    match expand(attributes.clone(), item.clone()) {
+        Ok(_) => format!("accepted: {item}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn mistakes_are_told_with_what_would_be_right() {
+    for (item, says) in [
+        ("#[command(15)] fn f(&mut self);", "own functions have numbers from 16 to 16383"),
+        ("#[command(16384)] fn f(&mut self);", "own functions have numbers from 16 to 16383"),
+        ("#[command(70000)] fn f(&mut self);", "number too large"),
+        ("#[command] fn f(&mut self);", "expected attribute arguments in parentheses: #[command(...)]"),
+        ("#[command(\"x\")] fn f(&mut self);", "expected integer literal"),
+        ("#[command(16, twice)] fn f(&mut self);", "unknown word; `idempotent` is the only one"),
+        ("#[command(16)] fn f(&mut self) {}", "have no body here"),
+        ("#[command(16)] fn f(&self);", "functions take `&mut self` first"),
+        ("#[command(16)] fn f();", "functions take `&mut self` first"),
+        ("#[command(16)] fn f(&mut self, text: &str);", "arguments travel to another process; take an owned value"),
+        ("#[command(16)] fn f(&mut self) -> &str;", "results travel to another process; return an owned value"),
+        ("#[command(16)] fn f(&mut self, (a, b): (u8, u8));", "write a plain name"),
+        ("#[command(16)] fn f<T>(&mut self, t: T);", "have no generics"),
+        ("#[command(16)] async fn f(&mut self);", "functions are not async"),
+        (
+            "#[command(16)] fn f(&mut self, a: u8, b: u8, c: u8, d: u8, e: u8, f: u8, g: u8, h: u8, i: u8);",
+            "at most eight arguments; put them into a struct",
+        ),
+        ("#[command(16)] fn f(&mut self); #[command(16)] fn g(&mut self);", "this number is taken"),
+        ("#[data(1)] fn f() -> u8; #[data(1)] fn g() -> u8;", "this number is taken"),
+        ("#[command(16)] fn f(&mut self); #[data(1)] fn f() -> u8;", "this name is taken"),
+        ("#[command(16)] fn with_timeout(&mut self);", "`with_timeout` is a function of every proxy"),
+        ("#[data(0)] fn f() -> u8;", "data have numbers from 1 to 16384"),
+        ("#[data(16385)] fn f() -> u8;", "data have numbers from 1 to 16384"),
+        ("#[data(1)] fn f();", "data are declared as `fn name() -> Type;`"),
+        ("#[data(1)] fn f(&mut self) -> u8;", "data are declared as `fn name() -> Type;`"),
+        ("#[data(1)] fn f() -> &'static str;", "data travel to other processes; name an owned type"),
+        ("#[data(1, idempotent)] fn f() -> u8;", "`idempotent` is for commands"),
+        ("fn f(&mut self);", "write #[command(16)] or #[data(1)] before it"),
+        ("type Error;", "an interface has functions only"),
+    ] {
+        let said = error(&quote!(class = "motor"), &format!("trait T {{ {item} }}").parse().unwrap());
+        assert!(said.contains(says), "{item}\n  says: {said}\n  should say: {says}");
+    }
+}
+
+#[test]
+fn mistakes_in_the_attribute_are_told() {
+    let item = quote!(
+        trait T {}
+    );
+    for (attributes, says) in [
+        (quote!(), "which class? write `#[interface(class = \"motor\")]`"),
+        (quote!(klass = "motor"), "unknown key; write `class = \"motor\"`"),
+        (quote!(class = motor), "expected string literal"),
+    ] {
+        let said = error(&attributes, &item);
+        assert!(said.contains(says), "{attributes}\n  says: {said}");
+    }
+    assert!(
+        expand(
+            quote!(class = "motor"),
+            quote!(
+                struct T;
+            )
+        )
+        .is_err()
+    );
+    assert!(expand(quote!(class = "motor"), item).is_ok(), "an interface may be empty");
+}

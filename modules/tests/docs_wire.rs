@@ -1,0 +1,93 @@
+//! The examples of `docs/src/wire.md` are what the code writes.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use rohrpost_mailbox::{HEAD_BYTES, Head, Name, Options, Priority, Type};
+use rohrpost_modules::call::{CallEnvelope, Fault, ReplyEnvelope};
+use rohrpost_modules::common::{DataHead, OutputLevel};
+use rohrpost_modules::interfaces::{DriveError, MotorInterface};
+use rohrpost_modules::output::{LINES, OutputLine};
+
+const PAGE: &str = include_str!("../../docs/src/wire.md");
+
+/// The bytes of a block: each line begins with pairs of digits, then two spaces and words.
+fn block(name: &str) -> Vec<u8> {
+    let fence = format!("\n```hex {name}\n");
+    let text = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no ```hex {name}")).split("\n```").next().unwrap();
+    let pairs = text.lines().flat_map(|line| line.split("  ").next().unwrap_or_default().split(' '));
+    pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap_or_else(|_| panic!("{name}: `{pair}`"))).collect()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x} ")).collect()
+}
+
+fn check(name: &str, head: Head, front: &[u8], value: &[u8]) {
+    let len = (front.len() + value.len()) as u16;
+    let head = Head { len, ..head };
+    let (there, body) = (block(name), [front, value].concat());
+    assert_eq!(Head::from_bytes(&there), Ok(head), "{name}: its head reads otherwise");
+    // The bytes as a little-endian computer writes them, whatever this one is.
+    if cfg!(target_endian = "little") {
+        assert_eq!(hex(&there[..HEAD_BYTES]), hex(&head.to_bytes()), "{name}: left the page, right the code");
+    }
+    assert_eq!(hex(&there[HEAD_BYTES..]), hex(&body), "{name}: left the page, right the code");
+}
+
+const PILOT: Name = Name::new(1, 140, 0, 1);
+const MOTOR: Name = Name::new(1, 200, 0, 0);
+
+#[test]
+fn a_command_has_the_documented_bytes() {
+    let interface = MotorInterface::hash();
+    let call = CallEnvelope { interface, incarnation: 1_234_567_890, sequence: 7, valid_for_us: 200_000, age_us: 0 };
+    let head =
+        Head { to: MOTOR, from: PILOT, kind: Type::command(16), id: 7, priority: Priority(140), ..Head::default() };
+    check("command", head, &call.to_bytes(), &postcard::to_stdvec(&(0.3f64, 0.5f64)).unwrap());
+}
+
+#[test]
+fn a_reply_has_the_documented_bytes() {
+    let envelope = ReplyEnvelope { incarnation: 1_234_567_890, sequence: 7 };
+    let head =
+        Head { to: PILOT, from: MOTOR, kind: Type::reply(16), id: 7, priority: Priority(140), ..Head::default() };
+    check("reply", head, &envelope.to_bytes(), &postcard::to_stdvec(&Ok::<(), DriveError>(())).unwrap());
+}
+
+#[test]
+fn a_line_of_output_has_the_documented_bytes() {
+    let line = OutputLine {
+        time_ns: 123_456_789,
+        module: MOTOR.raw(),
+        level: OutputLevel::Info,
+        lost: 0,
+        text: "is on".into(),
+    };
+    let data = DataHead { stamp_ns: line.time_ns, sequence: 2, missed: line.lost };
+    let (kind, priority, options) = (Type::data(1), Priority(32), Options::STAMPED);
+    let head = Head { to: Name::new(1, 32, 0, LINES), from: MOTOR, kind, priority, options, ..Head::default() };
+    check("line", head, &data.to_bytes(), &postcard::to_stdvec(&line).unwrap());
+}
+
+#[test]
+fn faults_have_the_documented_numbers() {
+    let (table, _) = PAGE.split("| | fault |").nth(1).unwrap().split_once("\n\n").unwrap();
+    let rows = table.lines().skip(2).count();
+    let text = String::new;
+    let faults = [
+        Fault::ModuleOff,
+        Fault::ModuleError(text()),
+        Fault::Interrupted,
+        Fault::InterfaceDiffers { server: 0 },
+        Fault::Unknown(0),
+        Fault::Arguments(text()),
+        Fault::Expired,
+        Fault::Busy,
+        Fault::NothingYet,
+        Fault::TooLarge(0),
+    ];
+    assert_eq!(rows, faults.len());
+    for (number, fault) in faults.iter().enumerate() {
+        assert_eq!(usize::from(postcard::to_stdvec(fault).unwrap()[0]), number, "{fault}");
+    }
+}

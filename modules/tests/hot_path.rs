@@ -1,0 +1,158 @@
+//! A module's thread takes nothing from the heap, once it is warm, for: a command and its answer, publishing to subscribers,
+//! and receiving data of a plain type. (Data with a `Vec` inside, such as scans, allocate that in decoding; output lines
+//! allocate their text.)
+//!
+//! The module runs on a thread of this process; only that thread counts. One test, as a process has one output.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Name, Node, node_directory};
+use rohrpost_modules::call::CallError;
+use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
+use rohrpost_modules::runtime::{Context, Rate, Received, Start, Subscription, ToolLink, run_started};
+use rohrpost_modules::types::Twist;
+use rohrpost_modules::{Module, ModuleError};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+thread_local! {
+    static COUNTED: Cell<bool> = const { Cell::new(false) };
+}
+static USES: AtomicU64 = AtomicU64::new(0);
+static RECEIVED: AtomicU64 = AtomicU64::new(0);
+static TICKS: AtomicU64 = AtomicU64::new(0);
+
+struct Counting;
+
+#[global_allocator]
+static HEAP: Counting = Counting;
+
+fn count() {
+    if COUNTED.with(Cell::get) {
+        USES.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+// SAFETY: hands all on to the system's; a constant thread-local without destructor neither allocates nor ends.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: as promised by our caller.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: as promised by our caller.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// Publishes what it is told, and follows itself: so it is publisher, subscriber and server at once.
+struct Wheels {
+    own: Subscription<Twist>,
+    told: Twist,
+}
+
+impl Module for Wheels {
+    type Settings = toml::Table;
+    type Interfaces = MotorInterface;
+
+    fn new(_: toml::Table, context: &mut Context) -> Result<Self, ModuleError> {
+        context.set_period(Duration::from_millis(1));
+        // Both kinds of subscription: each value, and periodic.
+        let own = context.subscribe(MotorInterface::MOTION, "motor.0", Rate::Each)?;
+        let _ = context.subscribe(MotorInterface::MOTION, "motor.0", Rate::Every(Duration::from_millis(2)))?;
+        Ok(Self { own, told: Twist::default() })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        COUNTED.with(|counted| counted.set(true));
+        TICKS.fetch_add(1, Ordering::Relaxed);
+        Ok(context.publish_now(MotorInterface::MOTION, &self.told)?)
+    }
+
+    fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
+        if data.read(&self.own).is_some() {
+            RECEIVED.fetch_add(1, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+}
+
+impl Motor for Wheels {
+    fn drive(&mut self, speed_m_s: f64, turn_rate_rad_s: f64) -> Result<(), DriveError> {
+        self.told = Twist { speed_m_s, turn_rate_rad_s };
+        Ok(())
+    }
+
+    fn halt(&mut self) -> Result<(), DriveError> {
+        Err(DriveError::NotFinite)
+    }
+}
+
+const CONFIG: &str = r#"
+installation = "hot-PID"
+[system]
+name = "robot"
+id = 1
+[classes]
+motor = { id = 100, text = "Drives" }
+tool = { id = 16, text = "By hand" }
+[nodes.main]
+[[module]]
+name = "motor.0"
+program = "motor"
+optional = true
+"#;
+const MOTOR: Name = Name::new(1, 100, 0, 0);
+
+/// Calls, until there were so many ticks and so many data received.
+fn work(motor: &MotorProxy, ticks: u64, received: u64) {
+    let (began, mut moves) = (Instant::now(), None);
+    let (ticks_then, received_then) = (TICKS.load(Ordering::Relaxed), RECEIVED.load(Ordering::Relaxed));
+    while TICKS.load(Ordering::Relaxed) < ticks_then + ticks
+        || RECEIVED.load(Ordering::Relaxed) < received_then + received
+    {
+        motor.drive(0.5, 0.25).unwrap();
+        assert!(matches!(motor.halt(), Err(CallError::Module(_, DriveError::NotFinite))));
+        // There is none before the first tick.
+        moves = motor.motion().ok();
+        assert!(began.elapsed() < Duration::from_secs(60), "it does not tick, or receives nothing");
+    }
+    assert_eq!(moves.map(|(_, twist)| twist), Some(Twist { speed_m_s: 0.5, turn_rate_rad_s: 0.25 }));
+}
+
+#[test]
+fn a_modules_thread_does_not_touch_the_heap() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("hot.toml");
+    std::fs::write(&file, CONFIG.replace("PID", &std::process::id().to_string())).unwrap();
+    let installation = Arc::new(Installation::load(&file).unwrap());
+    let start = Start { installation: installation.clone(), name: MOTOR, launcher: None, restarts: 0, off: false };
+    let module = std::thread::spawn(move || run_started::<Wheels>(start));
+
+    let path = node_directory(&installation.name, "main");
+    let node = Node::create(&path, 0o700).unwrap();
+    let mut tool = ToolLink::join(&installation, &node, "main", Duration::from_secs(5)).unwrap();
+    let began = Instant::now();
+    while tool.status(MOTOR).is_err() {
+        assert!(began.elapsed() < Duration::from_secs(60) && !module.is_finished(), "it does not start");
+        std::thread::yield_now();
+    }
+    let link = std::rc::Rc::new(std::cell::RefCell::new(tool.link));
+    let motor =
+        <MotorProxy as rohrpost_modules::interface::Proxy>::new(&link, MOTOR).with_timeout(Duration::from_secs(5));
+    // Longer than a renewal of the subscriptions takes to come.
+    work(&motor, 1500, 1000);
+    let before = USES.load(Ordering::Relaxed);
+    assert!(before > 0, "it counts");
+    work(&motor, 3000, 2000);
+    assert_eq!(USES.load(Ordering::Relaxed) - before, 0, "uses of the heap after warming up");
+    // The module's thread ends with the process; its node is nobody's then.
+    let _ = std::fs::remove_dir_all(path);
+}

@@ -1,0 +1,107 @@
+//! What the attribute makes of a trait: the description that tools read, and the hash that tells interfaces apart.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use rohrpost_modules::call::Fault;
+use rohrpost_modules::interface;
+use rohrpost_modules::interface::{Interface, Serve};
+use rohrpost_modules::value::Data;
+
+/// Opens and closes.
+///
+/// A gripper at the end of an arm.
+#[interface(class = "gripper", crate = rohrpost_modules::macro_support)]
+pub trait Gripper {
+    /// Closes with a force.
+    /// In newtons.
+    #[command(16)]
+    fn close(&mut self, force_n: f32, name: Option<String>) -> Result<u8, String>;
+
+    /// Opens.
+    #[command(17, idempotent)]
+    fn open(&mut self);
+
+    /// Arguments with names that the attribute uses itself.
+    #[command(18)]
+    fn say(&mut self, module: u8, reply: String, arguments: (u8, u8), function: bool) -> String;
+
+    /// What it feels.
+    #[data(1)]
+    fn pressure() -> Vec<f32>;
+}
+
+struct Tongs;
+
+impl Gripper for Tongs {
+    fn close(&mut self, force_n: f32, _: Option<String>) -> Result<u8, String> {
+        if force_n < 0.0 { Err("pushes".into()) } else { Ok(force_n as u8) }
+    }
+
+    fn open(&mut self) {}
+
+    fn say(&mut self, module: u8, reply: String, arguments: (u8, u8), function: bool) -> String {
+        format!("{module} {reply} {arguments:?} {function}")
+    }
+}
+
+#[test]
+fn a_description_says_it_all() {
+    let description = GripperInterface::description();
+    assert_eq!((description.name.as_str(), description.class.as_str()), ("Gripper", "gripper"));
+    assert_eq!(description.text, "Opens and closes.  A gripper at the end of an arm.");
+    let close = description.function("close").unwrap();
+    assert_eq!((close.number, close.idempotent, close.text.as_str()), (16, false, "Closes with a force. In newtons."));
+    let arguments: Vec<_> = close.arguments.iter().map(|argument| (argument.name.as_str(), &argument.ty)).collect();
+    assert_eq!(arguments, [("force_n", &f32::schema()), ("name", &Option::<String>::schema())]);
+    assert_eq!(close.result, Result::<u8, String>::schema());
+    let open = description.function("open").unwrap();
+    assert!(open.idempotent && open.arguments.is_empty() && open.result == <()>::schema());
+    let pressure = description.data_item("pressure").unwrap();
+    assert_eq!((pressure.number, &pressure.ty), (1, &Vec::<f32>::schema()));
+    let bytes = postcard::to_stdvec(&description).unwrap();
+    assert_eq!(postcard::from_bytes::<rohrpost_modules::description::Description>(&bytes).unwrap(), description);
+}
+
+#[test]
+fn functions_are_found_by_number_and_what_does_not_fit_is_refused() {
+    let serve = |function, arguments: &[u8]| {
+        let mut reply = Vec::new();
+        GripperInterface::serve(&mut Tongs, function, arguments, &mut reply).map(|()| reply)
+    };
+    let arguments = |force_n: f32| postcard::to_stdvec(&(force_n, None::<String>)).unwrap();
+    assert_eq!(serve(16, &arguments(3.0)), Ok(postcard::to_stdvec(&Ok::<u8, String>(3)).unwrap()));
+    assert_eq!(serve(16, &arguments(-1.0)), Ok(postcard::to_stdvec(&Err::<u8, _>("pushes")).unwrap()));
+    assert_eq!(serve(17, &[]), Ok(vec![]));
+    let names = postcard::to_stdvec(&(1u8, "two", (3u8, 4u8), true)).unwrap();
+    assert_eq!(serve(18, &names), Ok(postcard::to_stdvec("1 two (3, 4) true").unwrap()));
+    assert_eq!(serve(19, &[]), Err(Fault::Unknown(19)));
+    assert_eq!(serve(17, &[1]), Err(Fault::Arguments("1 bytes too many".into())));
+    assert!(matches!(serve(16, &arguments(1.0)[..3]), Err(Fault::Arguments(_))));
+}
+
+#[test]
+fn the_hash_is_of_what_matters() {
+    let description = GripperInterface::description();
+    let hash = GripperInterface::hash();
+    assert_eq!(hash, description.hash());
+    let changed = |change: fn(&mut rohrpost_modules::description::Description)| {
+        let mut other = description.clone();
+        change(&mut other);
+        other.hash() != hash
+    };
+    assert!(!changed(|d| d.text = "else".into()), "texts do not count");
+    assert!(!changed(|d| d.functions[0].text.clear()), "texts do not count");
+    assert!(!changed(|d| d.data[0].text.clear()), "texts do not count");
+    assert!(changed(|d| d.functions[0].number = 19), "numbers do");
+    assert!(changed(|d| d.functions[0].name = "shut".into()), "names do");
+    assert!(changed(|d| d.functions[0].arguments[0].ty = f64::schema()), "types do");
+    assert!(changed(|d| d.functions[0].arguments.reverse()), "their order does");
+    assert!(changed(|d| d.functions[1].result = u8::schema()), "results do");
+    assert!(changed(|d| d.functions[1].idempotent = false), "what may be repeated does");
+    assert!(changed(|d| d.data[0].ty = Vec::<f64>::schema()), "data do");
+    // Recordings and other nodes have it: it does not change with the compiler or from run to run.
+    assert_eq!(
+        hash, 178_475_845,
+        "the hash has changed, and with it the wire: raise the layout version if that is meant"
+    );
+}

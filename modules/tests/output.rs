@@ -1,0 +1,111 @@
+//! What a module says, on its way to a collector that is played by the test. One test, since a process has one output.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Name, Node, Participant, Receiver, Shape};
+use rohrpost_modules::common::{DataHead, OutputLevel};
+use rohrpost_modules::output::{LINES, OutputLine, TEXT_MAX, drain, install, lost, retry_at, set_level};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+const CONFIG: &str = r#"
+installation = "said"
+[system]
+name = "robot"
+id = 1
+[classes]
+motor = { id = 200, text = "Drives" }
+output = { id = 32, text = "Collects" }
+tool = { id = 16, text = "By hand" }
+[nodes.main]
+[[module]]
+name = "motor.0"
+program = "motor"
+optional = true
+"#;
+const ME: Name = Name::new(1, 200, 0, 0);
+const COLLECTOR: Name = Name::new(1, 32, 0, LINES);
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Of the queue in each process.
+const WAITING: u32 = 256;
+
+/// The next line; sends what waits until there is one.
+fn next(collector: &mut Receiver) -> OutputLine {
+    let began = Instant::now();
+    while began.elapsed() < PATIENCE {
+        drain();
+        if let Some(package) = collector.receive_timeout(Duration::from_millis(5)) {
+            let (_, value) = DataHead::split(package.body()).unwrap();
+            return postcard::from_bytes(value).unwrap();
+        }
+    }
+    panic!("no line came");
+}
+
+fn nothing_more(collector: &mut Receiver) {
+    drain();
+    assert!(collector.try_receive().is_none() && retry_at().is_none());
+}
+
+#[test]
+fn lines_arrive_whole_or_are_counted() {
+    let directory = tempfile::tempdir().unwrap();
+    let installation = Installation::parse(CONFIG, Path::new("said.toml")).unwrap();
+    let node = Node::create(&directory.path().join("node"), 0o700).unwrap();
+    let participant = Participant::join(&node, ME).unwrap();
+    install(&participant, &installation, ME, true);
+
+    // No collector: what does not fit in the queue is counted, nobody waits.
+    for n in 0..WAITING + 44 {
+        tracing::info!("line {n}");
+    }
+    assert_eq!(lost(), 44);
+    assert!(retry_at().is_some_and(|at| at > Instant::now()), "a time that has passed would keep the module awake");
+
+    // A collector comes, too small for all at once.
+    let shape = Shape { slots: 8, ..Shape::default() };
+    let mut collector = Participant::join(&node, Name::NONE).unwrap().receiver(COLLECTOR, shape).unwrap();
+    let mut lines: Vec<OutputLine> = (0..WAITING).map(|_| next(&mut collector)).collect();
+    assert_eq!(lines.iter().map(|line| line.lost).sum::<u32>(), 44, "it is said what was lost, once");
+    lines.sort_by_key(|line| line.text[5..].parse::<u32>().unwrap());
+    assert!(lines.iter().enumerate().all(|(n, line)| line.text == format!("line {n}") && line.module() == ME));
+    nothing_more(&mut collector);
+
+    // The level is changed while it runs.
+    for (level, heard) in [(OutputLevel::Warn, "w"), (OutputLevel::Error, ""), (OutputLevel::Trace, "dw")] {
+        set_level(level);
+        tracing::debug!("d");
+        tracing::warn!("w");
+        for text in heard.chars() {
+            assert_eq!(next(&mut collector).text, text.to_string(), "at {level:?}");
+        }
+        nothing_more(&mut collector);
+    }
+
+    // Long lines are cut, never inside a character.
+    for shift in 0..4 {
+        tracing::info!("{}{}", "x".repeat(shift), "€".repeat(TEXT_MAX));
+        let text = next(&mut collector).text;
+        assert!(text.len() <= TEXT_MAX && text.len() > TEXT_MAX - 6, "{} bytes", text.len());
+        assert!(text.ends_with("€…"));
+    }
+    tracing::info!(number = 7, "with fields");
+    assert_eq!(next(&mut collector).text, "with fields number=7");
+
+    // A panic says why, whoever panicked.
+    assert!(std::thread::spawn(|| panic!("the wheels came off")).join().is_err());
+    let line = next(&mut collector);
+    assert_eq!(line.level, OutputLevel::Error);
+    assert!(line.text.contains("the wheels came off") && line.text.contains("output.rs"), "{}", line.text);
+
+    // The collector dies and another one comes, for shorter lines only: those that never fit do not block the rest.
+    collector.close();
+    let shape = Shape { body_bytes_max: 128, ..Shape::default() };
+    let mut collector = Participant::join(&node, Name::NONE).unwrap().receiver(COLLECTOR, shape).unwrap();
+    let before = lost();
+    tracing::info!("{}", "long".repeat(100));
+    tracing::info!("short");
+    let line = next(&mut collector);
+    assert_eq!((line.text.as_str(), line.lost, lost() - before), ("short", 1, 1));
+}
