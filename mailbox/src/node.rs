@@ -292,7 +292,8 @@ impl Node {
     pub(crate) fn keep_all_out(&self) -> Result<Option<File>, NodeError> {
         let failed = |error| NodeError::Io(self.path.clone(), error);
         let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
-        for byte in (0..PARTICIPANTS_MAX as u64).chain([LAUNCH_BYTE]) {
+        // The launch's first: on a node that runs nothing else is taken, not even for a moment in which somebody wants to join.
+        for byte in std::iter::once(LAUNCH_BYTE).chain(0..PARTICIPANTS_MAX as u64) {
             if !lock::try_lock(&file, byte).map_err(failed)? {
                 return Ok(None);
             }

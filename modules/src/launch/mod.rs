@@ -23,7 +23,8 @@ use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as Configured
 use rohrpost_mailbox::{
     LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
 };
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
@@ -35,6 +36,9 @@ const LOOK_STARTING: Duration = Duration::from_millis(5);
 const LOOK_SWITCHING: Duration = Duration::from_millis(1);
 /// Notes that are kept for who asks; the oldest go first.
 const NOTES_MAX: usize = 1000;
+
+/// A node that somebody else removes just now is taken at the next try, or the next but one.
+const TAKE_MAX: usize = 20;
 
 /// Why a node could not be launched.
 #[derive(Debug, thiserror::Error)]
@@ -119,8 +123,7 @@ impl Launch {
             return Err(LaunchError::Programs(fatal.join("\n")));
         }
         let mode = installation.node(node_name).map_or(0o700, |node| node.mode);
-        let node = Node::create(&node_directory(&installation.name, node_name), mode)?;
-        let lock = node.launch_lock()?;
+        let (node, lock) = take_node(&node_directory(&installation.name, node_name), mode)?;
         let mut notes = leftovers::end(&node, &installation, node_name)?;
         notes.extend(missing.iter().map(|program| format!("left out: {program}")));
         let time = begin_time(&node, &installation)?;
@@ -309,6 +312,30 @@ impl Launch {
             Err(error) => notes.push(error.to_string()),
         }
         notes
+    }
+}
+
+/// Makes a node and becomes its launch.
+fn take_node(path: &Path, mode: u32) -> Result<(Arc<Node>, LaunchLock), NodeError> {
+    let mut tries = 0;
+    loop {
+        match Node::create(path, mode).and_then(|node| Ok((node.launch_lock()?, node))) {
+            Ok((lock, node)) => return Ok((node, lock)),
+            Err(error) if tries == TAKE_MAX || !passes(&error) => return Err(error),
+            Err(_) => {}
+        }
+        tries += 1;
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Whether an earlier launch that ends just now, or `rohrpost clean`, may be the reason: they keep all others out while they
+/// remove a node, which takes a moment.
+fn passes(error: &NodeError) -> bool {
+    match error {
+        NodeError::Missing(_) | NodeError::Launched(..) => true,
+        NodeError::Io(_, error) => error.kind() == ErrorKind::NotFound,
+        _ => false,
     }
 }
 
