@@ -44,10 +44,10 @@ fn modules_switch_off_and_end_when_launch_is_killed() {
 #[test]
 fn what_waited_for_the_last_run_does_not_drive_the_next() {
     let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = \"never\"")]);
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"10 min\" }")]);
     let mut tool = robot.tool(PATIENCE);
     signal(robot.pid("probe.0"), Signal::SIGKILL);
-    launch.wait_for("probe.0 was killed by signal 9");
+    launch.wait_for("probe.0 was killed by signal 9; starts again in 600s");
     robot.begin(&mut tool, "probe.0", COUNT, &(1u32,));
     assert_eq!(robot.waiting("probe.0"), 1);
     launch.signal(Signal::SIGKILL);

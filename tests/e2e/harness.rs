@@ -6,7 +6,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost::config::Installation;
 use rohrpost::macro_support::append;
-use rohrpost::mailbox::{Node, ParticipantInfo, node_directory};
+use rohrpost::mailbox::{Node, ParticipantInfo, local, node_directory};
 use rohrpost::serde::Serialize;
 use rohrpost::{Name, ToolLink};
 use std::fmt::Debug;
@@ -241,12 +241,19 @@ impl Robot {
             .filter(|module| module.start == rohrpost::config::Start::On)
             .map(|module| self.installation.classes.format(module.name))
             .collect();
-        for name in names {
+        for name in &names {
             wait(format!("{name} is not on"), || {
                 launch.assert_runs();
-                (self.state(&name) == "on").then_some(())
+                (self.state(name) == "on").then_some(())
             });
         }
+        // Launch takes the first place of a tool. Until it has heard from each module, a stop is a start that failed.
+        let tools = self.installation.node(&self.node_name).unwrap().tools.clone();
+        let replies = Name::new(1, 16, *tools.start(), local::REPLIES);
+        wait("launch has heard from all", || {
+            let heard = self.node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
+            (heard >= names.len() as u64).then_some(())
+        });
     }
 
     /// Packages that wait in a module's command mailbox.

@@ -70,6 +70,11 @@ fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
     signal(pid, Signal::SIGKILL);
     launch.wait_for("probe.0 was killed by signal 9; given up after 3 restarts within 60s");
     assert_eq!(robot.state("probe.1"), "on", "the others go on");
+    wait("its mailboxes are gone", || {
+        (robot.node.mailboxes().unwrap().iter().all(|n| n.module() != robot.name("probe.0"))).then_some(())
+    });
+    let told = place.say(&["call", "probe.0", "count", "1"]).fails();
+    assert!(told.contains("not on this node"), "nothing waits for a module that never comes: {told}");
     let status = place.say(&["status"]);
     assert_eq!(status.code, Some(1), "one does not answer: {}", status.out);
     launch.signal(Signal::SIGINT);
@@ -77,17 +82,6 @@ fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
     assert!(launch.err().contains("probe.0 failed for good: was killed by signal 9; given up"), "{}", launch.err());
     assert_eq!(place.recorded("start"), 5);
     place.assert_empty();
-}
-
-#[test]
-fn what_a_module_printed_is_told_when_it_ends() {
-    let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
-    let pid = robot.pid("probe.0");
-    let _ = place.say(&["call", "probe.0", "abort", "--timeout", "0.2"]);
-    launch.wait_for("probe.0 was killed by signal 6");
-    robot.wait_restarted("probe.0", pid);
-    launch.stop();
 }
 
 #[test]

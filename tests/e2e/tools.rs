@@ -18,7 +18,7 @@ fn a_module_of_ones_own_is_known_by_its_description() {
         "class probe: Does what tests ask of it.",
         "count <number: u32> -> u64",
         "Writes the number into the record",
-        "refuse <why: text> -> {Ok: u32}|{Err: {Refused: {why: text}}}",
+        "refuse <why: text> -> u32, or error {Refused: {why: text}}",
         "beat: u64",
         "every module: on, off, status, get DATA, output-level LEVEL",
     ] {
