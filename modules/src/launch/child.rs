@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 
 /// Longest pause before a restart.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
-/// Lines of what a module printed that are kept to be told when it ends.
-const PRINTED_MAX: usize = 12;
+/// Lines of what a module printed that are kept to be told when it ends: a panic and its back trace.
+const PRINTED_MAX: usize = 64;
 
 /// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes behind
 /// that hold its pipe.
