@@ -56,20 +56,23 @@ pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
 
 pub(crate) const OUTPUT: &str = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\n";
 
-/// Whether a process of this number runs (one that only waits to be reaped does not).
+/// Whether a process of this number runs (one that only waits to be reaped does not, and holds nothing any more).
 pub(crate) fn runs(pid: u32) -> bool {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    // After the name, which may hold anything, comes the state.
-    stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
+    // Its threads die one by one, and the first may be a zombie while another still holds its files.
+    let threads = std::fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
+    threads.map(|thread| state(&thread.path().join("stat"))).any(|state| !matches!(state, 'Z' | 'X'))
+}
+
+/// The letter after the name, which may hold anything; `X` when there is none any more.
+fn state(stat: &Path) -> char {
+    let text = std::fs::read_to_string(stat).unwrap_or_default();
+    text.rsplit_once(") ").and_then(|(_, rest)| rest.chars().next()).unwrap_or('X')
 }
 
 /// Stops a process as Ctrl-Z does, and waits until it stands.
 pub(crate) fn halt(pid: u32) {
     signal(pid, Signal::SIGSTOP);
-    wait(format!("{pid} stands"), || {
-        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-        stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('T')).then_some(())
-    });
+    wait(format!("{pid} stands"), || (state(Path::new(&format!("/proc/{pid}/stat"))) == 'T').then_some(()));
 }
 
 pub(crate) fn signal(pid: u32, signal: Signal) {
