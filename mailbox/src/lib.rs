@@ -59,6 +59,7 @@ pub use layout::{Shape, ShapeError};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
 pub use node::{
     LaunchLock, ModuleState, Node, NodeError, PARTICIPANTS_MAX, ParticipantInfo, base_directory, node_directory,
+    remove_base_if_empty,
 };
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;

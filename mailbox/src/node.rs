@@ -133,6 +133,14 @@ pub fn base_directory() -> PathBuf {
     }
 }
 
+/// Removes the directory around this user's nodes if it is empty and our own to choose; one that `$ROHRPOST_DIR` names stays.
+pub fn remove_base_if_empty() {
+    if std::env::var_os("ROHRPOST_DIR").is_none() {
+        // Refused when something is in it, as it should be.
+        let _ = fs::remove_dir(base_directory());
+    }
+}
+
 /// The directory of a node.
 pub fn node_directory(installation: &str, node: &str) -> PathBuf {
     base_directory().join(format!("{installation}.{node}"))

@@ -129,7 +129,7 @@ fn late_answers_and_those_to_forgotten_calls_are_dropped() {
     }
     let repeats = seen.iter().filter(|envelope| envelope.age_us > 0).count();
     assert!(
-        repeats <= 2 && seen.len() == repeats + 1,
+        repeats <= 2 && seen.len() == repeats + 2,
         "three tries in all, fewer on a busy computer: {repeats} repeats"
     );
     let call = ground.begin(SERVER, 3, LONG).unwrap();

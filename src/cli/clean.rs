@@ -1,7 +1,7 @@
 //! `rohrpost clean`.
 
 use super::{Failure, say};
-use rohrpost::mailbox::{Node, base_directory};
+use rohrpost::mailbox::{Node, base_directory, remove_base_if_empty};
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -40,7 +40,6 @@ pub(super) fn run(_: &Arguments) -> Result<ExitCode, Failure> {
     if seen == 0 {
         say(format_args!("nothing to clean in {}", base.display()));
     }
-    // Only if it is empty.
-    let _ = std::fs::remove_dir(&base);
+    remove_base_if_empty();
     Ok(ExitCode::SUCCESS)
 }

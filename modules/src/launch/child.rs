@@ -21,7 +21,7 @@ const PRINTED_MAX: usize = 12;
 
 /// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes behind
 /// that hold its pipe.
-const PRINTED_WAIT: Duration = Duration::from_millis(50);
+const PRINTED_WAIT: Duration = Duration::from_millis(100);
 
 /// Where launch stands with a module.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -20,7 +20,9 @@ use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
 use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as ConfiguredTime};
-use rohrpost_mailbox::{LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns};
+use rohrpost_mailbox::{
+    LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
+};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -299,7 +301,7 @@ impl Launch {
         tool.close();
         drop(lock);
         match node.remove_if_dead() {
-            Ok(true) => {}
+            Ok(true) => remove_base_if_empty(),
             Ok(false) => notes.push(format!(
                 "somebody still uses {}; `rohrpost clean` removes it when they have ended",
                 node.path().display()
