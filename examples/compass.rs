@@ -44,8 +44,8 @@ impl Module for WheelCompass {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        Ok(context
-            .publish_now(CompassInterface::BEARING, &(self.turned_deg + self.correction_deg).rem_euclid(360.0))?)
+        let bearing_deg = (self.turned_deg + self.correction_deg).rem_euclid(360.0);
+        Ok(context.publish_now(CompassInterface::BEARING, &bearing_deg)?)
     }
 }
 
