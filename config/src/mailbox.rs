@@ -1,11 +1,11 @@
 //! How large the mailboxes of a module are and what they do when full.
 
 use crate::reader::Section;
-use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Shape};
 use std::time::Duration;
 
 /// Most slots of one mailbox.
-pub const SLOTS_MAX: u16 = 1024;
+pub const SLOTS_MAX: u16 = rohrpost_mailbox::SLOTS_MAX as u16;
 /// Most unfinished claims of one participant.
 pub const CLAIMS_MAX: u8 = 16;
 
@@ -34,10 +34,10 @@ pub struct MailboxSpec {
 }
 
 impl MailboxSpec {
-    /// Bytes that the slots take: each a head and a body, in whole cache lines. The mailbox's own bookkeeping comes on
-    /// top, a page or two.
+    /// Bytes of shared memory that it takes, all in all.
     pub fn memory(&self) -> u64 {
-        u64::from(self.slots) * (u64::from(self.size) + HEAD_BYTES as u64).next_multiple_of(64)
+        let body_bytes_max = u16::try_from(self.size).unwrap_or(u16::MAX);
+        Shape { slots: self.slots, body_bytes_max, ..Shape::default() }.segment_bytes() as u64
     }
 }
 

@@ -54,7 +54,7 @@ pub mod local {
 /// System id of a package to all systems.
 pub const ALL_SYSTEMS: u8 = 255;
 
-/// A mailbox name. Zero in system, class or instance is reserved for "none" and "own".
+/// A mailbox name. System 0 and class 0 are reserved ("own", "none"); instance 0 is the first of its class.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct Name(u32);
 

@@ -36,7 +36,9 @@ impl Participant {
             node.check_present(&file)?;
             let incarnation = node.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1);
             let entry = node.entry(participant);
-            // Who leaves takes its process id out of the table.
+            // First of all: the lock is ours, but the name and the number still are those of whoever was here before.
+            entry.module.store(0, Ordering::Release);
+            // Who leaves in order takes its process id out of the table.
             let died = entry.pid.load(Ordering::Relaxed) != 0;
             entry.state.store(0, Ordering::Relaxed);
             entry.restarts.store(0, Ordering::Relaxed);
@@ -62,7 +64,8 @@ impl Participant {
         &self.node
     }
 
-    /// Tells this use of the name from all earlier ones on this node, also after a reboot.
+    /// Tells this use of the name from all earlier ones on this node; also from those before its directory was last made, on
+    /// a computer whose clock runs on while it is off.
     pub fn incarnation(&self) -> u32 {
         self.me.incarnation
     }
@@ -101,12 +104,20 @@ impl Participant {
     }
 }
 
-impl Drop for Participant {
-    fn drop(&mut self) {
+impl Participant {
+    /// Takes its name and its process id out of the table: it ends in order, and is not to be mourned. Dropping it does the
+    /// same; this is for processes whose threads keep it until they end.
+    pub fn leave(&self) {
         let entry = self.entry();
         entry.module.store(0, Ordering::Relaxed);
         entry.state.store(0, Ordering::Relaxed);
         entry.pid.store(0, Ordering::Release);
+    }
+}
+
+impl Drop for Participant {
+    fn drop(&mut self) {
+        self.leave();
         // Closing the file would unlock it too; doing it by name says when.
         let _ = lock::unlock(&self.file, u64::from(self.me.participant));
     }

@@ -16,6 +16,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+/// When a slot was still being filled at the last search, the next one comes after so many receives and waits.
+const SEARCH_AGAIN: u32 = 64;
+
 /// The one receiver of a mailbox. Dropped, the mailbox stays, and with it what was accepted: the next owner adopts it. See
 /// [`Receiver::close`] to remove it.
 pub struct Receiver {
@@ -24,6 +27,8 @@ pub struct Receiver {
     queue: Queue,
     /// The node's count of deaths when the slots were last searched for what the dead left.
     deaths_seen: u32,
+    /// Receives and waits until the slots are searched again, because one was still being filled after the last search.
+    search_in: Option<u32>,
     /// Holds the owner's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
     _lock: Held,
 }
@@ -32,7 +37,7 @@ impl Receiver {
     pub(crate) fn new(participant: Arc<Participant>, segment: Segment, lock: Held) -> Self {
         let queue = Queue::new(usize::from(segment.shape.slots));
         let deaths_seen = participant.node().page().deaths.load(Ordering::Acquire);
-        let mut receiver = Self { participant, segment, queue, deaths_seen, _lock: lock };
+        let mut receiver = Self { participant, segment, queue, deaths_seen, search_in: None, _lock: lock };
         receiver.search();
         receiver
     }
@@ -99,9 +104,7 @@ impl Receiver {
 
     /// Takes the next package that is not too old.
     fn next(&mut self) -> Option<Taken> {
-        if self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen {
-            self.search();
-        }
+        self.search_if_due();
         let slots = self.segment.slots();
         loop {
             let taken = self.queue.take(&slots)?;
@@ -122,6 +125,20 @@ impl Receiver {
         }
     }
 
+    fn search_if_due(&mut self) {
+        let due = match &mut self.search_in {
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+            None => false,
+        };
+        if due || self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen {
+            self.search();
+        }
+    }
+
     /// Looks through all slots for what the dead left.
     fn search(&mut self) {
         let node = self.participant.node().clone();
@@ -131,7 +148,15 @@ impl Receiver {
         let counters = &self.segment.page().counters;
         let lost = |priority| counters.lost(priority, Loss::Displaced, 1);
         let slots = self.segment.slots();
-        let freed = slots.reclaim(|by| by != me && node.is_dead(by), lost);
+        let mut filling = false;
+        let dead = |by| {
+            let dead = by != me && node.is_dead(by);
+            filling |= !dead;
+            dead
+        };
+        let freed = slots.reclaim(dead, lost);
+        // A dead one can still look alive: a child that it was about to start holds its lock for moments.
+        self.search_in = filling.then_some(SEARCH_AGAIN);
         if freed > 0 {
             // The dead had not said yet how important their packages were.
             counters.lost(crate::name::Priority(0), Loss::Unfinished, freed as u64);
@@ -141,9 +166,7 @@ impl Receiver {
 
     /// Turns hints into what they speak of, so that those which speak of nothing keep nobody awake.
     fn settle(&mut self) {
-        if self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen {
-            self.search();
-        }
+        self.search_if_due();
         self.queue.look(&self.segment.slots());
     }
 

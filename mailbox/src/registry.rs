@@ -107,8 +107,8 @@ impl Participant {
         Ok(Predecessor::Same(old, lock))
     }
 
-    /// Makes the file, whole, then gives it its name. The old mailbox is given up only when nothing can go wrong any more:
-    /// without memory for the new one, what the old one holds stays.
+    /// Makes the file, whole, then gives it its name. The old mailbox is given up only when the new one is whole: without
+    /// memory for that, what the old one holds stays.
     fn make(&self, name: Name, shape: Shape, old: Option<&Segment>) -> Result<(Segment, Held), CreateError> {
         let node = self.node();
         let path = path_of(node.path(), name);
@@ -195,7 +195,7 @@ pub struct MailboxInfo {
     pub depth: u32,
     /// Most that its receiver ever found waiting.
     pub depth_max: u32,
-    /// Packages ever accepted.
+    /// Packages ever accepted; after a sender was killed in the act, one more.
     pub sent: u64,
     /// By class: received, lost, latency.
     pub classes: Vec<ClassTraffic>,

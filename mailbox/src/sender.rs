@@ -177,6 +177,7 @@ impl Sender {
                 Published::Retired => claim = self.move_on(claim, label.priority, len)?,
             }
         }
+        self.count_displaced(&claim);
         self.segment.slots().abandon(claim);
         Err(SendError::NoMailbox(name))
     }

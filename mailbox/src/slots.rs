@@ -30,7 +30,8 @@ const DISPLACE_LOOKS_MAX: usize = 4;
 /// What senders and receiver touch with every package, together in as few cache lines as can be.
 #[repr(C, align(64))]
 pub(crate) struct Hot {
-    /// Next ticket: the order of publishing. Also the count of all packages ever sent here.
+    /// Next ticket: the order of publishing. Also the count of packages ever accepted here (one too many for each
+    /// sender that was killed between its ticket and its word).
     pub(crate) ticket: AtomicU64,
     /// Not 0: the receiver sleeps or is about to; ring its bell. Written by the receiver alone.
     pub(crate) sleeping: AtomicU32,

@@ -24,8 +24,8 @@ pub fn schedule(how: Scheduling) -> io::Result<()> {
     match how {
         Scheduling::Fifo(priority) => {
             // A runaway must not take the computer with it. Only ever lowered, so it cannot be refused.
-            let (_, hard) = getrlimit(Resource::RLIMIT_RTTIME)?;
-            setrlimit(Resource::RLIMIT_RTTIME, RUNAWAY_US.min(hard), hard)?;
+            let (soft, hard) = getrlimit(Resource::RLIMIT_RTTIME)?;
+            setrlimit(Resource::RLIMIT_RTTIME, RUNAWAY_US.min(soft), hard)?;
             let parameters = libc::sched_param { sched_priority: i32::from(priority.clamp(1, 99)) };
             // SAFETY: reads the parameters, which live here; 0 is the calling thread.
             check(unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) })

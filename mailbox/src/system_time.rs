@@ -268,10 +268,11 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
-    /// Goes on in the same epoch with another pace, never back.
-    pub fn set_pace(&mut self, pace: f64) {
+    /// Goes on in the same epoch with another pace, never back. False when the pace stays as it was: this thread was held up
+    /// each time it tried.
+    pub fn set_pace(&mut self, pace: f64) -> bool {
         let page: &TimePage = self.mapping.at(0);
-        let Some(last) = page.read() else { return };
+        let Some(last) = page.read() else { return false };
         let pace_ppb = (pace.clamp(0.0, 1000.0) * 1e9) as u64;
         // Until the index turns, readers go by the old pace. So that the new record is never behind what they read till
         // then, a slower pace begins a little in the future.
@@ -280,10 +281,12 @@ impl TimeKeeper {
             let begin_ns = monotonic_ns() + lead_ns;
             let system_ns = last.at(begin_ns).ns;
             page.fill(&TimeRecord { monotonic_ns: begin_ns, system_ns, pace_ppb, ..last });
+            // From here to the turn are nanoseconds; a thread held up just there for longer than the lead would be late.
             if lead_ns == 0 || monotonic_ns() < begin_ns {
-                break;
+                page.turn();
+                return true;
             }
         }
-        page.turn();
+        false
     }
 }

@@ -123,7 +123,7 @@ pub struct DataHead {
     pub stamp_ns: u64,
     /// Counts the packages of this subscription; a gap is a loss.
     pub sequence: u32,
-    /// Periods so far in which nothing could be delivered.
+    /// Periods so far in which nothing could be delivered, and packages that found the mailbox full.
     pub missed: u32,
 }
 

@@ -32,11 +32,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
     let mut view = View::new(arguments.quiet);
-    while launch.watch(view.wait()) {
-        view.show(&mut launch)?;
+    let mut shown = Ok(());
+    while shown.is_ok() && launch.watch(view.wait()) {
+        shown = view.show(&mut launch);
     }
     view.leave();
-    Ok(end(launch))
+    // Also when it can be shown no more: the modules are stopped in order.
+    let code = end(launch);
+    shown.map(|()| code)
 }
 
 /// Stops everything; what failed for good makes the exit code.

@@ -9,6 +9,10 @@ use serde::Deserialize;
 use std::io::BufRead;
 use std::time::Duration;
 
+/// Records played in one tick at most: a log that is behind catches up in pieces, and commands are heard in between.
+const AT_ONCE_MAX: usize = 64;
+/// Speeds beyond are of no use, and would be the whole log in one tick.
+const SPEED_MAX: f64 = 1000.0;
 /// Records are played so exactly; their stamps are exact.
 const TICK: Duration = Duration::from_millis(2);
 
@@ -33,8 +37,10 @@ pub(super) struct Carmen {
     speed: f64,
     /// Read from the log and not yet due.
     next: Option<Due>,
-    /// System time at which the log began, ns; none before the module was first on.
+    /// System time at which the log began, ns; pauses move it on. None before the module was first on.
     start_ns: Option<u64>,
+    /// When it was switched off.
+    paused_ns: Option<u64>,
     progress: Progress,
 }
 
@@ -46,17 +52,34 @@ impl Module for Carmen {
         let mut reading = carmen::Settings::default();
         reading.range_max_m = settings.range_max_m.unwrap_or(reading.range_max_m);
         let reader = carmen::open(&context.path(&settings.file), reading)?;
+        if settings.speed > SPEED_MAX {
+            return Err(ModuleError::new(format!("speed is {}; use at most {SPEED_MAX}", settings.speed)));
+        }
         let playback = Playback::new(reader, settings.speed)?;
         context.set_period(TICK);
         tracing::info!("plays {} at {} times its speed", settings.file, settings.speed);
         let (speed, progress) = (settings.speed, Progress::default());
-        Ok(Self { playback, speed, next: None, start_ns: None, progress })
+        Ok(Self { playback, speed, next: None, start_ns: None, paused_ns: None, progress })
+    }
+
+    fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        if let (Some(start_ns), Some(paused_ns)) = (self.start_ns, self.paused_ns.take()) {
+            self.start_ns = Some(start_ns + context.now().ns.saturating_sub(paused_ns));
+        }
+        Ok(())
+    }
+
+    fn off(&mut self, context: &mut Context) {
+        self.paused_ns = Some(context.now().ns);
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let now_ns = context.now().ns;
         let start_ns = *self.start_ns.get_or_insert(now_ns);
-        while !self.progress.finished {
+        for _ in 0..AT_ONCE_MAX {
+            if self.progress.finished {
+                break;
+            }
             let Some(due) = self.next.take().map(Ok).or_else(|| self.playback.next()).transpose()? else {
                 self.finish();
                 break;

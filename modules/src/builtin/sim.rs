@@ -40,6 +40,23 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    fn check(&self) -> Result<(), ModuleError> {
+        for (name, value, least, most) in [
+            ("beams", self.beams as f64, 1.0, 10_000.0),
+            ("dead-man-ms", self.dead_man_ms as f64, 10.0, 60_000.0),
+            ("laser-rate-hz", self.laser_rate_hz, 0.01, 100.0),
+            ("odometry-rate-hz", self.odometry_rate_hz, 0.01, 100.0),
+            ("range-max-m", self.range_max_m, 0.1, 1000.0),
+        ] {
+            if !(least..=most).contains(&value) {
+                return Err(ModuleError::new(format!("{name} is {value}; use {least} to {most}")));
+            }
+        }
+        Ok(())
+    }
+}
+
 pub(super) struct Sim {
     simulator: Simulator,
     clock: SystemClock,
@@ -83,6 +100,7 @@ impl Module for Sim {
     type Interfaces = (MotorInterface, WheelsInterface, LaserInterface);
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+        settings.check()?;
         let world = world(&settings, context)?;
         let (width_m, height_m) = world.size_m();
         tracing::info!("simulates a robot in {}, {width_m:.0} m by {height_m:.0} m", settings.map);

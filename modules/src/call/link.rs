@@ -126,6 +126,10 @@ impl Link {
         timeout: Duration,
         arguments: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
     ) -> Result<u32, CallError> {
+        // The number may come from another process's description.
+        if !(1..=Type::COMMAND_MAX).contains(&function) {
+            return Err(CallError::BadArguments(format!("{function} is no function's number")));
+        }
         // Counted for each server: one that hangs must not keep us from calling others.
         let there = self.calls.iter().filter(|call| call.to == to).count();
         if there >= REPLIES_KEPT || self.calls.len() >= CALLS_MAX {

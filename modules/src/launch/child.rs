@@ -1,5 +1,6 @@
 //! One module's process: started, watched, started again, stopped.
 
+use super::leftovers::KILL_TIME;
 use crate::runtime::environment;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -249,6 +250,12 @@ impl Child {
         let mut killed = None;
         while let Some(process) = &mut self.process {
             match process.try_wait() {
+                Ok(None) if killed.is_some() && Instant::now() >= deadline + KILL_TIME => {
+                    // It waits for broken hardware, say. The others still have to be stopped.
+                    killed =
+                        Some(format!("{} (process {}) cannot even be killed; left behind", self.text, process.id()));
+                    break;
+                }
                 Ok(None) if Instant::now() < deadline || killed.is_some() => {
                     std::thread::sleep(Duration::from_millis(2));
                 }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A process that was killed ends within this time, or never (it waits for a broken disk, say).
-const KILL_TIME: Duration = Duration::from_secs(5);
+pub(super) const KILL_TIME: Duration = Duration::from_secs(5);
 
 /// File in a node's directory that tells tools which configuration runs: its path, then the node's name.
 pub const CONFIG_FILE: &str = "config";
@@ -18,7 +18,7 @@ pub const CONFIG_FILE: &str = "config";
 /// Ends modules of this node that still live though no launch watches them, and removes mailboxes that nobody owns.
 pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str) -> Result<Vec<String>, LaunchError> {
     let ours = || {
-        // Who joins or leaves just now has no number in the table; 0 would be our own process group.
+        // Who joins or leaves just now has no name in the table, or no number; 0 would be our own process group.
         let other = |pid: u32| pid != std::process::id() && pid != 0;
         let named = |name| installation.modules_on(node_name).any(|module| module.name == name);
         node.participants().into_iter().filter(move |p| named(p.module) && other(p.pid)).collect::<Vec<_>>()
@@ -26,7 +26,10 @@ pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str
     let mut notes = Vec::new();
     for participant in ours() {
         let name = installation.classes.format(participant.module);
-        notes.push(format!("{name} (process {}) was left over from an earlier launch; ended", participant.pid));
+        notes.push(format!(
+            "{name} (process {}) ran already, left over from an earlier launch or started by hand; ended",
+            participant.pid
+        ));
         send(participant.pid, Signal::SIGTERM);
     }
     let patience = installation.modules_on(node_name).map(|module| module.stop_within).max().unwrap_or_default();

@@ -74,7 +74,8 @@ pub enum Event {
     Child,
 }
 
-/// A node that is launched.
+/// A node that is launched. The thread that begins it must live as long as its modules: the kernel takes that thread's end
+/// for launch's, and tells them so.
 pub struct Launch {
     installation: Arc<Installation>,
     node_name: String,
@@ -151,14 +152,15 @@ impl Launch {
         for index in 0..self.children.len() {
             self.children[index].spawn();
             loop {
-                let stop = matches!(self.events.recv_timeout(LOOK_STARTING), Ok(Event::Stop));
+                if self.told_to_stop(LOOK_STARTING) {
+                    return Err(LaunchError::NotReady(self.children[index].text().into(), "told to stop".into()));
+                }
                 // Those that were started before may end meanwhile.
                 (0..=index).for_each(|index| self.step(index));
                 let child = &self.children[index];
                 match child.phase() {
                     Phase::Ready | Phase::Ended => break,
                     Phase::Failed(why) => return Err(LaunchError::NotReady(child.text().into(), why.clone())),
-                    _ if stop => return Err(LaunchError::NotReady(child.text().into(), "told to stop".into())),
                     _ => {}
                 }
             }
@@ -171,7 +173,7 @@ impl Launch {
         for index in 0..self.children.len() {
             self.switch_on(index);
             while self.switching[index].is_some() {
-                if matches!(self.events.recv_timeout(LOOK_SWITCHING), Ok(Event::Stop)) {
+                if self.told_to_stop(LOOK_SWITCHING) {
                     return Err(LaunchError::NotReady(self.children[index].text().into(), "told to stop".into()));
                 }
                 (0..self.children.len()).for_each(|index| self.step(index));
@@ -236,15 +238,20 @@ impl Launch {
         self.note(note);
     }
 
+    /// Waits for an event, at most for `period`. Whoever could send one being gone is a word to stop, too.
+    fn told_to_stop(&self, period: Duration) -> bool {
+        match self.events.recv_timeout(period) {
+            Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => true,
+            Ok(Event::Child) | Err(RecvTimeoutError::Timeout) => false,
+        }
+    }
+
     /// Watches for at most `period`, or until something happens; false when it is time to stop.
     pub fn watch(&mut self, period: Duration) -> bool {
         let starting = self.children.iter().any(|child| matches!(child.phase(), Phase::Starting | Phase::Ready));
         let look = if starting { LOOK_STARTING } else { Duration::MAX };
         let look = if self.switching.iter().any(Option::is_some) { LOOK_SWITCHING } else { look };
-        let stop = match self.events.recv_timeout(period.min(look)) {
-            Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => true,
-            Ok(Event::Child) | Err(RecvTimeoutError::Timeout) => false,
-        };
+        let stop = self.told_to_stop(period.min(look));
         for index in 0..self.children.len() {
             self.step(index);
             self.switch_on(index);

@@ -6,7 +6,6 @@ use crossbeam_queue::ArrayQueue;
 use rohrpost_config::{Installation, Level};
 use rohrpost_mailbox::{Label, Name, Options, Participant, Priority, SendError, Sender, SystemClock, Type};
 use std::fmt::{self, Write};
-use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 use std::time::{Duration, Instant};
@@ -37,7 +36,7 @@ struct Output {
     lost: AtomicU64,
     way: Mutex<Way>,
     /// Also print lines from this level on.
-    print: Option<OutputLevel>,
+    print: OutputLevel,
 }
 
 struct Way {
@@ -70,7 +69,7 @@ pub fn install(participant: &Arc<Participant>, installation: &Installation, me: 
         lost_now: AtomicU32::new(0),
         lost: AtomicU64::new(0),
         way: Mutex::new(way),
-        print: (launched || std::io::stderr().is_terminal() || !cfg!(test)).then_some(print),
+        print,
     };
     if OUTPUT.set(output).is_ok() {
         let subscriber = tracing_subscriber::registry().with(OutputLayer);
@@ -111,6 +110,11 @@ pub fn set_level(level: OutputLevel) {
     }
 }
 
+/// Whether events become lines, and are printed where that is wanted.
+pub(crate) fn is_installed() -> bool {
+    OUTPUT.get().is_some()
+}
+
 /// Lines lost so far.
 pub fn lost() -> u64 {
     OUTPUT.get().map_or(0, |output| output.lost.load(Ordering::Relaxed))
@@ -131,7 +135,7 @@ pub fn retry_at() -> Option<Instant> {
 
 impl Output {
     fn say(&self, level: OutputLevel, text: String) {
-        if self.print.is_some_and(|least| level <= least) {
+        if level <= self.print {
             super::print(&format_args!("{:5} {text}", level.name()));
         }
         let line = OutputLine { time_ns: self.clock.now().ns, module: self.me.raw(), level, lost: 0, text };

@@ -6,6 +6,7 @@
 
 mod layer;
 
+pub(crate) use layer::is_installed;
 pub use layer::{drain, install, lost, retry_at, set_level};
 
 use crate::common::OutputLevel;
@@ -20,10 +21,17 @@ pub const CLASS: &str = "output";
 /// Longest text of a line, bytes; what is longer is cut.
 pub const TEXT_MAX: usize = 900;
 
-/// Prints a line to standard error. Whoever read it may be gone; that is no reason to panic.
+/// Prints a line to standard error, if that takes it at once: whoever reads it may be gone, or stopped, and neither is a
+/// reason to panic or to wait.
 pub(crate) fn print(line: &dyn std::fmt::Display) {
+    use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
     use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "{line}");
+    use std::os::fd::AsFd;
+    let stderr = std::io::stderr();
+    let mut room = [PollFd::new(stderr.as_fd(), PollFlags::POLLOUT)];
+    if poll(&mut room, PollTimeout::ZERO).is_ok_and(|ready| ready > 0) {
+        let _ = writeln!(stderr.lock(), "{line}");
+    }
 }
 
 /// One line of output.

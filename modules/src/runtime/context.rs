@@ -16,7 +16,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Shorter ones leave no time for anything else; longer ones no clock can hold.
+/// Shorter ones leave no time for anything else; longer ones are never.
 const PERIOD_MIN: Duration = Duration::from_micros(10);
 const PERIOD_MAX: Duration = Duration::from_secs(86_400);
 

@@ -35,7 +35,9 @@ pub fn run<M: Module>() -> ExitCode {
         Err(error) => {
             tracing::error!("{error}");
             output::drain();
-            output::print(&error);
+            if !output::is_installed() {
+                output::print(&error);
+            }
             ExitCode::FAILURE
         }
     }
@@ -271,6 +273,7 @@ impl<M: Module> Running<M> {
         self.life.enter(ModuleState::Stopping);
         tracing::debug!("ends");
         output::drain();
+        self.life.participant.leave();
         if !self.by_hand {
             return;
         }
