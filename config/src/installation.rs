@@ -110,7 +110,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
         _ => PathBuf::from("."),
     };
-    let name = file.required("installation", "installation = \"demo\"").and_then(|item| item.text("demo"));
+    let name = file.required("installation", "installation = \"demo\"").and_then(|item| item.word("demo"));
     let system = System::read(required(&file, "system", "`[system]` with `name = \"robot\"` and `id = 1`"));
     let classes = ClassTable::read(
         required(&file, "classes", "`[classes]` with lines such as `laser = { id = 150, text = \"Tells distances\" }`"),

@@ -4,6 +4,7 @@
 //! name any other. A wrong value is reported and read as missing: the defaults that then stand in never leave this
 //! crate, since a file with problems gives no installation.
 
+use crate::classes::is_word;
 use crate::errors::Problem;
 use crate::units;
 use std::cell::RefCell;
@@ -145,6 +146,12 @@ impl<'d> Item<'d> {
             Some(text) => Some(text),
             None => self.wrong(&format!("text in quotes, such as `{} = \"{example}\"`", self.key)),
         }
+    }
+
+    /// Text that becomes part of a path: it must not be one.
+    pub(crate) fn word(&self, example: &str) -> Option<&'d str> {
+        let text = self.text(example)?;
+        if is_word(text) { Some(text) } else { self.wrong("small letters, digits and `-`, a letter first") }
     }
 
     pub(crate) fn flag(&self) -> Option<bool> {

@@ -19,7 +19,7 @@ fn parse(text: &str) -> Installation {
 #[test]
 fn every_key_arrives() {
     let full = parse(FULL);
-    assert_eq!((full.name.as_str(), full.system.name.as_str(), full.system.id), ("two computers", "ottfried", 7));
+    assert_eq!((full.name.as_str(), full.system.name.as_str(), full.system.id), ("two-computers", "ottfried", 7));
     assert_eq!(full.folder, Path::new("conf"));
     assert_eq!(full.scheduling(Class(159)), Scheduling::Normal { nice: 0 });
     assert_eq!(full.scheduling(Class(160)), Scheduling::Fifo { priority: 1 });

@@ -252,10 +252,12 @@ impl Node {
         self.page().entries.iter().filter(|e| e.pid.load(Ordering::Relaxed) != 0).for_each(|e| doorbell::ring(&e.bell));
     }
 
-    /// All participants alive.
+    /// All participants alive, but for those that are joining or leaving just now.
     pub fn participants(&self) -> Vec<ParticipantInfo> {
         let alive = |index: &u16| lock::is_locked(&self.file, u64::from(*index)).unwrap_or(false);
-        (0..PARTICIPANTS_MAX as u16).filter(alive).map(|index| self.entry(index).read()).collect()
+        let all = (0..PARTICIPANTS_MAX as u16).filter(alive).map(|index| self.entry(index).read());
+        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group.
+        all.filter(|participant| participant.pid != 0).collect()
     }
 
     /// Process id of the launch that runs this node now.

@@ -3,6 +3,7 @@
 use super::Failure;
 use rohrpost::Start;
 use rohrpost::config::BUILTINS;
+use rohrpost_modules::runtime::exit;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -16,9 +17,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
-    let start = Start::from_arguments(arguments.arguments.into_iter())?;
+    let start = match Start::from_arguments(arguments.arguments.into_iter()) {
+        Ok(start) => start,
+        Err(error) => return Ok(exit(Err(error))),
+    };
     match rohrpost_modules::builtin::run(&arguments.builtin, start) {
-        Some(result) => result.map(|()| ExitCode::SUCCESS).map_err(Into::into),
+        Some(result) => Ok(exit(result)),
         None => Err(format!("no built-in module `{}`; there are: {}", arguments.builtin, BUILTINS.join(", ")).into()),
     }
 }

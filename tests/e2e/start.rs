@@ -92,7 +92,7 @@ fn an_optional_module_is_left_out_with_a_notice() {
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
     wait("output.0 is on", || (robot.state("output.0") == "on").then_some(()));
-    launch.wait_for("left out: ");
+    launch.wait_for("the module is left out, since it is optional");
     let out = launch.stop();
     assert!(out.contains("module `probe.1`: `rohrpost-nowhere` is neither in"), "{out}");
     place.assert_empty();

@@ -1,7 +1,7 @@
 //! One module's process: started, watched, started again, stopped.
 
 use super::leftovers::KILL_TIME;
-use crate::runtime::environment;
+use crate::runtime::{StartError, environment};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost_config::{Installation, Module, Program, Restart, RestartPolicy, Start, find_program};
@@ -195,7 +195,10 @@ impl Child {
             (None, Some(signal)) => format!("was killed by signal {signal}"),
             (None, None) => "ended".to_owned(),
         };
+        // Started again, it would find the same configuration.
+        let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
         let again = match self.restart.policy {
+            _ if misconfigured => false,
             RestartPolicy::Never => false,
             RestartPolicy::OnFailure => !status.success(),
             RestartPolicy::Always => true,

@@ -126,7 +126,7 @@ impl Launch {
         let mode = installation.node(node_name).map_or(0o700, |node| node.mode);
         let (node, lock) = take_node(&node_directory(&installation.name, node_name), mode)?;
         let mut notes = leftovers::end(&node, &installation, node_name)?;
-        notes.extend(missing.iter().map(|program| format!("left out: {program}")));
+        notes.extend(missing.iter().map(ToString::to_string));
         let time = begin_time(&node, &installation)?;
         leftovers::note_config(&node, &installation, node_name)?;
         let tool = ToolLink::join(&installation, &node, node_name, PATIENCE)?;

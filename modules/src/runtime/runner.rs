@@ -30,17 +30,18 @@ const PAUSE: Duration = Duration::from_micros(50);
 /// Launch tells it by its environment what it is; by hand say `--config FILE --name CLASS.INSTANCE` (and `--off`, to leave it
 /// switched off).
 pub fn run<M: Module>() -> ExitCode {
-    match Start::from_environment().and_then(run_started::<M>) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            tracing::error!("{error}");
-            output::drain();
-            if !output::is_installed() {
-                output::print(&error);
-            }
-            ExitCode::FAILURE
-        }
+    exit(Start::from_environment().and_then(run_started::<M>))
+}
+
+/// Tells what went wrong, and turns it into an exit code.
+pub fn exit(result: Result<(), StartError>) -> ExitCode {
+    let Err(error) = result else { return ExitCode::SUCCESS };
+    tracing::error!("{error}");
+    output::drain();
+    if !output::is_installed() {
+        output::print(&error);
     }
+    ExitCode::from(error.exit_code())
 }
 
 /// Runs a module as something that was started already says: for programs that hold several kinds of module.

@@ -68,6 +68,24 @@ pub enum StartError {
     System(&'static str, std::io::Error),
 }
 
+impl StartError {
+    /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the same way.
+    pub const CONFIGURATION: u8 = 78;
+
+    /// The exit code that tells launch whether starting again may help.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_)
+            | Self::Config(_)
+            | Self::Name(_)
+            | Self::NoModule(..)
+            | Self::Settings(_)
+            | Self::Face(..) => Self::CONFIGURATION,
+            Self::Node(_) | Self::Mailbox(_) | Self::Orphan(_) | Self::Module(..) | Self::System(..) => 1,
+        }
+    }
+}
+
 /// What to start.
 #[derive(Debug)]
 pub struct Start {
@@ -216,13 +234,15 @@ fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<A
 }
 
 /// Asks for the class's scheduling; a refusal is one warning.
-fn schedule(how: Scheduling) {
-    let how = match how {
+fn schedule(wanted: Scheduling) {
+    let how = match wanted {
         Scheduling::Fifo { priority } => sys::Scheduling::Fifo(priority),
         Scheduling::Normal { nice } => sys::Scheduling::Normal(nice),
     };
     if let Err(error) = sys::schedule(how) {
-        tracing::warn!("runs without its scheduling {how:?}: {error}; allow it with `ulimit -r 99` or CAP_SYS_NICE");
+        tracing::warn!(
+            "runs without {wanted}: {error}; allow it with a limit `rtprio` for this user (limits.conf) or CAP_SYS_NICE"
+        );
     } else if let sys::Scheduling::Fifo(_) = how {
         match sys::lock_memory() {
             Ok(true) => {}
