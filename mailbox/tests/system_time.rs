@@ -21,7 +21,9 @@ fn role() {
         let pace = 1 + turn % 9;
         let source = if pace.is_multiple_of(2) { TimeSource::Log } else { TimeSource::Simulation };
         let mut keeper = TimeKeeper::begin(&node, source, pace * MARK_NS, pace as f64).unwrap();
-        (0..50).for_each(|_| keeper.set_pace(pace as f64));
+        for _ in 0..50 {
+            keeper.set_pace(pace as f64);
+        }
     }
 }
 

@@ -131,8 +131,9 @@ fn tools_say_what_to_do_while_nothing_runs() {
     let config = place.config(&[OUTPUT]);
     let told = place.say(&["list", "--config", config.to_str().unwrap()]).fails();
     assert!(told.contains("is it launched?"), "{told}");
-    let told = place.say(&["run", "output"]).fails();
-    assert!(told.contains("--config FILE --name CLASS.INSTANCE"), "{told}");
+    let said = place.say(&["run", "output"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("--config FILE --name CLASS.INSTANCE"), "{said:?}");
     let told = place.say(&["run", "mop", "--config", config.to_str().unwrap(), "--name", "output.0"]).fails();
     assert!(told.contains("no built-in module `mop`; there are: "), "{told}");
     place.assert_empty();

@@ -75,12 +75,11 @@ impl StartError {
     /// The exit code that tells launch whether starting again may help.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_)
-            | Self::Config(_)
-            | Self::Name(_)
-            | Self::NoModule(..)
-            | Self::Settings(_)
-            | Self::Face(..) => Self::CONFIGURATION,
+            // As command lines everywhere do.
+            Self::Usage(_) => 2,
+            Self::Config(_) | Self::Name(_) | Self::NoModule(..) | Self::Settings(_) | Self::Face(..) => {
+                Self::CONFIGURATION
+            }
             Self::Node(_) | Self::Mailbox(_) | Self::Orphan(_) | Self::Module(..) | Self::System(..) => 1,
         }
     }
