@@ -17,8 +17,7 @@ pub trait Compass {
 #[derive(rohrpost::serde::Deserialize)]
 #[serde(crate = "rohrpost::serde", deny_unknown_fields, rename_all = "kebab-case")]
 struct Settings {
-    wheels: String,
-    rate_hz: f64,
+    rate_hz: Option<f64>,
 }
 
 struct WheelCompass {
@@ -32,8 +31,8 @@ impl Module for WheelCompass {
     type Interfaces = CompassInterface;
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
-        context.set_period(std::time::Duration::try_from_secs_f64(1.0 / settings.rate_hz)?);
-        let wheels = context.subscribe(interfaces::WheelsInterface::ODOMETRY, &settings.wheels, Rate::Each)?;
+        context.set_period(std::time::Duration::try_from_secs_f64(1.0 / settings.rate_hz.unwrap_or(5.0))?);
+        let wheels = context.subscribe(interfaces::WheelsInterface::ODOMETRY, "odometry.0", Rate::Each)?;
         Ok(Self { wheels, turned_deg: 0.0, correction_deg: 0.0 })
     }
 

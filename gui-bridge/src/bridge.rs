@@ -56,6 +56,8 @@ struct Drawn {
     rate: Rate,
     /// None until its module has described it.
     way: Option<Way>,
+    /// Its module has said that it has no such data.
+    refused: bool,
 }
 
 struct Way {
@@ -94,7 +96,7 @@ impl Module for Bridge {
             let from = Name::new(installation.system.id, class.0, 0, 0);
             if installation.module(from).is_some() {
                 let (module, data) = (text(from), "line".to_owned());
-                drawn.push(Drawn { from, module, data, rate: Rate::Each, way: None });
+                drawn.push(Drawn { from, module, data, rate: Rate::Each, way: None, refused: false });
             }
         }
         let me = installation.module(context.me()).ok_or_else(|| ModuleError::new("it is not in the configuration"))?;
@@ -155,7 +157,14 @@ impl Module for Bridge {
 }
 
 fn wanted(show: &Show, module: String) -> Drawn {
-    Drawn { from: show.from, module, data: show.data.clone(), rate: Rate::hz(show.rate.unwrap_or(0.0)), way: None }
+    Drawn {
+        from: show.from,
+        module,
+        data: show.data.clone(),
+        rate: Rate::hz(show.rate.unwrap_or(0.0)),
+        way: None,
+        refused: false,
+    }
 }
 
 /// What a value needs besides itself to be drawn.
@@ -215,7 +224,7 @@ fn level(level: OutputLevel) -> Level {
 impl Bridge {
     /// Asks for the descriptions that are missing, and subscribes to what they tell.
     fn subscribe(&mut self, context: &mut Context) {
-        for drawn in self.drawn.iter_mut().filter(|drawn| drawn.way.is_none()) {
+        for drawn in self.drawn.iter_mut().filter(|drawn| drawn.way.is_none() && !drawn.refused) {
             let description = match describe(drawn.from, context) {
                 Ok(description) => description,
                 Err(error) => {
@@ -224,6 +233,7 @@ impl Bridge {
                 }
             };
             let Some(item) = description.data_item(&drawn.data).cloned() else {
+                drawn.refused = true;
                 let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
                 let (module, data) = (&drawn.module, &drawn.data);
                 tracing::warn!("{module} has no data `{data}` to draw; it has: {}", names.join(", "));

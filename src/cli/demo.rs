@@ -64,7 +64,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let summary = summary(&mut launch);
     let code = end(launch);
     outcome?;
-    say(summary?.trim_end());
+    let (text, well) = summary?;
+    say(text.trim_end());
     let is_new = |path: &PathBuf| path.metadata().and_then(|file| file.modified()).is_ok_and(|at| at >= begun);
     if let Some(path) = drawing.filter(is_new) {
         let path = path.canonicalize().unwrap_or(path);
@@ -72,7 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let path = path.strip_prefix(here).unwrap_or(&path).display();
         say(format_args!("drawing: {path} (to open it: rerun {path})"));
     }
-    Ok(code)
+    Ok(if well { code } else { ExitCode::FAILURE })
 }
 
 /// The file that the GUI will write, if it writes one.
@@ -196,15 +197,22 @@ fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interf
     launch.tool().call(module, FIRST_FUNCTION, interface, |_| Ok(()), read).ok()
 }
 
-/// What there is to say at the end: packages, losses and latencies by class, and what came of them.
-fn summary(launch: &mut Launch) -> Result<String, Failure> {
+/// What there is to say at the end: packages, losses and latencies by class, and what came of them; and
+/// whether all is well.
+fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
     let survey = launch.survey()?;
     let mut text = print_classes(launch.installation(), &survey.classes);
     let received: u64 = survey.classes.iter().map(|class| class.received).sum();
     let lost: u64 = survey.classes.iter().map(rohrpost::mailbox::ClassTraffic::lost_in_all).sum();
+    text.push_str("(data and replies carry the class of the module that asked for them)\n");
     text.push_str(&format!("\n{received} packages received, {lost} lost\n"));
+    let mut well = true;
     if let Some(played) = progress(launch) {
         let Progress { scans, odometries, discarded, malformed, .. } = played;
+        if played.finished && scans + odometries == 0 {
+            well = false;
+            text.push_str("the log holds no record that is known: is it a CARMEN log?\n");
+        }
         text.push_str(&format!(
             "log: {scans} scans and {odometries} odometry lines played, {discarded} discarded for their stamps, \
              {malformed} broken\n"
@@ -223,8 +231,9 @@ fn summary(launch: &mut Launch) -> Result<String, Failure> {
             && status.state == State::Error
         {
             let name = launch.installation().classes.format(module.name);
+            well = false;
             text.push_str(&format!("{name} is in error: {}\n", status.error));
         }
     }
-    Ok(text)
+    Ok((text, well))
 }

@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
     };
     tool.close();
-    result
+    result.map_err(|error: Failure| running.told(collector, &*error))
 }
 
 /// Prints all lines from `next` on; false when nobody reads any more.

@@ -103,3 +103,14 @@ fn the_configuration_of_the_present_folder_is_taken_if_there_is_one() {
     assert!(demo.end().success());
     place.assert_empty();
 }
+
+#[test]
+fn a_log_that_is_none_is_told_and_fails() {
+    let place = Place::new();
+    let log = place.path("poem.txt");
+    std::fs::write(&log, "Fest gemauert in der Erden\nsteht die Form, aus Lehm gebrannt.\n").unwrap();
+    let said = place.say(&["demo", "--log", log.to_str().unwrap(), "--no-gui", "--quiet"]);
+    assert_eq!(said.code, Some(1), "{said:?}");
+    assert!(said.out.contains("is it a CARMEN log?"), "{said:?}");
+    place.assert_empty();
+}

@@ -16,6 +16,7 @@ mod once;
 mod once_wrap;
 mod probe;
 mod process;
+mod readme;
 mod restart;
 mod screen;
 mod start;

@@ -32,7 +32,24 @@ pub(crate) fn ci() -> Result<ExitCode, Failure> {
     let deny = ["--all-targets", "--", "--deny", "warnings"];
     cargo::run("clippy for all but the GUI bridge", cargo(&["clippy", "--workspace", "--exclude", BRIDGE]).args(deny))?;
     cargo::run("clippy for the GUI bridge", &mut bridge_clippy())?;
+    let bare = ["clippy", "--package", "rohrpost", "--package", "rohrpost-modules", "--no-default-features", "--lib"];
+    cargo::run("clippy for what the author of a module compiles", cargo(&bare).args(["--", "--deny", "warnings"]))?;
+    no_command_line()?;
     test()
+}
+
+/// Without default features nothing of the command line, of the built-in modules or of Rerun may be compiled.
+fn no_command_line() -> Result<(), Failure> {
+    let arguments =
+        ["tree", "--package", "rohrpost", "--no-default-features", "--edges", "normal,build", "--prefix", "none"];
+    let output = cargo(&arguments).output().map_err(|error| format!("cargo tree: {error}"))?;
+    let tree = String::from_utf8_lossy(&output.stdout);
+    let unwanted = ["clap ", "comfy-table ", "serde_json ", "flate2 ", "rand ", "rerun "];
+    let found: Vec<&str> = tree.lines().filter(|line| unwanted.iter().any(|name| line.starts_with(name))).collect();
+    if !output.status.success() || !tree.starts_with("rohrpost ") || !found.is_empty() {
+        return Err(format!("the author of a module would compile {found:?} ({})", output.status).into());
+    }
+    Ok(())
 }
 
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the compiler of

@@ -1,5 +1,7 @@
 //! The `interface` and `data` attributes. Use them through the crate `rohrpost`.
 
+#![forbid(unsafe_code)]
+
 mod interface;
 
 use proc_macro::TokenStream;

@@ -167,6 +167,13 @@ impl Context {
         if class != wanted {
             return Err(ContextError::Class { module: module.into(), class: class.into(), wanted });
         }
+        // The configuration counts on `calls`: who calls how many decides how many slots a mailbox needs.
+        let declared = self.installation.module(self.me).is_none_or(|me| me.calls.contains(&name));
+        if !declared {
+            tracing::warn!(
+                "it calls {module}, which its `calls` does not name; add it, so that `check` can count on it"
+            );
+        }
         Ok(name)
     }
 
