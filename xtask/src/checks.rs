@@ -47,7 +47,7 @@ fn no_command_line() -> Result<(), Failure> {
     let unwanted = ["clap ", "comfy-table ", "serde_json ", "flate2 ", "rand ", "rerun "];
     let found: Vec<&str> = tree.lines().filter(|line| unwanted.iter().any(|name| line.starts_with(name))).collect();
     if !output.status.success() || !tree.starts_with("rohrpost ") || !found.is_empty() {
-        return Err(format!("the author of a module would compile {found:?} ({})", output.status).into());
+        return Err(format!("the author of a module would compile {found:?} ({})", output.status));
     }
     Ok(())
 }
