@@ -4,9 +4,8 @@
 //! it. Types that are not known here are drawn by their description.
 
 use crate::{Connection, DrawError, Level, Scene, Sink};
-use rohrpost::common::{self, OutputLevel};
+use rohrpost::common::OutputLevel;
 use rohrpost::config::Show;
-use rohrpost::description::Description;
 use rohrpost::interface::{Interface, Proxy};
 use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
 use rohrpost::mailbox::{ModuleState, Node};
@@ -24,8 +23,6 @@ use std::time::Duration;
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
 /// A module whose description is wanted answers within this time, or is asked again at the next survey.
 const PATIENCE: Duration = Duration::from_millis(300);
-/// Bytes of a description at most: what another process claims is not believed without end.
-const DESCRIPTION_MAX: usize = 256 * 1024;
 
 /// What the configuration says of the bridge.
 #[derive(Deserialize)]
@@ -225,7 +222,7 @@ impl Bridge {
     /// Asks for the descriptions that are missing, and subscribes to what they tell.
     fn subscribe(&mut self, context: &mut Context) {
         for drawn in self.drawn.iter_mut().filter(|drawn| drawn.way.is_none() && !drawn.refused) {
-            let description = match describe(drawn.from, context) {
+            let description = match rohrpost::describe(&mut context.link().borrow_mut(), drawn.from, PATIENCE) {
                 Ok(description) => description,
                 Err(error) => {
                     tracing::debug!("{} does not describe itself yet: {error}", drawn.module);
@@ -275,23 +272,6 @@ fn kind_of(item: &rohrpost::description::DataItem) -> Kind {
         (OutputLine::schema(), Kind::Line),
     ];
     known.into_iter().find(|(schema, _)| *schema == item.ty).map_or(Kind::Unknown, |(_, kind)| kind)
-}
-
-fn describe(module: Name, context: &Context) -> Result<Description, ModuleError> {
-    let mut link = context.link().borrow_mut();
-    let mut bytes = Vec::new();
-    loop {
-        let from = bytes.len() as u32;
-        let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(from,));
-        let call = link.begin(module, common::DESCRIBE, common::HASH, PATIENCE, write)?;
-        let read = |reply: &[u8]| rohrpost::macro_support::from_bytes::<common::DescriptionPart>(reply);
-        let part = link.wait(call, read)?;
-        let last = part.bytes.is_empty();
-        bytes.extend_from_slice(&part.bytes);
-        if last || bytes.len() >= part.total as usize || bytes.len() > DESCRIPTION_MAX {
-            return Ok(rohrpost::macro_support::from_bytes(&bytes)?);
-        }
-    }
 }
 
 fn states(scene: &mut Scene, survey: &Survey, context: &Context) -> Result<(), DrawError> {

@@ -16,6 +16,7 @@ mod leftovers;
 pub use child::Phase;
 pub use leftovers::CONFIG_FILE;
 
+use crate::call::CallError;
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
@@ -46,6 +47,9 @@ pub enum LaunchError {
     /// Several nodes, or another one.
     #[error("which node? the configuration has {0}; say --node NAME")]
     WhichNode(String),
+    /// One that is not there.
+    #[error("the configuration has no node `{0}`; it has {1}")]
+    NoNode(String, String),
     /// The node.
     #[error(transparent)]
     Node(#[from] NodeError),
@@ -94,11 +98,11 @@ pub struct Launch {
 /// The node that is meant: the one named, or the only one.
 ///
 /// # Errors
-/// [`LaunchError::WhichNode`].
+/// [`LaunchError::WhichNode`] and [`LaunchError::NoNode`].
 pub fn choose_node<'a>(installation: &'a Installation, name: Option<&str>) -> Result<&'a NodeConfig, LaunchError> {
     let names = || installation.nodes.iter().map(|node| node.name.as_str()).collect::<Vec<_>>().join(", ");
     match (name, &installation.nodes[..]) {
-        (Some(name), _) => installation.node(name).ok_or_else(|| LaunchError::WhichNode(names())),
+        (Some(name), _) => installation.node(name).ok_or_else(|| LaunchError::NoNode(name.into(), names())),
         (None, [only]) => Ok(only),
         (None, _) => Err(LaunchError::WhichNode(names())),
     }
@@ -234,7 +238,9 @@ impl Launch {
         };
         let Some(answer) = answer else { return };
         child.runs();
-        let note = answer.err().map(|error| format!("{} could not be switched on: {error}", child.text()));
+        // The lower layers know numbers only.
+        let told = |error: CallError| error.to_string().replace(&child.name().to_string(), child.text());
+        let note = answer.err().map(|error| format!("{} could not be switched on: {}", child.text(), told(error)));
         self.note(note);
     }
 

@@ -151,21 +151,7 @@ impl ToolLink {
     /// # Errors
     /// See [`CallError`].
     pub fn describe(&mut self, module: Name) -> Result<Description, CallError> {
-        let mut bytes = Vec::new();
-        loop {
-            let part: DescriptionPart = self.common(module, common::DESCRIBE, &(bytes.len() as u32,))?;
-            // What it says of itself is a claim.
-            if part.total as usize > DESCRIPTION_MAX {
-                let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
-                return Err(CallError::BadReply(module, text));
-            }
-            let last = part.bytes.is_empty();
-            bytes.extend_from_slice(&part.bytes);
-            if bytes.len() >= part.total as usize || last {
-                break;
-            }
-        }
-        postcard::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
+        describe(&mut self.link, module, self.timeout)
     }
 
     /// Removes the tool's mailboxes.
@@ -175,4 +161,28 @@ impl ToolLink {
         }
         self.link.close();
     }
+}
+
+/// Asks a module what it offers; each part of the answer must come within `timeout`.
+///
+/// # Errors
+/// See [`CallError`].
+pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Description, CallError> {
+    let mut bytes = Vec::new();
+    loop {
+        let from = bytes.len() as u32;
+        let call = link.begin(module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))?;
+        let part: DescriptionPart = link.wait(call, |reply| postcard::from_bytes(reply))?;
+        // What it says of itself is a claim.
+        if part.total as usize > DESCRIPTION_MAX {
+            let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
+            return Err(CallError::BadReply(module, text));
+        }
+        let last = part.bytes.is_empty();
+        bytes.extend_from_slice(&part.bytes);
+        if bytes.len() >= part.total as usize || last {
+            break;
+        }
+    }
+    postcard::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
 }
