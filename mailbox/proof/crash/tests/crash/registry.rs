@@ -72,3 +72,12 @@ fn a_remover_of_an_orphan_dies() {
         assert!(found.packages.is_empty(), "{death:?} {found:?}");
     });
 }
+
+#[test]
+fn who_cleans_up_dies() {
+    each_step("clean up", 5, Ground::orphan, |ground, (), death| {
+        assert!(death.is_some() || !ground.path().exists());
+        let found = adopt_and_drain(ground, u64::from(death.is_some()));
+        assert!(found.packages.is_empty(), "{death:?} {found:?}");
+    });
+}

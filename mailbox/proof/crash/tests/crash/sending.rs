@@ -39,6 +39,23 @@ fn a_sender_dies_displacing() {
 }
 
 #[test]
+fn a_sender_dies_being_refused() {
+    let scene = |ground: &Ground| {
+        let receiver = ground.receiver();
+        ground.send(LOW, 0..4);
+        receiver
+    };
+    each_step("be refused", 5, scene, |ground, mut receiver, death| {
+        let found = drain(ground, &mut receiver, u64::from(death.is_some()));
+        assert_eq!(found.scene(), [0, 1, 2, 3], "{death:?}");
+        assert_eq!(found.times(100), 0, "{death:?}");
+        let counted = death.is_none_or(|death| death.step == "counters: loss");
+        assert_eq!(found.lost(Loss::Refused), u64::from(counted), "{death:?}");
+        all_usable(ground, receiver);
+    });
+}
+
+#[test]
 fn a_sender_dies_beside_a_sleeping_receiver() {
     let scene = |ground: &Ground| {
         let mut receiver = ground.receiver();

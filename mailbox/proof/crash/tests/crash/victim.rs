@@ -43,6 +43,12 @@ fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             send(&mut sender, HIGH, 100).unwrap();
             die_with(sender);
         }
+        "be refused" => {
+            let mut sender = ground.sender();
+            arm();
+            assert!(send(&mut sender, LOW, 100).is_err());
+            die_with(sender);
+        }
         "drop a loan" => {
             let mut sender = ground.sender();
             arm();
@@ -107,6 +113,11 @@ fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             let node = ground.node();
             arm();
             assert!(node.remove_orphan(MAILBOX).unwrap());
+        }
+        "clean up" => {
+            let node = ground.node();
+            arm();
+            assert!(node.remove_if_dead().unwrap());
         }
         "begin time" => {
             let node = ground.node();
