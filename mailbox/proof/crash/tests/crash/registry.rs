@@ -22,13 +22,21 @@ fn a_maker_of_a_node_dies() {
 fn a_joiner_dies() {
     each_step(
         "join",
-        3,
+        6,
         |_| (),
         |ground, (), _| {
             let participant = ground.join();
             assert_eq!(ground.node().participants().len(), 1);
             assert_eq!(ground.node().participants()[0].incarnation, participant.incarnation());
-            drop(participant);
+            // Whatever table the dead one left, this is a new one and whole.
+            assert!(ground.node().traffic().is_empty());
+            let receiver = ground.receiver();
+            ground.send(LOW, 0..1);
+            let mut sender = participant.sender(MAILBOX).unwrap();
+            send(&mut sender, LOW, 1).unwrap();
+            assert_eq!(ground.node().traffic().iter().map(|flow| flow.packages).sum::<u64>(), 1);
+            drop((sender, participant));
+            receiver.close();
             empty(ground);
         },
     );
