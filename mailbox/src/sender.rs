@@ -8,6 +8,7 @@ use crate::participant::Participant;
 use crate::segment::{BadSegment, Segment};
 use crate::slots::{Claim, NoSlot, Published};
 use crate::step::step;
+use crate::traffic::{Key, Writer};
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.
@@ -72,6 +73,8 @@ pub struct Sender {
     participant: Arc<Participant>,
     segment: Segment,
     cursor: usize,
+    /// Counts what it sends.
+    flows: Writer,
 }
 
 impl Participant {
@@ -90,7 +93,7 @@ impl Participant {
         drop(sending);
         // Senders start at different slots, so that they meet less.
         let cursor = usize::from(self.claimant().participant) * 7;
-        Ok(Sender { participant: self.clone(), segment, cursor })
+        Ok(Sender { participant: self.clone(), segment, cursor, flows: self.traffic().writer() })
     }
 }
 
@@ -119,7 +122,7 @@ impl Sender {
     /// When it was not accepted.
     pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
         let len: usize = parts.iter().map(|part| part.len()).sum();
-        let claim = self.claim(label.priority, len)?;
+        let claim = self.claim(label.priority, len).map_err(|error| self.refused(label, error))?;
         let mut loan = Loan { sender: self, claim: Some(claim), priority: label.priority };
         let mut body = loan.body();
         for part in parts {
@@ -135,7 +138,8 @@ impl Sender {
     /// # Errors
     /// [`SendError::Full`], or what reopening a replaced mailbox brings.
     pub fn loan(&mut self, priority: Priority) -> Result<Loan<'_>, SendError> {
-        let claim = self.claim(priority, 0)?;
+        // What it would have been was not said yet.
+        let claim = self.claim(priority, 0).map_err(|error| self.refused(&Label::default(), error))?;
         Ok(Loan { sender: self, claim: Some(claim), priority })
     }
 
@@ -164,13 +168,15 @@ impl Sender {
         let name = self.name();
         for _ in 0..REOPEN_MAX {
             // SAFETY: `claim` is ours, and the loan that could reach its bytes has been consumed.
-            unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
+            let published_ns = unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
             self.count_displaced(&claim);
             match self.segment.slots().publish(claim, label.priority) {
                 Published::Accepted { wake } => {
                     if wake {
                         self.wake();
                     }
+                    step!("send: before count");
+                    self.flows.accepted(self.participant.traffic(), key(label, name), len, published_ns, 0);
                     return Ok(());
                 }
                 Published::Reclaimed => return Err(SendError::Reclaimed(name)),
@@ -201,6 +207,13 @@ impl Sender {
         result
     }
 
+    /// Counts what was not accepted; its sender is told.
+    fn refused(&mut self, label: &Label, error: SendError) -> SendError {
+        let key = key(label, self.name());
+        self.flows.refused(self.participant.traffic(), key);
+        error
+    }
+
     fn count_displaced(&self, claim: &Claim) {
         if let Some(priority) = claim.displaced() {
             self.segment.page().counters.lost(priority, Loss::Displaced, 1);
@@ -218,11 +231,16 @@ impl Sender {
 
 impl Drop for Sender {
     fn drop(&mut self) {
+        self.flows.leave(self.participant.traffic());
         let mut sending = self.participant.sending();
         if let Some(at) = sending.iter().position(|name| *name == self.segment.name) {
             sending.swap_remove(at);
         }
     }
+}
+
+fn key(label: &Label, to: Name) -> Key {
+    Key { to, from: label.from, kind: label.kind }
 }
 
 /// A slot to write a package in.
@@ -250,10 +268,14 @@ impl Loan<'_> {
     pub fn send(mut self, label: &Label, len: usize) -> Result<(), SendError> {
         let max = self.sender.body_bytes_max();
         if len > max {
-            return Err(SendError::TooLarge { name: self.sender.name(), len, max });
+            let error = SendError::TooLarge { name: self.sender.name(), len, max };
+            return Err(self.sender.refused(label, error));
         }
         match self.claim.take() {
-            Some(claim) => self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len),
+            Some(claim) => {
+                let sent = self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len);
+                sent.map_err(|error| self.sender.refused(label, error))
+            }
             None => Ok(()),
         }
     }
