@@ -32,6 +32,7 @@
 mod clock;
 mod counters;
 mod doorbell;
+mod latest;
 mod layout;
 mod lock;
 mod memory;
