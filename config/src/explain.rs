@@ -1,7 +1,8 @@
 //! Says in words what an installation means: the page that `rohrpost check` prints, readable at 100 columns.
 
+use crate::Full;
 use crate::installation::Installation;
-use crate::mailbox::{Full, MailboxSpec};
+use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
 use crate::time::TimeSource;
@@ -225,6 +226,7 @@ fn restart(restart: &Restart) -> String {
 fn mailbox(spec: &MailboxSpec) -> String {
     let full = match spec.full {
         Full::Displace => "full: the least important gives way",
+        Full::Latest => "latest: the newer replaces the older",
         Full::Reject => "full: new ones are refused",
     };
     let (size, memory) = (size_text(spec.size.into()), about(spec.memory()));

@@ -8,7 +8,7 @@ use crate::module::Module;
 use crate::output;
 use nix::sys::signal::Signal;
 use rohrpost_config::{
-    Errors, Full, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState,
+    Errors, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState,
 };
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, base_directory, local,
@@ -188,10 +188,7 @@ pub(crate) fn shape(spec: &MailboxSpec) -> Shape {
     Shape {
         slots: spec.slots,
         body_bytes_max: u16::try_from(spec.size).unwrap_or(u16::MAX),
-        full: match spec.full {
-            Full::Displace => rohrpost_mailbox::Full::Displace,
-            Full::Reject => rohrpost_mailbox::Full::Reject,
-        },
+        full: spec.full,
         max_age: spec.max_age,
         claims: spec.claims,
     }
