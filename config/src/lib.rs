@@ -64,6 +64,7 @@ pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, Start};
 pub use node::{Node, System};
 pub use output::{Level, Output};
 pub use program::{MissingProgram, find_program};
+pub use reader::nearest;
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
 pub use time::TimeSource;

@@ -288,8 +288,8 @@ fn shown(value: &DeValue<'_>) -> String {
     }
 }
 
-/// The candidate that is most like `word`, if one is like it at all.
-pub(crate) fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+/// The candidate that is most like `word`, if one is like it at all: what messages ask back.
+pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     // Both measures: edits for slips of the finger, Jaro-Winkler for words begun right (`max` for `max-age`).
     let likeness = |candidate: &str| {
         let edits = strsim::normalized_damerau_levenshtein(word, candidate);
