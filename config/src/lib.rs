@@ -31,6 +31,7 @@
 //! Every key of the file is described in [`manual`].
 #![forbid(unsafe_code)]
 
+mod calls;
 mod check;
 mod classes;
 mod digest;
@@ -63,6 +64,7 @@ pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, Start};
 pub use node::{Node, System};
 pub use output::{Level, Output};
 pub use program::{MissingProgram, find_program};
+pub use reader::nearest;
 pub use rohrpost_mailbox::Full;
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
