@@ -36,6 +36,17 @@ impl<'d> Reader<'d> {
         self.problems.borrow_mut().push(Problem { line: Some(line), message: message.into() });
     }
 
+    /// What the parser says of a text that is no TOML.
+    pub(crate) fn report_syntax(&self, error: &toml::de::Error) {
+        let span = error.span().unwrap_or(0..0);
+        let there = self.text.get(span.clone()).unwrap_or_default();
+        let message = match error.message() {
+            "duplicate key" => format!("`{there}` is given twice; drop one of them"),
+            message => format!("this is no TOML: {}", message.replace('\n', " ")),
+        };
+        self.report(self.line(span), message);
+    }
+
     pub(crate) fn into_problems(self) -> Vec<Problem> {
         self.problems.into_inner()
     }
@@ -288,7 +299,7 @@ fn shown(value: &DeValue<'_>) -> String {
 }
 
 /// The candidate that is most like `word`, if one is like it at all.
-pub(crate) fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     // Both measures: edits for slips of the finger, Jaro-Winkler for words begun right (`max` for `max-age`).
     let likeness = |candidate: &str| {
         let edits = strsim::normalized_damerau_levenshtein(word, candidate);
