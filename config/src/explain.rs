@@ -136,6 +136,9 @@ impl Page<'_> {
         self.entry("starts", &starts(module));
         self.entry("when it ends", &restart(&module.restart));
         self.entry("calls", &self.names(module.calls.iter().copied()));
+        for (to, why) in &module.although {
+            self.entry("although", &format!("{} is less important: {why}", self.name(*to)));
+        }
         let callers =
             self.installation.modules.iter().filter(|other| module.names().any(|own| other.calls.contains(&own)));
         self.entry("called by", &self.names(callers.map(|caller| caller.name)));

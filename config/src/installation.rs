@@ -159,7 +159,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         saved: None,
         scheduling,
     };
-    check::claims(&installation, &lines, reader);
+    check::across(&installation, &lines, reader);
     Some(installation)
 }
 

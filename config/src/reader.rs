@@ -259,12 +259,13 @@ impl<'d> Item<'d> {
     /// The texts of a list, with the lines they stand in.
     pub(crate) fn texts(&self, example: &str) -> Vec<(&'d str, usize)> {
         let list = self.list(&format!("[\"{example}\"]")).unwrap_or_default();
-        list.iter()
-            .filter_map(|item| match item.value.get_ref().as_str() {
-                Some(text) if !text.is_empty() => Some((text, item.line)),
-                _ => item.wrong(&format!("a list of texts, such as `{} = [\"{example}\"]`", self.key)),
-            })
-            .collect()
+        list.iter().filter_map(|item| Some((item.text_of_list(example)?, item.line))).collect()
+    }
+
+    /// The text that an element of a list is.
+    pub(crate) fn text_of_list(&self, example: &str) -> Option<&'d str> {
+        let text = self.value.get_ref().as_str().filter(|text| !text.is_empty());
+        text.or_else(|| self.wrong(&format!("a list of texts, such as `{} = [\"{example}\"]`", self.key)))
     }
 
     pub(crate) fn is_table(&self) -> bool {
@@ -298,7 +299,7 @@ fn shown(value: &DeValue<'_>) -> String {
     }
 }
 
-/// The candidate that is most like `word`, if one is like it at all.
+/// The candidate that is most like `word`, if one is like it at all: what messages ask back.
 pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     // Both measures: edits for slips of the finger, Jaro-Winkler for words begun right (`max` for `max-age`).
     let likeness = |candidate: &str| {

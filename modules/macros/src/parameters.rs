@@ -307,7 +307,7 @@ fn parameter_set(owner: &Ident, krate: &TokenStream, parameters: &[Parameter]) -
                 }
             }
 
-            fn check(
+            fn accept(
                 &self, index: usize, value: &[u8],
             ) -> ::std::result::Result<::std::vec::Vec<u8>, #krate::Refusal> {
                 match index {

@@ -1,6 +1,8 @@
 //! `pilot`: drives about without hitting anything, by what the scanner sees.
 
-use crate::interfaces::{LaserInterface, MotorProxy};
+use super::check::{self, Called};
+use crate::interface::Interface;
+use crate::interfaces::{LaserInterface, MotorInterface, MotorProxy};
 use crate::module::{Module, ModuleError};
 use crate::parameter::ParameterSet;
 use crate::robot::pilot::{Pilot, Settings as PilotSettings};
@@ -20,6 +22,19 @@ pub(super) struct Settings {
     cruise_m_s: f64,
     #[serde(default)]
     seed: u64,
+}
+
+impl check::Settings for Settings {
+    fn parameters(&self) -> &'static [&'static str] {
+        self.names()
+    }
+
+    fn calls(&self) -> Vec<Called<'_>> {
+        vec![
+            Called { key: "laser", module: &self.laser, class: LaserInterface::CLASS },
+            Called { key: "motor", module: &self.motor, class: MotorInterface::CLASS },
+        ]
+    }
 }
 
 pub(super) struct PilotModule {

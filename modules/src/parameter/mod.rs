@@ -35,9 +35,9 @@ pub trait ParameterSet {
     ///
     /// # Errors
     /// [`Refusal::Type`] or [`Refusal::Range`].
-    fn check(&self, index: usize, value: &[u8]) -> Result<Vec<u8>, Refusal>;
+    fn accept(&self, index: usize, value: &[u8]) -> Result<Vec<u8>, Refusal>;
 
-    /// Stores a value that [`ParameterSet::check`] or [`ParameterSet::get`] returned.
+    /// Stores a value that [`ParameterSet::accept`] or [`ParameterSet::get`] returned.
     fn put(&mut self, index: usize, value: &[u8]);
 }
 

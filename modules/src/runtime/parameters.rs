@@ -55,7 +55,7 @@ fn check(set: &dyn ParameterSet, values: &[(String, Vec<u8>)]) -> Result<Vec<Wan
             return Err(Refusal::Twice(name.clone()));
         }
         let old = set.get(index).ok_or_else(unknown)?;
-        wanted.push(Wanted { index, old, new: set.check(index, value)? });
+        wanted.push(Wanted { index, old, new: set.accept(index, value)? });
     }
     Ok(wanted)
 }
@@ -101,7 +101,7 @@ pub(crate) fn check_start<M: Module>(
     let Some(set) = set.as_mut() else { return Ok(()) };
     for (index, parameter) in (0..set.names().len()).filter_map(|index| Some((index, set.get(index)?))) {
         let refused = |refusal| StartError::Module(text.to_owned(), format!("its own default: {refusal}"));
-        set.check(index, &parameter.value).map_err(refused)?;
+        set.accept(index, &parameter.value).map_err(refused)?;
     }
     Ok(())
 }
