@@ -5,6 +5,7 @@ use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
+use crate::saved::SavedValue;
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
@@ -85,6 +86,10 @@ impl Page<'_> {
             TimeSource::Log => "the log that is replayed".into(),
         };
         self.entry("time", &time);
+        if let Some(file) = &self.installation.parameters {
+            let words = format!("values saved in {} go before settings", file.display());
+            self.entry("parameters", &words);
+        }
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
@@ -141,6 +146,11 @@ impl Page<'_> {
         if !module.settings.is_empty() {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));
+        }
+        let values = self.installation.saved.as_ref().map(|saved| saved.values(self.installation, module.name));
+        if let Some(Ok(values)) = values.filter(|values| values.as_ref().is_ok_and(|values| !values.is_empty())) {
+            let text = |saved: &SavedValue<toml::Value>| format!("{} = {}", saved.name, saved.value);
+            self.entry("saved", &values.iter().map(text).collect::<Vec<_>>().join(", "));
         }
         for (key, spec) in module.mailboxes.each() {
             self.entry(key, &mailbox(spec));

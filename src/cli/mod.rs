@@ -8,6 +8,7 @@ mod echo;
 mod launch;
 mod list;
 mod log;
+mod param;
 mod run;
 mod status;
 mod summary;
@@ -46,6 +47,8 @@ enum Command {
     Echo(echo::Arguments),
     /// Print what modules say.
     Log(log::Arguments),
+    /// Show, set, save and load the parameters of modules.
+    Param(param::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
     /// Run a built-in module by hand.
@@ -63,6 +66,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Call(arguments) => call::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
+        Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };

@@ -12,6 +12,7 @@ mod context;
 mod face;
 mod follow;
 mod host;
+mod parameters;
 mod runner;
 pub(crate) mod server;
 mod start;

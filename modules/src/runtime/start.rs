@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::face::Face;
+use super::parameters;
 use super::runner::{Life, Running, served};
 use crate::call::Link;
 use crate::module::Module;
@@ -175,7 +176,9 @@ impl Start {
         let names = faces.iter().map(|face: &Face<M>| face.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock);
         let settings = installation.settings_as(module)?;
-        let made = M::new(settings, &mut context).map_err(|error| StartError::Module(text, error.to_string()))?;
+        let mut made =
+            M::new(settings, &mut context).map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
+        parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
         let life = Life::new(made, participant);
