@@ -255,6 +255,11 @@ impl Latency {
         self.buckets.iter_mut().zip(&other.buckets).for_each(|(a, b)| *a = a.saturating_add(*b));
     }
 
+    /// Shortest time that counts in a bucket; each begins where the one before ends.
+    pub fn bucket_start(bucket: usize) -> Duration {
+        Duration::from_nanos(bucket_start_ns(bucket) as u64)
+    }
+
     /// What was counted since `earlier` was read. The longest is not known for a part: it stays the longest of all.
     pub fn since(&self, earlier: &Self) -> Self {
         let buckets = std::array::from_fn(|i| self.buckets[i].saturating_sub(earlier.buckets[i]));

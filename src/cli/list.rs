@@ -22,8 +22,9 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// A mailbox, as the tables show it.
 #[derive(Serialize)]
-struct MailboxLine {
+pub(super) struct MailboxLine {
     mailbox: String,
     purpose: &'static str,
     owner: Option<u32>,
@@ -54,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         installation: &running.installation.name,
         node: &running.node_name,
         modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
-        mailboxes: survey.mailboxes.iter().map(|mailbox| mailbox_line(&running, mailbox)).collect(),
+        mailboxes: mailbox_lines(&running, &survey.mailboxes),
     };
     if arguments.json {
         say(serde_json::to_string(&listing)?);
@@ -66,6 +67,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say(format_args!("\n{}", print_mailboxes(&listing.mailboxes).trim_end()));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Mailboxes, one a line.
+pub(super) fn mailbox_lines(running: &Running, mailboxes: &[MailboxInfo]) -> Vec<MailboxLine> {
+    mailboxes.iter().map(|mailbox| mailbox_line(running, mailbox)).collect()
 }
 
 fn mailbox_line(running: &Running, mailbox: &MailboxInfo) -> MailboxLine {
@@ -86,7 +92,8 @@ fn mailbox_line(running: &Running, mailbox: &MailboxInfo) -> MailboxLine {
     }
 }
 
-fn print_mailboxes(lines: &[MailboxLine]) -> String {
+/// The same as a table.
+pub(super) fn print_mailboxes(lines: &[MailboxLine]) -> String {
     let rows = lines.iter().map(|line| {
         [
             line.mailbox.clone(),

@@ -14,6 +14,7 @@ mod status;
 mod summary;
 mod table;
 mod target;
+mod top;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -39,6 +40,8 @@ enum Command {
     Demo(demo::Arguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
+    /// Watch modules, and switch them on and off.
+    Top(top::Arguments),
     /// Ask modules how they are.
     Status(status::Arguments),
     /// Call a function of a module.
@@ -62,6 +65,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Launch(arguments) => launch::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
+        Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),

@@ -9,7 +9,7 @@ use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
 
 /// A module, as the tables show it.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(super) struct ModuleLine {
     pub(super) module: String,
     pub(super) faces: Vec<String>,
