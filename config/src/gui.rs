@@ -34,7 +34,8 @@ impl Gui {
             let Some(read) = Show::read(item, directory) else { continue };
             if let Some(first) = show.iter().find(|first| (first.from, &first.data) == (read.from, &read.data)) {
                 let from = directory.classes.format(read.from);
-                item.report(format!("`{}` of `{from}` is shown in line {} already; drop one", read.data, first.line));
+                let what = read.data.as_ref().map_or("everything".into(), |data| format!("`{data}`"));
+                item.report(format!("{what} of `{from}` is shown in line {} already; drop one", first.line));
             }
             show.push(read);
         }

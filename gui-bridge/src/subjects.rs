@@ -97,7 +97,11 @@ impl Subjects {
             wish.answered = true;
             let items = wish.items(&description, &self.views);
             for item in items {
+                let known = |subject: &Subject| subject.from == wish.from && subject.item.number == item.number;
                 let Some(view) = self.views.iter().position(|view| view.wants(&description, &item)) else { continue };
+                if self.subjects.iter().any(known) {
+                    continue;
+                }
                 found(wish.from);
                 let rate = wish.rate.unwrap_or_else(|| self.views[view].rate());
                 let interface = description.hash();
