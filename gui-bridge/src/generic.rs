@@ -48,7 +48,7 @@ impl Scene {
             return;
         }
         said.clone_from(&text);
-        self.log_event(entity, &TextLog::new(format!("{module} {data}\n{text}")));
+        self.log(entity, &TextLog::new(format!("{module} {data}\n{text}")));
     }
 }
 

@@ -131,9 +131,10 @@ pub(crate) enum Surface {
 
 /// A stream without a layout yet.
 pub(crate) fn open(canvas: &Canvas) -> Result<RecordingStream, OpenError> {
-    // A file gets chunks of decent size; a viewer is shown changes within a blink.
+    // A chunk costs more than a kilobyte besides its rows. So a file gets large ones, and a crash of the bridge loses two
+    // seconds; a viewer is shown changes within a blink.
     let flush_tick = Duration::from_millis(match canvas.surface {
-        Surface::File(_) => 500,
+        Surface::File(_) => 2000,
         Surface::Line(_) => 40,
     });
     let batching =

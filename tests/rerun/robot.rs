@@ -249,16 +249,16 @@ impl Robot {
         let memory = tempfile::Builder::new().prefix("rohrpost-gui-").tempdir().unwrap();
         let config = memory.path().join("robot.toml");
         std::fs::write(&config, configuration(port, settings)).unwrap();
+        let installation = Installation::load(&config).unwrap();
         let launch = Command::new(env!("CARGO_BIN_EXE_rohrpost"))
             .args(["launch", "robot.toml"])
             .env("ROHRPOST_DIR", memory.path().join("nodes"))
             .current_dir(memory.path())
             .stdin(Stdio::null())
-            .stdout(std::fs::File::create(memory.path().join("said")).unwrap())
-            .stderr(std::fs::File::create(memory.path().join("errors")).unwrap())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        let installation = Installation::load(&config).unwrap();
         let base = node_directory(&installation.name, "main");
         let path = memory.path().join("nodes").join(base.file_name().unwrap());
         let node = wait("the node", || Node::open(&path).ok().filter(|node| node.launcher() == Some(launch.id())));
@@ -333,11 +333,11 @@ impl Robot {
         assert_eq!((bridge.state, bridge.restarts), (Some(ModuleState::On), 0), "{}", self.said());
     }
 
-    /// What launch and the modules have said.
+    /// What modules have said.
     pub(crate) fn said(&self) -> String {
-        ["said", "errors"]
-            .map(|file| std::fs::read_to_string(self.memory.path().join(file)).unwrap_or_default())
-            .concat()
+        let mut log = Command::new(env!("CARGO_BIN_EXE_rohrpost"));
+        let output = log.arg("log").env("ROHRPOST_DIR", self.memory.path().join("nodes")).output().unwrap();
+        String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
     pub(crate) fn folder(&self) -> &Path {
@@ -394,7 +394,7 @@ settings = {{}}
 [[module]]
 name = "gui.0"
 program = [{bridge:?}]
-calls = ["source.0", "output.0"]
+calls = ["source.0", {{ to = "output.0", although = "it reads earlier lines once, and waits for nobody" }}]
 settings = {{ viewer = "rerun+http://127.0.0.1:{port}/proxy" }}
 [module.mailbox.data]
 slots = 256

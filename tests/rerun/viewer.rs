@@ -6,7 +6,6 @@ use super::programs::{rerun, rows};
 use super::robot::{PATIENCE, wait};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use std::collections::BTreeMap;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -45,9 +44,9 @@ impl Viewer {
         kill(Pid::from_raw(self.process.id() as i32), signal).unwrap();
     }
 
-    /// Reads what it has got and gets, until these entities are there; how many rows each entity has.
+    /// Reads what it has got and gets, until these entities are there, and so many below one of them.
     #[track_caller]
-    pub(crate) fn shows(&self, folder: &Path, entities: &[&str]) -> BTreeMap<String, u64> {
+    pub(crate) fn shows(&self, folder: &Path, entities: &[&str], (below, many): (&str, usize)) {
         let file = folder.join("seen.rrd");
         let _ = std::fs::remove_file(&file);
         let mut reader = quiet(&["--save", file.to_str().unwrap(), "--connect"])
@@ -60,8 +59,9 @@ impl Viewer {
             let printed =
                 Command::new(rerun()).args(["rrd", "print"]).arg(&file).env("NO_COLOR", "1").output().unwrap();
             let rows = rows(&String::from_utf8_lossy(&printed.stdout));
-            if entities.iter().all(|entity| rows.keys().any(|name| name.starts_with(entity))) {
-                break Ok(rows);
+            let count = |entity: &str| rows.keys().filter(|name| name.starts_with(entity)).count();
+            if entities.iter().all(|entity| count(entity) > 0) && count(below) == many {
+                break Ok(());
             }
             if start.elapsed() > PATIENCE {
                 break Err(rows);
@@ -70,7 +70,9 @@ impl Viewer {
         };
         let _ = reader.kill();
         let _ = reader.wait();
-        seen.unwrap_or_else(|rows| panic!("the viewer never got all of {entities:?}, but {rows:#?}"))
+        seen.unwrap_or_else(|rows| {
+            panic!("the viewer never got all of {entities:?} and {many} {below}, but {rows:#?}")
+        });
     }
 }
 
