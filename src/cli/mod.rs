@@ -7,6 +7,7 @@ mod clean;
 mod delay;
 mod demo;
 mod echo;
+mod graph;
 mod hz;
 mod launch;
 mod list;
@@ -58,6 +59,8 @@ enum Command {
     Bw(bw::Arguments),
     /// Measure how long packages wait; disturbs nobody.
     Delay(delay::Arguments),
+    /// Show or draw who sends what to whom, how often; disturbs nobody.
+    Graph(graph::Arguments),
     /// Measure how long a module takes to answer.
     Ping(ping::Arguments),
     /// Send a command over and over.
@@ -82,6 +85,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Hz(arguments) => hz::run(&arguments),
         Command::Bw(arguments) => bw::run(&arguments),
         Command::Delay(arguments) => delay::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
         Command::Ping(arguments) => ping::run(&arguments),
         Command::Send(arguments) => send::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
