@@ -34,6 +34,7 @@ mod clock;
 mod counters;
 mod doorbell;
 mod flows;
+mod latest;
 mod layout;
 mod lock;
 mod memory;

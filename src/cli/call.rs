@@ -149,7 +149,8 @@ pub(super) fn prepare<'a>(
     Ok((function, body))
 }
 
-fn usage(function: &Function) -> String {
+/// A function with the names and types of its arguments.
+pub(super) fn usage(function: &Function) -> String {
     let arguments: Vec<String> = function
         .arguments
         .iter()

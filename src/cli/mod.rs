@@ -12,6 +12,7 @@ mod hz;
 mod launch;
 mod list;
 mod log;
+mod param;
 mod ping;
 mod run;
 mod send;
@@ -19,6 +20,7 @@ mod status;
 mod summary;
 mod table;
 mod target;
+mod top;
 mod watch;
 
 use clap::{Parser, Subcommand};
@@ -45,6 +47,8 @@ enum Command {
     Demo(demo::Arguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
+    /// Watch modules, and switch them on and off.
+    Top(top::Arguments),
     /// Ask modules how they are.
     Status(status::Arguments),
     /// Call a function of a module.
@@ -65,6 +69,8 @@ enum Command {
     Ping(ping::Arguments),
     /// Send a command over and over.
     Send(send::Arguments),
+    /// Show, set, save and load the parameters of modules.
+    Param(param::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
     /// Run a built-in module by hand.
@@ -78,6 +84,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Launch(arguments) => launch::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
+        Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),
@@ -88,6 +95,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Graph(arguments) => graph::run(&arguments),
         Command::Ping(arguments) => ping::run(&arguments),
         Command::Send(arguments) => send::run(&arguments),
+        Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };

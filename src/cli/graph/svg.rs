@@ -105,14 +105,18 @@ impl Drawing {
         let (left, top, right, bottom) = self.reach.unwrap_or_default();
         let (x, y) = (left - MARGIN, top - MARGIN);
         let (wide, high) = (right - left + 2.0 * MARGIN, bottom - top + 2.0 * MARGIN);
-        let tip = |name: &str, rgb: u32| {
-            format!(
-                "<marker id=\"{name}\" viewBox=\"0 0 10 8\" refX=\"9\" refY=\"4\" markerWidth=\"10\" markerHeight=\"8\" \
-                 markerUnits=\"userSpaceOnUse\" orient=\"auto\"><path d=\"M0 0L10 4L0 8z\" fill=\"#{rgb:06x}\"/></marker>\n"
-            )
+        let tip = |rgb: u32| {
+            // One for each end of a line: renderers disagree about turning a marker round.
+            let marker = |end: &str, shape: &str, at: u8| {
+                format!(
+                    "<marker id=\"{end}{rgb:06x}\" viewBox=\"0 0 10 8\" refX=\"{at}\" refY=\"4\" markerWidth=\"10\" \
+                     markerHeight=\"8\" markerUnits=\"userSpaceOnUse\" orient=\"auto\"><path d=\"{shape}\" \
+                     fill=\"#{rgb:06x}\"/></marker>\n"
+                )
+            };
+            marker("end", "M0 0L10 4L0 8z", 9) + &marker("start", "M10 0L0 4L10 8z", 1)
         };
-        let tips: String =
-            [DATA, COMMAND, OUTPUT, REPLY].into_iter().map(|rgb| tip(&format!("tip{rgb:06x}"), rgb)).collect();
+        let tips: String = [DATA, COMMAND, OUTPUT, REPLY].into_iter().map(tip).collect();
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide:.0}\" height=\"{high:.0}\" \
              viewBox=\"{x:.1} {y:.1} {wide:.1} {high:.1}\" font-family=\"sans-serif\">\n<title>{}</title>\n<defs>\n{tips}</defs>\n\
@@ -150,20 +154,25 @@ impl RenderBackend for Drawing {
                 / 2.0;
         self.reach(at.x - half, at.y - step * lines / 2.0);
         self.reach(at.x + half, at.y + step * lines / 2.0);
-        // Labels of arrows have the arrow's colour, and paper around them where lines cross.
         let label = look.font_size == LABEL_FONT;
+        // Labels of arrows have the arrow's colour, and paper around them where lines cross.
         let ink = if label { web(look.line_color) } else { "#1c2128".into() };
-        let halo = if label { " stroke=\"white\" stroke-width=\"4\" paint-order=\"stroke\"" } else { "" };
         for (n, line) in text.lines().enumerate() {
             let y = at.y + step * (n as f64 - (lines - 1.0) / 2.0) + look.font_size as f64 * 0.35;
             let weight = if !label && n == 0 { " font-weight=\"bold\"" } else { "" };
-            let _ = writeln!(
-                self.texts,
-                "<text x=\"{:.1}\" y=\"{y:.1}\" font-size=\"{}\" text-anchor=\"middle\" fill=\"{ink}\"{weight}{halo}>{}</text>",
-                at.x,
-                look.font_size,
-                escaped(line)
-            );
+            let mut put = |paint: &str| {
+                let _ = writeln!(
+                    self.texts,
+                    "<text x=\"{:.1}\" y=\"{y:.1}\" font-size=\"{}\" text-anchor=\"middle\"{weight} {paint}>{}</text>",
+                    at.x,
+                    look.font_size,
+                    escaped(line)
+                );
+            };
+            if label {
+                put("aria-hidden=\"true\" fill=\"white\" stroke=\"white\" stroke-width=\"4\"");
+            }
+            put(&format!("fill=\"{ink}\""));
         }
     }
 
@@ -185,9 +194,9 @@ impl RenderBackend for Drawing {
         }
         path.iter().for_each(|(a, b)| [a, b].iter().for_each(|point| self.reach(point.x, point.y)));
         let ink = web(look.line_color);
-        let tip = format!("url(#tip{})", ink.trim_start_matches('#'));
-        let start = if head.0 { format!(" marker-start=\"{tip}\"") } else { String::new() };
-        let end = if head.1 { format!(" marker-end=\"{tip}\"") } else { String::new() };
+        let tip = |end: &str| format!(" marker-{end}=\"url(#{end}{})\"", ink.trim_start_matches('#'));
+        let start = if head.0 { tip("start") } else { String::new() };
+        let end = if head.1 { tip("end") } else { String::new() };
         let dash = if dashed { " stroke-dasharray=\"5 4\"" } else { "" };
         let width = look.line_width;
         let _ = writeln!(
@@ -255,7 +264,7 @@ mod tests {
                 let drawn = write(&graph(modules, &edges), true);
                 assert!(drawn.ends_with("</svg>") && !drawn.contains("NaN"), "{modules} {edges:?}");
                 assert_eq!(drawn.matches("rx=").count(), modules, "{edges:?}");
-                assert_eq!(drawn.matches("&lt;scan&gt; 10/s").count(), edges.len(), "{edges:?}");
+                assert_eq!(drawn.matches("&lt;scan&gt; 10/s").count(), 2 * edges.len(), "{edges:?}");
             }
         }
     }
