@@ -60,7 +60,7 @@ fn scheduling(process: Option<&ParticipantInfo>) -> String {
     }
 }
 
-fn state(module: &ModuleSurvey, phase: Option<&Phase>, installation: &Installation) -> String {
+pub(super) fn state(module: &ModuleSurvey, phase: Option<&Phase>, installation: &Installation) -> String {
     match (&module.process, phase) {
         (_, Some(Phase::Failed(_))) => "failed".into(),
         (_, Some(Phase::Ended)) => "ended".into(),
