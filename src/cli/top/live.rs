@@ -249,11 +249,13 @@ impl Live {
 
     fn draw(&mut self, terminal: &mut DefaultTerminal) -> Result<(), Failure> {
         let details = match self.app.screen {
-            Screen::Details(name) => details::page(&self.running, &self.now, &self.model, name, &self.offered),
+            Screen::Details(name) => {
+                details::page(&self.running.installation, &self.now, &self.model, name, &self.offered)
+            }
             Screen::Table | Screen::Help => Vec::new(),
         };
         self.app.columns = columns(&self.model, terminal.size()?.width).into_iter().map(|(column, _)| column).collect();
-        let output: Vec<OutputText> = self.output.shown(&self.running, self.app.lines);
+        let output: Vec<OutputText> = self.output.shown(&self.running.installation, self.app.lines);
         let view = View {
             model: &self.model,
             app: &self.app,
