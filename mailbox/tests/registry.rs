@@ -321,3 +321,28 @@ fn removing_and_joining_at_once_leave_no_ghosts() {
     remover.join().unwrap();
     assert!(joined > 0);
 }
+
+#[test]
+fn words_beside_a_mailbox_are_whole_and_go_with_it() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
+    assert_eq!(node.about(MAILBOX), None);
+    for words in [&b"first"[..], b"", b"of another length"] {
+        receiver.set_about(words).unwrap();
+        assert_eq!(node.about(MAILBOX).as_deref(), Some(words));
+    }
+    drop(receiver);
+    assert!(node.about(MAILBOX).is_some(), "the mailbox stays, and so do they");
+    let receiver = ground.join().receiver(MAILBOX, shape(5)).unwrap();
+    assert!(node.about(MAILBOX).is_some(), "replaced, not removed");
+    receiver.close();
+    assert_eq!(node.about(MAILBOX), None);
+    let receiver = ground.join().receiver(MAILBOX, shape(5)).unwrap();
+    receiver.set_about(&vec![0; (1 << 20) + 1]).unwrap();
+    assert_eq!(node.about(MAILBOX), None, "too long to be read");
+    drop(receiver);
+    assert!(node.remove_orphan(MAILBOX).unwrap());
+    let left = fs::read_dir(ground.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert_eq!(left.filter(|name| name.contains("about")).count(), 0);
+}

@@ -1,19 +1,25 @@
 //! The command line: one file a subcommand.
 
+mod bw;
 mod call;
 mod check;
 mod clean;
+mod delay;
 mod demo;
 mod echo;
+mod hz;
 mod launch;
 mod list;
 mod log;
+mod ping;
 mod run;
+mod send;
 mod status;
 mod summary;
 mod table;
 mod target;
 mod top;
+mod watch;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -49,6 +55,16 @@ enum Command {
     Echo(echo::Arguments),
     /// Print what modules say.
     Log(log::Arguments),
+    /// Measure how often a module publishes; disturbs nobody.
+    Hz(hz::Arguments),
+    /// Measure the bytes that go in and out of a module; disturbs nobody.
+    Bw(bw::Arguments),
+    /// Measure how long packages wait; disturbs nobody.
+    Delay(delay::Arguments),
+    /// Measure how long a module takes to answer.
+    Ping(ping::Arguments),
+    /// Send a command over and over.
+    Send(send::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
     /// Run a built-in module by hand.
@@ -67,6 +83,11 @@ pub(crate) fn main() -> ExitCode {
         Command::Call(arguments) => call::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
+        Command::Hz(arguments) => hz::run(&arguments),
+        Command::Bw(arguments) => bw::run(&arguments),
+        Command::Delay(arguments) => delay::run(&arguments),
+        Command::Ping(arguments) => ping::run(&arguments),
+        Command::Send(arguments) => send::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };

@@ -166,7 +166,7 @@ impl Start {
             let commands = participant.receiver(name.with_local(local::COMMANDS), shape(&module.mailboxes.commands))?;
             // Whoever had this mailbox before has ended by now, and ran nothing after this.
             let started_ns = monotonic_ns();
-            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)), started_ns));
+            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)), started_ns)?);
         }
         let data = participant.receiver(self.name.with_local(local::DATA), shape(&module.mailboxes.data))?;
         let replies = participant.receiver(self.name.with_local(local::REPLIES), shape(&module.mailboxes.replies))?;

@@ -56,6 +56,24 @@ fn a_maker_of_a_mailbox_dies() {
 }
 
 #[test]
+fn a_receiver_dies_saying_what_its_mailbox_is_for() {
+    each_step(
+        "say what it is for",
+        1,
+        |_| (),
+        |ground, (), death| {
+            let said = ground.node().about(MAILBOX).unwrap();
+            assert_eq!(said, if death.is_some() { b"old" } else { b"new" });
+            let receiver = ground.receiver();
+            receiver.set_about(b"newest").unwrap();
+            assert_eq!(ground.node().about(MAILBOX).unwrap(), b"newest");
+            receiver.close();
+            empty(ground);
+        },
+    );
+}
+
+#[test]
 fn a_receiver_dies_closing() {
     let scene = |ground: &Ground| {
         ground.orphan();
