@@ -168,52 +168,21 @@ impl ToolLink {
 /// # Errors
 /// See [`CallError`].
 pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Description, CallError> {
-    let mut parts = DescriptionParts::new(module);
+    let mut bytes = Vec::new();
     loop {
-        let call = parts.ask(link, timeout)?;
-        let part = link.wait(call, |reply| postcard::from_bytes(reply))?;
-        if let Some(description) = parts.take(part)? {
-            return Ok(description);
-        }
-    }
-}
-
-/// A description on its way: a reply holds a part of it.
-pub struct DescriptionParts {
-    module: Name,
-    bytes: Vec<u8>,
-}
-
-impl DescriptionParts {
-    /// Of this module, and nothing of it yet.
-    pub fn new(module: Name) -> Self {
-        Self { module, bytes: Vec::new() }
-    }
-
-    /// Begins the call for the next part.
-    ///
-    /// # Errors
-    /// As [`Link::begin`].
-    pub fn ask(&self, link: &mut Link, timeout: Duration) -> Result<u32, CallError> {
-        let from = self.bytes.len() as u32;
-        link.begin(self.module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))
-    }
-
-    /// Takes a part; the whole, if that was the last.
-    ///
-    /// # Errors
-    /// [`CallError::BadReply`] when it is too long, or no description.
-    pub fn take(&mut self, part: DescriptionPart) -> Result<Option<Description>, CallError> {
+        let from = bytes.len() as u32;
+        let call = link.begin(module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))?;
+        let part: DescriptionPart = link.wait(call, |reply| postcard::from_bytes(reply))?;
         // What it says of itself is a claim.
         if part.total as usize > DESCRIPTION_MAX {
             let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
-            return Err(CallError::BadReply(self.module, text));
+            return Err(CallError::BadReply(module, text));
         }
-        self.bytes.extend_from_slice(&part.bytes);
-        if self.bytes.len() < part.total as usize && !part.bytes.is_empty() {
-            return Ok(None);
+        let last = part.bytes.is_empty();
+        bytes.extend_from_slice(&part.bytes);
+        if bytes.len() >= part.total as usize || last {
+            break;
         }
-        let read = postcard::from_bytes(&self.bytes);
-        read.map(Some).map_err(|error| CallError::BadReply(self.module, error.to_string()))
     }
+    postcard::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
 }

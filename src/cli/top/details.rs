@@ -12,24 +12,15 @@ use rohrpost::description::Description;
 use rohrpost::mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use rohrpost::survey::sum;
 use rohrpost::value::{describe_result, describe_type};
-use std::collections::HashMap;
 use std::time::Duration;
 
-/// What is known of a module's interface.
-pub(super) enum Offered {
-    /// It was asked.
-    Asked,
-    Known(Description),
-    Unknown(String),
-}
-
-/// The page as lines; those that begin without a blank are headings.
+/// The page as lines; those that begin without a blank are headings. `noted` knows what modules say of themselves.
 pub(super) fn page(
     installation: &Installation,
     sample: &Sample,
     model: &Model,
     name: Name,
-    offered: &HashMap<Name, Offered>,
+    noted: impl Fn(Name) -> Option<Description>,
 ) -> Vec<String> {
     let Some(row) = model.row(name) else {
         return vec![format!("{} is not here any more", installation.classes.format(name))];
@@ -60,22 +51,7 @@ pub(super) fn page(
     lines.extend(peers("receives from", &row.receives_from));
     let names = module.into_iter().flat_map(|module| std::iter::once(&module.name).chain(&module.faces));
     for face in names {
-        match offered.get(face) {
-            Some(Offered::Known(description)) => lines.extend(interface(installation, *face, description)),
-            Some(Offered::Unknown(why)) => {
-                lines.extend([
-                    "".into(),
-                    format!("{} offers", installation.classes.format(*face)),
-                    format!("  not known: {why}"),
-                ]);
-            }
-            Some(Offered::Asked) => lines.extend([
-                "".into(),
-                format!("{} offers", installation.classes.format(*face)),
-                "  asked ...".into(),
-            ]),
-            None => {}
-        }
+        lines.extend(noted(*face).into_iter().flat_map(|description| interface(installation, *face, &description)));
     }
     lines
 }

@@ -1,6 +1,6 @@
 //! The demo's robot as two looks at it, a second apart, with numbers that are easy to follow.
 
-use super::super::details::{self, Offered};
+use super::super::details;
 use super::super::draw::{OutputText, View};
 use super::super::model::{Model, Sample, TimeNow};
 use super::super::palette::Palette;
@@ -12,7 +12,6 @@ use ratatui::backend::TestBackend;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::config::Installation;
-use rohrpost::description::Description;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::MotorInterface;
 use rohrpost::mailbox::{
@@ -88,14 +87,10 @@ impl Robot {
     pub(super) fn screen(&self, app: &mut App, columns: u16, rows: u16) -> String {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).unwrap();
         app.columns = super::super::draw::columns(&self.model, columns).iter().map(|(column, _)| *column).collect();
-        let offered = HashMap::from([
-            (self.name("motor.0"), Offered::Known(self.description())),
-            (self.name("odometry.0"), Offered::Asked),
-            (self.name("laser.0"), Offered::Unknown("laser.0: no answer within 1 s".into())),
-        ]);
+        let noted = |name| (name == self.name("motor.0")).then(MotorInterface::description);
         let details = match app.screen {
             super::super::app::Screen::Details(name) => {
-                details::page(&self.installation, &self.now, &self.model, name, &offered)
+                details::page(&self.installation, &self.now, &self.model, name, noted)
             }
             _ => Vec::new(),
         };
@@ -111,10 +106,6 @@ impl Robot {
         let lines = terminal.backend().buffer().content.chunks(columns.into());
         let text = lines.map(|line| line.iter().map(|cell| cell.symbol()).collect::<String>());
         text.map(|line| format!("{}\n", line.trim_end())).collect()
-    }
-
-    fn description(&self) -> Description {
-        MotorInterface::description()
     }
 
     fn output(&self, app: &App) -> Vec<OutputText> {
@@ -238,7 +229,7 @@ fn flow(module: &ModuleSurvey, to: Name, packages: u64) -> FlowInfo {
         refused: 0,
         first_ns: 1,
         last_ns: 2,
-        interval_squares_ns2: 0.0,
+        interval_squares_ns2: 0,
         age_sum_ns: 0,
         seconds: Vec::new(),
     }
