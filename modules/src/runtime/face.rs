@@ -1,6 +1,7 @@
-//! One name under which a module's process is reached: its command mailbox, its interface, and what it has run.
+//! One name under which a module's process is reached: its command mailbox, and its interface.
 
-use crate::call::{Fault, Once};
+use super::server::Desk;
+use crate::call::Fault;
 use crate::description::Description;
 use crate::interface::{ServeFunction, Served};
 use rohrpost_mailbox::{Name, Receiver};
@@ -8,8 +9,7 @@ use rohrpost_mailbox::{Name, Receiver};
 /// One face. A module without further faces has this one.
 pub(crate) struct Face<M> {
     pub(crate) name: Name,
-    pub(crate) commands: Receiver,
-    pub(crate) once: Once,
+    pub(crate) desk: Desk,
     pub(crate) offer: Offer<M>,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct Offer<M> {
 }
 
 impl<M> Face<M> {
-    pub(crate) fn new(name: Name, class: &str, commands: Receiver, served: Option<Served<M>>, started_ns: u64) -> Self {
+    pub(crate) fn new(name: Name, class: &str, commands: Receiver, served: Option<Served<M>>) -> Self {
         let (serve, description) = match served {
             Some(Served { description, serve, .. }) => (Some(serve), description),
             None => (None, bare(class)),
@@ -38,7 +38,7 @@ impl<M> Face<M> {
         // Writing to a growing vector does not fail.
         let description = postcard::to_stdvec(&description).unwrap_or_default();
         let offer = Offer { idempotent, data, serve, hash, description };
-        Self { name, commands, once: Once::new(started_ns), offer }
+        Self { name, desk: Desk::new(commands), offer }
     }
 }
 
