@@ -174,9 +174,9 @@ impl Child {
         match self.phase {
             _ if self.over.is_some() => Some(LOOK),
             Phase::Starting | Phase::Stopping => Some(LOOK),
-            Phase::Waiting if self.process.is_none() && !self.last_life => {
-                Some(self.since.saturating_duration_since(now))
-            }
+            // Killed, since it did not get ready.
+            Phase::Waiting if self.process.is_some() => Some(LOOK),
+            Phase::Waiting if !self.last_life => Some(self.since.saturating_duration_since(now)),
             _ => None,
         }
     }

@@ -26,8 +26,10 @@ pub enum ClientError {
     /// A mailbox.
     #[error(transparent)]
     Mailbox(#[from] CreateError),
-    /// All instances of class `tool` are in use.
-    #[error("all {0} tool instances of node `{1}` are in use; end some, or widen `tools` in the configuration")]
+    /// All instances of class `tool` that programs run by hand may take are in use.
+    #[error(
+        "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, or widen `tools` in the configuration"
+    )]
     Crowded(usize, String),
     /// The configuration has no such node.
     #[error("the configuration has no node `{0}`")]
