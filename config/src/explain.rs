@@ -119,8 +119,9 @@ impl Page<'_> {
             self.entry("address", address);
         }
         self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
-        let (first, last) = (node.tools.start(), node.tools.end());
-        self.entry("tools", &format!("programs run by hand are tool.{first} to tool.{last}"));
+        let (hand, launch) = (node.tools_by_hand(), node.launch_instance());
+        let (first, last) = (hand.start(), hand.end());
+        self.entry("tools", &format!("launch is tool.{launch}; programs run by hand are tool.{first} to tool.{last}"));
         for module in modules {
             self.module(module);
         }

@@ -4,6 +4,7 @@ mod bw;
 mod call;
 mod check;
 mod clean;
+mod control;
 mod delay;
 mod demo;
 mod echo;
@@ -45,6 +46,12 @@ enum Command {
     Launch(launch::Arguments),
     /// Run a simulated robot that drives and maps, or play a robot's log.
     Demo(demo::Arguments),
+    /// End a module and start it again.
+    Restart(control::Arguments),
+    /// End a module; it stays ended until it is started.
+    Stop(control::Arguments),
+    /// Start a module that was stopped, has ended, or failed.
+    Start(control::Arguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
     /// Watch modules, and switch them on and off.
@@ -83,6 +90,9 @@ pub(crate) fn main() -> ExitCode {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Restart(arguments) => control::run(&arguments, control::Order::Restart),
+        Command::Stop(arguments) => control::run(&arguments, control::Order::Stop),
+        Command::Start(arguments) => control::run(&arguments, control::Order::Start),
         Command::List(arguments) => list::run(&arguments),
         Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
