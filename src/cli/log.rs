@@ -14,7 +14,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// New lines are asked for so often.
 const POLL: Duration = Duration::from_millis(200);
 /// Number of `lines_from` in the collector's interface.
-const LINES_FROM: u16 = 16;
+pub(super) const LINES_FROM: u16 = 16;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:

@@ -19,6 +19,8 @@ const PAGE_BYTES: usize = 2500;
 #[serde(deny_unknown_fields)]
 pub(super) struct Settings {}
 
+impl super::check::Settings for Settings {}
+
 pub(super) struct OutputModule {
     ring: VecDeque<OutputLine>,
     ring_max: usize,
