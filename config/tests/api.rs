@@ -1,7 +1,7 @@
 //! What other crates rely on when they use an installation.
 
 use rohrpost_config::{
-    Full, Installation, Level, Node, Program, RestartPolicy, Scheduling, Start, TimeSource, explain,
+    Full, Installation, Level, LineFormat, Node, Program, RestartPolicy, Scheduling, Start, TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -26,7 +26,10 @@ fn every_key_arrives() {
     let base = Node { name: "base".into(), address: Some("10.0.0.1".into()), mode: 0o770, tools: 0..=15, line: 19 };
     assert_eq!(full.node("base"), Some(&base));
     assert_eq!(full.time, TimeSource::Local);
-    assert_eq!(full.output.file, Some(PathBuf::from("conf/robot.log")));
+    let output = &full.output;
+    assert_eq!((output.rate, output.burst, output.ring, output.journal), (50, 80, 500, true));
+    assert_eq!(output.file, Some(PathBuf::from("conf/robot.log")));
+    assert_eq!((output.file_size, output.files, output.format), (1 << 20, 2, LineFormat::Json));
 
     let motor = full.module(Name::new(7, 200, 0, 0)).unwrap();
     let words = ["./drivers/base", "--port", "/dev/ttyS0"].map(String::from);
@@ -132,8 +135,9 @@ fn missing_programs_matter_where_they_should_run() {
     let missing = full.missing_programs("base", folder.path());
     assert_eq!(missing.len(), 1);
     assert!(!missing[0].optional);
+    let line = 1 + FULL.lines().position(|line| line == "[[module]]").unwrap();
     let expected = format!(
-        "{}:40: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
+        "{}:{line}: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
          `program`",
         path.display(),
         folder.path().display()
