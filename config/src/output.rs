@@ -92,11 +92,6 @@ impl Level {
 }
 
 impl Output {
-    /// The level of a module: its own, or the common one.
-    pub fn level_of(&self, module: Name) -> Level {
-        self.levels.iter().find(|(name, _)| *name == module.module()).map_or(self.level, |(_, level)| *level)
-    }
-
     pub(crate) fn read(section: Option<Section<'_>>, directory: &Directory<'_>, folder: &Path) -> Self {
         let mut output = Self::default();
         let Some(section) = section else { return output };

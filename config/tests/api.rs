@@ -64,8 +64,13 @@ fn modules_are_found_by_every_name_they_answer_to() {
         assert_eq!(found(text).as_deref(), module, "{text}");
     }
     assert_eq!(full.modules_on("desk").count(), 2);
-    assert_eq!(full.output.level_of(Name::new(7, 150, 0, 2)), Level::Trace, "by a mailbox of a face");
-    assert_eq!(full.output.level_of(Name::new(7, 200, 0, 0)), Level::Warn);
+    let level = |text: &str| full.output_level(full.classes.parse_name(text).unwrap());
+    assert_eq!(level("7.laser.0.2"), Level::Trace, "by a mailbox of a face");
+    assert_eq!(level("motor.0"), Level::Trace, "it is one process with its face");
+    assert_eq!((level("mapper.0"), level("output.0")), (Level::Debug, Level::Warn));
+    let node = |text: &str| full.node_of(full.classes.parse_name(text).unwrap());
+    assert_eq!([node("motor.0"), node("laser.0"), node("mapper.0")], [Some("base"), Some("base"), Some("desk")]);
+    assert_eq!([node("tool.3"), node("tool.16"), node("laser.1")], [Some("base"), Some("desk"), None]);
 }
 
 #[derive(Debug, Deserialize, PartialEq)]

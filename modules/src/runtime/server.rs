@@ -169,8 +169,7 @@ impl Call<'_> {
             }
             common::OUTPUT_LEVEL => {
                 let (level,): (OutputLevel,) = read_arguments(self.arguments)?;
-                output::set_level(level);
-                Ok(())
+                write_result(reply, &output::set_level(level))
             }
             common::DESCRIBE => {
                 let (from,): (u32,) = read_arguments(self.arguments)?;
