@@ -200,7 +200,7 @@ mod tests {
         let excess = Excess::default();
         let each = 50_000;
         let told = std::thread::scope(|scope| {
-            let adders: Vec<_> = (0..3).map(|_| scope.spawn(|| (1..=each).for_each(|n| drop(excess.add(n))))).collect();
+            let adders: Vec<_> = (0..3).map(|_| scope.spawn(|| (1..=each).for_each(|n| _ = excess.add(n)))).collect();
             let mut told = 0;
             while adders.iter().any(|adder| !adder.is_finished()) {
                 told += excess.tell_all().map_or(0, |told| told.lines);

@@ -1,11 +1,13 @@
 //! From which level on modules speak: listed, and set while they run.
 
+use super::super::summary::is_left_out;
 use super::super::table::table;
 use super::super::target::Running;
 use super::super::{Failure, call, say};
 use super::{Arguments, filter};
 use rohrpost::common::OutputLevel;
 use rohrpost::config::Module;
+use rohrpost::survey::Survey;
 use rohrpost::{Name, ToolLink};
 use serde::Serialize;
 use std::process::ExitCode;
@@ -25,16 +27,13 @@ impl Setting {
         }
         let class = filter::class(name, running)?;
         let of_class = |module: &&Module| module.names().any(|name| name.class() == class);
-        let modules: Vec<Name> = here(running).filter(of_class).map(|module| module.name).collect();
+        let here = running.installation.modules_on(&running.node_name);
+        let modules: Vec<Name> = here.filter(of_class).map(|module| module.name).collect();
         if modules.is_empty() {
             return Err(format!("node `{}` has no module of class `{name}`", running.node_name).into());
         }
         Ok(Self { modules, level })
     }
-}
-
-fn here(running: &Running) -> impl Iterator<Item = &Module> {
-    running.installation.modules_on(&running.node_name)
 }
 
 /// A module with its faces: they are one process, and have one level.
@@ -92,8 +91,9 @@ struct Listed {
 
 /// Lists the levels of all modules of the node.
 pub(super) fn list(running: &Running, json: bool, tool: &mut ToolLink) -> Result<ExitCode, Failure> {
+    let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
     let mut lines = Vec::new();
-    for module in here(running) {
+    for module in survey.modules.iter().filter(|module| !is_left_out(module, &running.installation)) {
         let status = tool.status(module.name);
         let failure = status.as_ref().err().map(|error| running.told(module.name, error).to_string());
         let status = status.ok();
