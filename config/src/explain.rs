@@ -1,10 +1,12 @@
 //! Says in words what an installation means: the page that `rohrpost check` prints, readable at 100 columns.
 
+use crate::Full;
 use crate::installation::Installation;
-use crate::mailbox::{Full, MailboxSpec};
+use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
 use crate::output::LineFormat;
+use crate::saved::SavedValue;
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
@@ -85,6 +87,10 @@ impl Page<'_> {
             TimeSource::Log => "the log that is replayed".into(),
         };
         self.entry("time", &time);
+        if let Some(file) = &self.installation.parameters {
+            let words = format!("values saved in {} go before settings", file.display());
+            self.entry("parameters", &words);
+        }
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
@@ -132,12 +138,20 @@ impl Page<'_> {
         self.entry("starts", &starts(module));
         self.entry("when it ends", &restart(&module.restart));
         self.entry("calls", &self.names(module.calls.iter().copied()));
+        for (to, why) in &module.although {
+            self.entry("although", &format!("{} is less important: {why}", self.name(*to)));
+        }
         let callers =
             self.installation.modules.iter().filter(|other| module.names().any(|own| other.calls.contains(&own)));
         self.entry("called by", &self.names(callers.map(|caller| caller.name)));
         if !module.settings.is_empty() {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));
+        }
+        let values = self.installation.saved.as_ref().map(|saved| saved.values(self.installation, module.name));
+        if let Some(Ok(values)) = values.filter(|values| values.as_ref().is_ok_and(|values| !values.is_empty())) {
+            let text = |saved: &SavedValue<toml::Value>| format!("{} = {}", saved.name, saved.value);
+            self.entry("saved", &values.iter().map(text).collect::<Vec<_>>().join(", "));
         }
         for (key, spec) in module.mailboxes.each() {
             self.entry(key, &mailbox(spec));
@@ -238,6 +252,7 @@ fn restart(restart: &Restart) -> String {
 fn mailbox(spec: &MailboxSpec) -> String {
     let full = match spec.full {
         Full::Displace => "full: the least important gives way",
+        Full::Latest => "latest: the newer replaces the older",
         Full::Reject => "full: new ones are refused",
     };
     let (size, memory) = (size_text(spec.size.into()), about(spec.memory()));

@@ -138,7 +138,8 @@ fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Resu
     Ok(decode(&function.result, &bytes)?)
 }
 
-fn usage(function: &Function) -> String {
+/// A function with the names and types of its arguments.
+pub(super) fn usage(function: &Function) -> String {
     let arguments: Vec<String> = function
         .arguments
         .iter()

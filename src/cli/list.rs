@@ -1,10 +1,10 @@
 //! `rohrpost list`.
 
-use super::summary::{ModuleLine, module_lines, print_modules};
+use super::summary::{ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
 use super::target::{Running, Target};
 use super::{Failure, say};
-use rohrpost::mailbox::{Full, Loss, MailboxInfo};
+use rohrpost::mailbox::{Loss, MailboxInfo};
 use rohrpost::survey::{Survey, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
@@ -22,8 +22,9 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// A mailbox, as the tables show it.
 #[derive(Serialize)]
-struct MailboxLine {
+pub(super) struct MailboxLine {
     mailbox: String,
     purpose: &'static str,
     owner: Option<u32>,
@@ -35,6 +36,8 @@ struct MailboxLine {
     sent: u64,
     received: u64,
     lost: Vec<(&'static str, u64)>,
+    #[serde(skip)]
+    losses: String,
 }
 
 #[derive(Serialize)]
@@ -52,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         installation: &running.installation.name,
         node: &running.node_name,
         modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
-        mailboxes: survey.mailboxes.iter().map(|mailbox| mailbox_line(&running, mailbox)).collect(),
+        mailboxes: mailbox_lines(&running, &survey.mailboxes),
     };
     if arguments.json {
         say(serde_json::to_string(&listing)?);
@@ -66,6 +69,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Mailboxes, one a line.
+pub(super) fn mailbox_lines(running: &Running, mailboxes: &[MailboxInfo]) -> Vec<MailboxLine> {
+    mailboxes.iter().map(|mailbox| mailbox_line(running, mailbox)).collect()
+}
+
 fn mailbox_line(running: &Running, mailbox: &MailboxInfo) -> MailboxLine {
     let lost = |cause: Loss| mailbox.classes.iter().map(|class| class.lost(cause)).sum();
     MailboxLine {
@@ -74,21 +82,19 @@ fn mailbox_line(running: &Running, mailbox: &MailboxInfo) -> MailboxLine {
         owner: mailbox.owner,
         slots: mailbox.shape.slots,
         body_bytes_max: mailbox.shape.body_bytes_max,
-        full: match mailbox.shape.full {
-            Full::Displace => "displace",
-            Full::Reject => "reject",
-        },
+        full: mailbox.shape.full.name(),
         waiting: mailbox.depth,
         waiting_max: mailbox.depth_max,
         sent: mailbox.sent,
         received: mailbox.classes.iter().map(|class| class.received).sum(),
+        losses: losses(lost),
         lost: Loss::ALL.into_iter().map(|cause| (cause.name(), lost(cause))).filter(|(_, n)| *n > 0).collect(),
     }
 }
 
-fn print_mailboxes(lines: &[MailboxLine]) -> String {
+/// The same as a table.
+pub(super) fn print_mailboxes(lines: &[MailboxLine]) -> String {
     let rows = lines.iter().map(|line| {
-        let lost: Vec<String> = line.lost.iter().map(|(cause, n)| format!("{n} {cause}")).collect();
         [
             line.mailbox.clone(),
             line.purpose.into(),
@@ -98,7 +104,7 @@ fn print_mailboxes(lines: &[MailboxLine]) -> String {
             format!("{} (most {})", line.waiting, line.waiting_max),
             line.sent.to_string(),
             line.received.to_string(),
-            if lost.is_empty() { "none".into() } else { lost.join(", ") },
+            line.losses.clone(),
         ]
     });
     table(["mailbox", "for", ">owner", ">slots", "when full", ">waiting", ">sent", ">received", "lost"], rows)

@@ -19,6 +19,8 @@ use std::time::Duration;
 
 /// New lines are asked for so often.
 const POLL: Duration = Duration::from_millis(200);
+/// Number of `lines_from` in the collector's interface.
+pub(super) const LINES_FROM: u16 = 16;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:

@@ -8,11 +8,13 @@ mod echo;
 mod launch;
 mod list;
 mod log;
+mod param;
 mod run;
 mod status;
 mod summary;
 mod table;
 mod target;
+mod top;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -38,6 +40,8 @@ enum Command {
     Demo(demo::Arguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
+    /// Watch modules, and switch them on and off.
+    Top(top::Arguments),
     /// Ask modules how they are.
     Status(status::Arguments),
     /// Call a function of a module.
@@ -46,6 +50,8 @@ enum Command {
     Echo(echo::Arguments),
     /// Print what modules say.
     Log(log::Arguments),
+    /// Show, set, save and load the parameters of modules.
+    Param(param::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
     /// Run a built-in module by hand.
@@ -59,10 +65,12 @@ pub(crate) fn main() -> ExitCode {
         Command::Launch(arguments) => launch::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
+        Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
+        Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };

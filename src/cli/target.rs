@@ -68,6 +68,13 @@ fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
 }
 
 impl Running {
+    /// The same node, launched anew: what it runs may have changed since.
+    pub(super) fn again(&self) -> Result<Self, Failure> {
+        let (config, node_name) = noted_config(self.node.path())?;
+        let node = Node::open(self.node.path())?;
+        Ok(Self { installation: Installation::load(&config)?, node_name, node })
+    }
+
     /// Takes part as a tool.
     pub(super) fn join(&self, timeout: Duration) -> Result<ToolLink, Failure> {
         Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)

@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod check;
 mod crash;
 mod demo;
 mod harness;

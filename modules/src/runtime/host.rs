@@ -1,9 +1,10 @@
 //! How a program that is no module takes part: tools, tests, launch itself.
 
 use crate::call::{CallError, Link, REPLIES_KEPT};
-use crate::common::{self, DescriptionPart, OutputLevel, Status};
+use crate::common::{self, Change, DescriptionPart, OutputLevel, ParameterPage, SetParameters, Status};
 use crate::description::Description;
 use crate::interface::append;
+use crate::parameter::{Parameter, Refusal};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
@@ -16,6 +17,9 @@ const DATA_SLOTS: u16 = 128;
 
 /// Longest description that is asked for, bytes.
 const DESCRIPTION_MAX: usize = 1 << 20;
+
+/// Times that parameters are read anew because they were set meanwhile.
+const READS_MAX: usize = 5;
 
 /// Why a tool cannot take part.
 #[derive(Debug, thiserror::Error)]
@@ -154,6 +158,41 @@ impl ToolLink {
         describe(&mut self.link, module, self.timeout)
     }
 
+    /// Asks a module for its parameters and their values; empty, if it has none.
+    ///
+    /// # Errors
+    /// See [`CallError`]. A module built before there were parameters says [`crate::call::Fault::Unknown`].
+    pub fn parameters(&mut self, module: Name) -> Result<Vec<Parameter>, CallError> {
+        let mut found = Vec::new();
+        let mut changes = None;
+        let mut reads = 0;
+        loop {
+            let from = found.len() as u16;
+            let page: ParameterPage = self.common(module, common::PARAMETERS, &(from,))?;
+            // Somebody set some in between: values of one moment belong together.
+            if changes.replace(page.changes).is_some_and(|before| before != page.changes) && reads < READS_MAX {
+                reads += 1;
+                found.clear();
+                changes = None;
+                continue;
+            }
+            let last = page.parameters.is_empty();
+            found.extend(page.parameters);
+            if found.len() >= usize::from(page.total) || last {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Sets parameters of a module, all of them or none; returns what they were and are.
+    ///
+    /// # Errors
+    /// See [`CallError`] and [`Refusal`].
+    pub fn set_parameters(&mut self, module: Name, wish: &SetParameters) -> Result<Vec<Change>, CallError<Refusal>> {
+        let set: Result<_, Refusal> = self.common(module, common::SET_PARAMETERS, wish).map_err(CallError::widen)?;
+        set.map_err(|refusal| CallError::Module(module, refusal))
+    }
+
     /// Removes the tool's mailboxes.
     pub fn close(self) {
         if let Some(data) = self.data {
@@ -168,21 +207,52 @@ impl ToolLink {
 /// # Errors
 /// See [`CallError`].
 pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Description, CallError> {
-    let mut bytes = Vec::new();
+    let mut parts = DescriptionParts::new(module);
     loop {
-        let from = bytes.len() as u32;
-        let call = link.begin(module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))?;
-        let part: DescriptionPart = link.wait(call, |reply| postcard::from_bytes(reply))?;
+        let call = parts.ask(link, timeout)?;
+        let part = link.wait(call, |reply| postcard::from_bytes(reply))?;
+        if let Some(description) = parts.take(part)? {
+            return Ok(description);
+        }
+    }
+}
+
+/// A description on its way: a reply holds a part of it.
+pub struct DescriptionParts {
+    module: Name,
+    bytes: Vec<u8>,
+}
+
+impl DescriptionParts {
+    /// Of this module, and nothing of it yet.
+    pub fn new(module: Name) -> Self {
+        Self { module, bytes: Vec::new() }
+    }
+
+    /// Begins the call for the next part.
+    ///
+    /// # Errors
+    /// As [`Link::begin`].
+    pub fn ask(&self, link: &mut Link, timeout: Duration) -> Result<u32, CallError> {
+        let from = self.bytes.len() as u32;
+        link.begin(self.module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))
+    }
+
+    /// Takes a part; the whole, if that was the last.
+    ///
+    /// # Errors
+    /// [`CallError::BadReply`] when it is too long, or no description.
+    pub fn take(&mut self, part: DescriptionPart) -> Result<Option<Description>, CallError> {
         // What it says of itself is a claim.
         if part.total as usize > DESCRIPTION_MAX {
             let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
-            return Err(CallError::BadReply(module, text));
+            return Err(CallError::BadReply(self.module, text));
         }
-        let last = part.bytes.is_empty();
-        bytes.extend_from_slice(&part.bytes);
-        if bytes.len() >= part.total as usize || last {
-            break;
+        self.bytes.extend_from_slice(&part.bytes);
+        if self.bytes.len() < part.total as usize && !part.bytes.is_empty() {
+            return Ok(None);
         }
+        let read = postcard::from_bytes(&self.bytes);
+        read.map(Some).map_err(|error| CallError::BadReply(self.module, error.to_string()))
     }
-    postcard::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
 }

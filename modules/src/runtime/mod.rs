@@ -12,13 +12,14 @@ mod context;
 mod face;
 mod follow;
 mod host;
+mod parameters;
 mod runner;
 pub(crate) mod server;
 mod start;
 
 pub use context::{Context, ContextError, Received};
 pub use follow::{Rate, Subscription};
-pub use host::{ClientError, ToolLink, describe};
+pub use host::{ClientError, DescriptionParts, ToolLink, describe};
 pub use runner::{exit, run, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;

@@ -69,6 +69,8 @@ pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
 /// The module and the state it is in.
 pub(crate) struct Life<M> {
     pub(crate) module: M,
+    /// Times that parameters were set.
+    pub(crate) changes: u32,
     participant: Arc<Participant>,
     state: ModuleState,
     error: String,
@@ -77,8 +79,8 @@ pub(crate) struct Life<M> {
 
 impl<M: Module> Life<M> {
     pub(crate) fn new(module: M, participant: Arc<Participant>) -> Self {
-        let mut life =
-            Self { module, participant, state: ModuleState::Starting, error: String::new(), started: Instant::now() };
+        let (state, started) = (ModuleState::Starting, Instant::now());
+        let mut life = Self { module, changes: 0, participant, state, error: String::new(), started };
         life.enter(ModuleState::Off);
         life
     }

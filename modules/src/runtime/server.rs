@@ -2,9 +2,10 @@
 
 use super::context::Context;
 use super::face::{Face, Offer};
+use super::parameters;
 use super::runner::Life;
 use crate::call::{CallEnvelope, Fault, ReplyEnvelope, Request, Verdict};
-use crate::common::{self, DescriptionPart, OutputLevel, Subscribe};
+use crate::common::{self, DescriptionPart, OutputLevel, SetParameters, Subscribe};
 use crate::interface::append;
 use crate::module::Module;
 use crate::output;
@@ -176,6 +177,17 @@ impl Call<'_> {
                 let rest = offer.description.get(from as usize..).unwrap_or_default();
                 let bytes = rest[..rest.len().min(common::DESCRIPTION_PART)].to_vec();
                 write_result(reply, &DescriptionPart { total: offer.description.len() as u32, bytes })
+            }
+            common::PARAMETERS => {
+                let (from,): (u16,) = read_arguments(self.arguments)?;
+                write_result(reply, &parameters::page(&mut life.module, life.changes, from))
+            }
+            common::SET_PARAMETERS => {
+                let wish: SetParameters = read_arguments(self.arguments)?;
+                let by = context.installation.classes.format(self.head.from.module());
+                let set = parameters::set(&mut life.module, context, &wish, &by);
+                life.changes = life.changes.wrapping_add(u32::from(set.is_ok() && !wish.only_check));
+                write_result(reply, &set)
             }
             other => Err(Fault::Unknown(other)),
         }

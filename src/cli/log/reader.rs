@@ -6,13 +6,10 @@
 
 use super::super::Failure;
 use super::super::target::Running;
-use super::told;
+use super::{LINES_FROM, told};
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::output::OutputLine;
 use rohrpost::{CallError, Name, ToolLink};
-
-/// Number of `lines_from` in the collector's interface.
-const LINES_FROM: u16 = 16;
 
 pub(super) struct Reader<'a> {
     running: &'a Running,
