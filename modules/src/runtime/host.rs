@@ -170,11 +170,11 @@ impl ToolLink {
         self.common(module, common::STATUS, &())
     }
 
-    /// Sets which output lines a module sends.
+    /// Sets which output lines a module sends, and tells which it sent before; none when nothing collects them.
     ///
     /// # Errors
     /// See [`CallError`].
-    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<(), CallError> {
+    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<Option<OutputLevel>, CallError> {
         self.common(module, common::OUTPUT_LEVEL, &(level,))
     }
 
