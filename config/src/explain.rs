@@ -5,6 +5,7 @@ use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
+use crate::output::LineFormat;
 use crate::saved::SavedValue;
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
@@ -166,12 +167,24 @@ impl Page<'_> {
         for (module, level) in &output.levels {
             let _ = write!(words, "; {} from {}", self.name(*module), level.as_str());
         }
-        if let Some(file) = &output.file {
-            let _ = write!(words, "; written to {} as well", file.display());
-        }
         self.line("Output");
         self.line("");
         self.entry("keeps", &words);
+        let (rate, burst) = (output.rate, output.burst);
+        let words = format!("{rate} lines a second from each module, {burst} at once; errors are counted apart");
+        self.entry("takes", &words);
+        if let Some(file) = &output.file {
+            let format = match output.format {
+                LineFormat::Text => "text",
+                LineFormat::Json => "JSON",
+            };
+            let size = size_text(output.file_size);
+            let kept = count(output.files as usize, "full file");
+            self.entry("writes", &format!("{} as {format}; a new one after {size}, {kept} kept", file.display()));
+        }
+        if output.journal {
+            self.entry("", "the system's journal");
+        }
     }
 
     fn gui(&mut self) {

@@ -64,7 +64,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
             let json = serde_json::to_value(tool.status(module)?)?;
             serde_json::from_value(json)?
         }
-        ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|()| Value::Null)?,
+        ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|_| Value::Null)?,
         ("get", [data]) => get(module, data, tool)?,
         (_, texts) => call(module, name, texts, tool)?,
     };
@@ -83,8 +83,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
 }
 
 pub(super) fn level_of(text: &str) -> Result<OutputLevel, Failure> {
-    use OutputLevel::{Debug, Error, Info, Trace, Warn};
-    let level = [Error, Warn, Info, Debug, Trace].into_iter().find(|level| level.name() == text);
+    let level = OutputLevel::ALL.into_iter().find(|level| level.name() == text);
     level.ok_or_else(|| format!("no level `{text}`; there are error, warn, info, debug, trace").into())
 }
 

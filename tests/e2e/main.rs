@@ -16,6 +16,8 @@ mod mailboxes;
 mod nodes;
 mod once;
 mod once_wrap;
+mod output;
+mod output_log;
 mod probe;
 mod process;
 mod readme;

@@ -32,7 +32,8 @@ pub enum ClientError {
     Mailbox(#[from] CreateError),
     /// All instances of class `tool` that programs run by hand may take are in use.
     #[error(
-        "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, or widen `tools` in the configuration"
+        "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, or \
+         widen `tools` in the configuration"
     )]
     Crowded(usize, String),
     /// The configuration has no such node.
@@ -169,11 +170,11 @@ impl ToolLink {
         self.common(module, common::STATUS, &())
     }
 
-    /// Sets which output lines a module sends.
+    /// Sets which output lines a module sends, and tells which it sent before; none when nothing collects them.
     ///
     /// # Errors
     /// See [`CallError`].
-    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<(), CallError> {
+    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<Option<OutputLevel>, CallError> {
         self.common(module, common::OUTPUT_LEVEL, &(level,))
     }
 

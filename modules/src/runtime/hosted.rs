@@ -66,8 +66,7 @@ impl<M: Module> Hosted<'_, M> {
             }
             common::OUTPUT_LEVEL => {
                 let (level,): (OutputLevel,) = read_arguments(call.arguments)?;
-                output::set_level(level);
-                Ok(())
+                write_result(reply, &output::set_level(level))
             }
             common::DESCRIBE => call.describe(&self.offer.description, reply),
             common::PARAMETERS => {
