@@ -4,6 +4,7 @@ mod call;
 mod check;
 mod clean;
 mod demo;
+mod doctor;
 mod echo;
 mod launch;
 mod list;
@@ -48,6 +49,8 @@ enum Command {
     Log(log::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
+    /// Look whether this computer lets a robot run in time.
+    Doctor(doctor::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
 }
@@ -64,6 +67,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Echo(arguments) => echo::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {

@@ -9,6 +9,7 @@
 mod check;
 mod crash;
 mod demo;
+mod doctor;
 mod harness;
 mod launch;
 mod mailboxes;
