@@ -9,6 +9,7 @@ mod echo;
 mod launch;
 mod list;
 mod log;
+mod new;
 mod run;
 mod status;
 mod summary;
@@ -51,6 +52,8 @@ enum Command {
     Clean(clean::Arguments),
     /// Look whether this computer lets a robot run in time.
     Doctor(doctor::Arguments),
+    /// Begin a module of your own: a project that compiles, runs and has a test.
+    New(new::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
 }
@@ -68,6 +71,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Log(arguments) => log::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {

@@ -13,6 +13,7 @@ mod doctor;
 mod harness;
 mod launch;
 mod mailboxes;
+mod new;
 mod nodes;
 mod once;
 mod once_wrap;
