@@ -3,6 +3,7 @@
 mod call;
 mod check;
 mod clean;
+mod completions;
 mod demo;
 mod doctor;
 mod echo;
@@ -54,12 +55,15 @@ enum Command {
     Doctor(doctor::Arguments),
     /// Begin a module of your own: a project that compiles, runs and has a test.
     New(new::Arguments),
+    /// Print a script by which a shell completes commands, modules, functions and data.
+    Completions(completions::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
 }
 
 /// Runs the command that was typed.
 pub(crate) fn main() -> ExitCode {
+    completions::answer();
     let result = match Arguments::parse().command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),
@@ -72,6 +76,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {

@@ -7,6 +7,7 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod check;
+mod completions;
 mod crash;
 mod demo;
 mod doctor;
