@@ -38,7 +38,7 @@ pub use rerun;
 pub use scene::{DrawError, RATE_HZ, Scene, entity};
 pub use sink::{CloseError, OpenError, Sink};
 pub use states::Level;
-pub use store::{BYTES_MAX, DrawingCounts, ENTITIES_MAX, LINES_MAX};
+pub use store::{BYTES_MAX, DrawingCounts, ENTITIES_MAX, LINE_BYTES_MAX, LINES_MAX};
 pub use view::{Datum, View, Views};
 pub use world::{MAP_CELLS_MAX, TILES_MAX};
 

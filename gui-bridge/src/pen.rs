@@ -201,6 +201,7 @@ impl Work {
                 told = "draws";
             }
             let end = self.watch(&feeder, Some(&line), &|| false);
+            let was_broken = line.is_broken();
             feeder.give_up();
             line.cut();
             if !ended_within(&feeder, END) {
@@ -208,7 +209,7 @@ impl Work {
                 return Err(CloseError::Stuck);
             }
             match (end, feeder.failure()) {
-                (_, Some(error @ (FeedError::Layout(_) | FeedError::Open(_)))) if !line.is_broken() => {
+                (_, Some(error @ (FeedError::Layout(_) | FeedError::Open(_)))) if !was_broken => {
                     self.fail(&error);
                     return Ok(());
                 }
@@ -277,7 +278,7 @@ impl Work {
                 return End::Ended;
             }
             if line.is_some_and(|line| !line.has_answered()) {
-                return End::Still;
+                return if self.is_closing() { End::Ended } else { End::Still };
             }
             if self.is_closing() {
                 let until = last

@@ -190,7 +190,8 @@ impl Scene {
         self.paper.put(entity, Row { time: None, components: what.as_serialized_batches() });
     }
 
-    /// Draws what happens now and is no state: the next one does not replace it.
+    /// Draws what happens now and is no state: the next one does not replace it. For small things, such as lines of text: what
+    /// has more than [`crate::LINE_BYTES_MAX`] is dropped and counted.
     pub fn log_event(&mut self, entity: EntityPath, what: &dyn AsComponents) {
         self.paper.line(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
     }

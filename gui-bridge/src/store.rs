@@ -23,6 +23,9 @@ pub const BYTES_MAX: usize = 64 * 1024 * 1024;
 /// Lines of text that wait, and as many that are kept for a viewer that comes later.
 pub const LINES_MAX: usize = 1000;
 
+/// A line is no longer than this.
+pub const LINE_BYTES_MAX: usize = 16 * 1024;
+
 /// What an entity shows at one time.
 #[derive(Clone)]
 pub(crate) struct Row {
@@ -149,6 +152,10 @@ impl Store {
     /// A line of text, which nothing replaces.
     pub(crate) fn line(&self, path: EntityPath, row: Row) {
         let mut inner = self.lock();
+        if row.bytes() > LINE_BYTES_MAX {
+            inner.counts.dropped += 1;
+            return;
+        }
         if inner.lines.len() == LINES_MAX {
             inner.lines.pop_front();
             inner.counts.dropped += 1;
