@@ -232,7 +232,7 @@ impl Sender {
     fn wake(&self) {
         step!("send: before bell");
         let owner = self.segment.page().owner.participant.load(std::sync::atomic::Ordering::Relaxed);
-        doorbell::ring(&self.participant.node().entry(owner as u16).bell);
+        doorbell::ring(self.participant.node(), owner as u16);
         step!("send: rung");
     }
 }

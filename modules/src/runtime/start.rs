@@ -178,8 +178,9 @@ impl Start {
         let made = M::new(settings, &mut context).map_err(|error| StartError::Module(text, error.to_string()))?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
+        let spin = module.spin;
         let life = Life::new(made, participant);
-        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, receivers: Vec::new() })
+        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, spin, receivers: Vec::new() })
     }
 }
 
