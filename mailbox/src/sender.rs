@@ -99,8 +99,8 @@ impl Participant {
 }
 
 fn open(participant: &Participant, name: Name) -> Result<Segment, SendError> {
-    match Segment::open(participant.node().path(), name, true) {
-        Ok((segment, _)) => Ok(segment),
+    match Segment::open(participant.node().path(), name) {
+        Ok(segment) => Ok(segment),
         Err(BadSegment::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => Err(SendError::NoMailbox(name)),
         Err(error) => Err(SendError::Bad(name, error.to_string())),
     }

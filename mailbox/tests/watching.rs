@@ -110,13 +110,13 @@ fn a_timeout_is_kept_in_poll_to_less_than_a_millisecond() {
     let (_far, near) = UnixStream::pair().unwrap();
     watches.add(&near, Interest::Read).unwrap();
     for timeout in [300, 1_700].map(Duration::from_micros) {
-        let shortest = (0..50).map(|_| {
+        // However busy the computer is, one of many is not kept waiting by others.
+        until("a timeout is kept to the fraction of a millisecond", || {
             let began = Instant::now();
             watches.wait_any(&mut [&mut receiver], timeout, || false);
-            began.elapsed()
+            assert!(began.elapsed() >= timeout);
+            began.elapsed() < timeout + Duration::from_micros(600)
         });
-        let shortest = shortest.min().unwrap();
-        assert!(shortest >= timeout && shortest < timeout + Duration::from_micros(600), "{timeout:?}: {shortest:?}");
     }
 }
 

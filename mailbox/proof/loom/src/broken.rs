@@ -20,7 +20,7 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("no_wake_up_is_lost_between_two", 2),
     ("no_wake_up_is_lost_when_displaced", 2),
     ("no_wake_up_is_lost_in_poll", 2),
-    ("no_wake_up_is_lost_in_poll_between_two", 2),
+    ("no_wake_up_is_lost_in_poll_between_two", 1),
     ("a_dead_ringer_takes_no_wake_up_along", 2),
     ("a_retired_mailbox_keeps_nothing", 3),
     ("a_retired_mailbox_keeps_nothing_of_the_dead", 2),
