@@ -12,6 +12,7 @@ mod demo;
 mod harness;
 mod launch;
 mod mailboxes;
+mod measure;
 mod nodes;
 mod once;
 mod once_wrap;
