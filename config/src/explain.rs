@@ -5,6 +5,7 @@ use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
+use crate::output::LineFormat;
 use crate::saved::SavedValue;
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
@@ -111,7 +112,7 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let memory = modules.iter().map(|module| memory(module)).sum();
+        let memory = modules.iter().map(|module| module.memory()).sum();
         self.line("");
         self.line(format!("Node `{}`: {}, {} of mailboxes", node.name, count(modules.len(), "module"), about(memory)));
         self.line("");
@@ -119,8 +120,9 @@ impl Page<'_> {
             self.entry("address", address);
         }
         self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
-        let (first, last) = (node.tools.start(), node.tools.end());
-        self.entry("tools", &format!("programs run by hand are tool.{first} to tool.{last}"));
+        let (hand, launch) = (node.tools_by_hand(), node.launch_instance());
+        let (first, last) = (hand.start(), hand.end());
+        self.entry("tools", &format!("launch is tool.{launch}; programs run by hand are tool.{first} to tool.{last}"));
         for module in modules {
             self.module(module);
         }
@@ -165,12 +167,24 @@ impl Page<'_> {
         for (module, level) in &output.levels {
             let _ = write!(words, "; {} from {}", self.name(*module), level.as_str());
         }
-        if let Some(file) = &output.file {
-            let _ = write!(words, "; written to {} as well", file.display());
-        }
         self.line("Output");
         self.line("");
         self.entry("keeps", &words);
+        let (rate, burst) = (output.rate, output.burst);
+        let words = format!("{rate} lines a second from each module, {burst} at once; errors are counted apart");
+        self.entry("takes", &words);
+        if let Some(file) = &output.file {
+            let format = match output.format {
+                LineFormat::Text => "text",
+                LineFormat::Json => "JSON",
+            };
+            let size = size_text(output.file_size);
+            let kept = count(output.files as usize, "full file");
+            self.entry("writes", &format!("{} as {format}; a new one after {size}, {kept} kept", file.display()));
+        }
+        if output.journal {
+            self.entry("", "the system's journal");
+        }
     }
 
     fn gui(&mut self) {
@@ -251,12 +265,6 @@ fn mailbox(spec: &MailboxSpec) -> String {
         let _ = write!(words, "; {} claims a sender", spec.claims);
     }
     words
-}
-
-/// Bytes of a module's mailboxes; each face has a command mailbox like the module's.
-fn memory(module: &Module) -> u64 {
-    let [commands, replies, data] = module.mailboxes.each().map(|(_, spec)| spec.memory());
-    commands * (1 + module.faces.len() as u64) + replies + data
 }
 
 /// A size in at most four digits.
