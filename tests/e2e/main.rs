@@ -15,6 +15,7 @@ mod doctor;
 mod harness;
 mod launch;
 mod mailboxes;
+mod measure;
 mod new;
 mod nodes;
 mod once;
