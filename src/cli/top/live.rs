@@ -17,6 +17,7 @@ use rohrpost::Name;
 use rohrpost::launch::{Event as Told, events};
 use std::collections::HashMap;
 use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 /// Signals are looked after so often, and answers that are awaited.
@@ -29,10 +30,26 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
     let mut live = Live::new(running, interval, palette)?;
     let outcome = {
         let mut screen = Opened::new()?;
-        live.watch(&mut screen.0, || matches!(told.try_recv(), Ok(Told::Stop)))
+        let typed = keyboard()?;
+        live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(Told::Stop)))
     };
     live.calls.map(Calls::close);
     outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// What the terminal says, from a thread of its own: reading from a terminal that was closed never returns (crossterm takes
+/// its end for an interruption), and must not keep us from ending.
+fn keyboard() -> Result<Receiver<Event>, Failure> {
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let read = move || {
+        while let Ok(event) = event::read() {
+            if sender.send(event).is_err() {
+                break;
+            }
+        }
+    };
+    std::thread::Builder::new().name("keyboard".into()).spawn(read)?;
+    Ok(receiver)
 }
 
 /// The terminal while it is ours; given back as it was, whatever ends us. (Of a panic, `ratatui` says what it was after that.)
@@ -105,7 +122,12 @@ impl Live {
         }
     }
 
-    fn watch(&mut self, terminal: &mut DefaultTerminal, stop: impl Fn() -> bool) -> Result<(), Failure> {
+    fn watch(
+        &mut self,
+        terminal: &mut DefaultTerminal,
+        typed: &Receiver<Event>,
+        stop: impl Fn() -> bool,
+    ) -> Result<(), Failure> {
         let mut next = Instant::now() + self.interval;
         self.ask();
         let mut changed = true;
@@ -115,11 +137,11 @@ impl Live {
             }
             let look = if self.calls.as_ref().is_some_and(Calls::waits) { LOOK_WAITING } else { LOOK };
             let wait = if self.app.paused { look } else { look.min(next.saturating_duration_since(Instant::now())) };
-            if event::poll(wait)? {
-                if self.event(event::read()?) {
-                    return Ok(());
-                }
-                changed = true;
+            match typed.recv_timeout(wait) {
+                Ok(event) if self.event(&event) => return Ok(()),
+                Ok(_) => changed = true,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Err("the terminal says nothing more".into()),
             }
             if Instant::now() >= next && !self.app.paused {
                 next = Instant::now() + self.interval;
@@ -233,8 +255,8 @@ impl Live {
     }
 
     /// Takes what the terminal says; true when it is time to end.
-    fn event(&mut self, event: Event) -> bool {
-        let Event::Key(key) = event else { return false };
+    fn event(&mut self, event: &Event) -> bool {
+        let Event::Key(key) = *event else { return false };
         if key.kind == KeyEventKind::Release {
             return false;
         }
