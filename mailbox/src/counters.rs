@@ -6,6 +6,7 @@
 
 use crate::name::{Class, Priority};
 use crate::step::step;
+use crate::word::Victim;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -33,12 +34,14 @@ pub enum Loss {
     Closed,
     /// Not accepted: its sender died while it wrote.
     Unfinished,
+    /// Accepted, then its own sender's newer one took its place, as the policy `latest` is for. No reason to worry.
+    Replaced,
 }
 
 impl Loss {
     /// All causes, in the order of the counters.
-    pub const ALL: [Self; 6] =
-        [Self::Displaced, Self::Refused, Self::Stale, Self::Poison, Self::Closed, Self::Unfinished];
+    pub const ALL: [Self; 7] =
+        [Self::Displaced, Self::Refused, Self::Stale, Self::Poison, Self::Closed, Self::Unfinished, Self::Replaced];
 
     /// One word for tables.
     pub const fn name(self) -> &'static str {
@@ -49,12 +52,18 @@ impl Loss {
             Self::Poison => "poison",
             Self::Closed => "closed",
             Self::Unfinished => "unfinished",
+            Self::Replaced => "replaced",
         }
+    }
+
+    /// Whether somebody misses the package. Nobody misses one that was replaced by a newer.
+    pub const fn is_missed(self) -> bool {
+        !matches!(self, Self::Replaced)
     }
 
     /// Whether the package had been accepted: sent = received + such losses + depth.
     pub const fn was_accepted(self) -> bool {
-        matches!(self, Self::Displaced | Self::Stale | Self::Poison | Self::Closed)
+        matches!(self, Self::Displaced | Self::Stale | Self::Poison | Self::Closed | Self::Replaced)
     }
 }
 
@@ -95,6 +104,12 @@ impl Counters {
     pub(crate) fn lost(&self, priority: Priority, cause: Loss, packages: u64) {
         self.row(Class(priority.0)).losses[cause as usize].fetch_add(packages, Ordering::Relaxed);
         step!("counters: loss");
+    }
+
+    /// A package lost its place to another.
+    pub(crate) fn gave_way(&self, victim: Victim) {
+        let cause = if victim.replaced { Loss::Replaced } else { Loss::Displaced };
+        self.lost(victim.priority, cause, 1);
     }
 
     /// By the receiver alone, which may therefore load and store.
@@ -201,9 +216,9 @@ impl ClassTraffic {
         self.losses[cause as usize]
     }
 
-    /// Lost for any cause.
+    /// Lost for any cause for which somebody misses them ([`Loss::is_missed`]).
     pub fn lost_in_all(&self) -> u64 {
-        self.losses.iter().sum()
+        Loss::ALL.into_iter().filter(|cause| cause.is_missed()).map(|cause| self.lost(cause)).sum()
     }
 
     /// Adds what the same class did in another mailbox.

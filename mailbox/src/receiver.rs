@@ -146,7 +146,7 @@ impl Receiver {
         self.deaths_seen = node.page().deaths.load(Ordering::Acquire);
         let me = self.participant.claimant();
         let counters = &self.segment.page().counters;
-        let lost = |priority| counters.lost(priority, Loss::Displaced, 1);
+        let lost = |victim| counters.gave_way(victim);
         let slots = self.segment.slots();
         let mut filling = false;
         let dead = |by| {

@@ -166,7 +166,7 @@ fn retire(old: &Segment) {
         old.page().counters.lost(taken.word.priority(), Loss::Closed, 1);
         slots.release(taken);
     }
-    slots.settle(|priority| old.page().counters.lost(priority, Loss::Displaced, 1));
+    slots.settle(|victim| old.page().counters.gave_way(victim));
 }
 
 /// Takes a mailbox's name away; the caller owns it.

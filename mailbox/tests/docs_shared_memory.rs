@@ -43,8 +43,8 @@ fn a_mailbox_is_as_documented() {
         assert_eq!((there.u32(72), there.u32(76), there.u64(128)), (0, 2, 2), "adoptions, most waiting, ticket");
         assert_eq!((there.u32(136), there.u32(140), there.u32(320)), (0, 0, 256 + u32::from(HIGH.0)));
         assert_eq!(there.u64(328), 1, "received of the first row");
-        assert!(there.u64(320 + 296) >= there.u64(320 + 64), "all waits, and the longest");
-        assert_eq!(there.u64(320 + 304), 5, "bytes of the first row");
+        assert!(there.u64(320 + 304) >= there.u64(320 + 72), "all waits, and the longest");
+        assert_eq!(there.u64(320 + 312), 5, "bytes of the first row");
         let words = 4096 + (usize::from(slots) * word_bytes).next_multiple_of(64);
         let mut seen = Vec::new();
         for slot in 0..usize::from(slots) {

@@ -34,6 +34,15 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// Functions that every module has, besides those of its interface.
+pub(super) const COMMON: [(&str, &str); 5] = [
+    ("on", "Begins to work"),
+    ("off", "Goes to its safe state"),
+    ("status", "Says how it is"),
+    ("get", "Asks for its newest data of a kind"),
+    ("output-level", "Sets which lines it sends"),
+];
+
 /// A time that a user gave in seconds.
 pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())
@@ -64,7 +73,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
             let json = serde_json::to_value(tool.status(module)?)?;
             serde_json::from_value(json)?
         }
-        ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|()| Value::Null)?,
+        ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|_| Value::Null)?,
         ("get", [data]) => get(module, data, tool)?,
         (_, texts) => call(module, name, texts, tool)?,
     };
@@ -83,8 +92,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
 }
 
 pub(super) fn level_of(text: &str) -> Result<OutputLevel, Failure> {
-    use OutputLevel::{Debug, Error, Info, Trace, Warn};
-    let level = [Error, Warn, Info, Debug, Trace].into_iter().find(|level| level.name() == text);
+    let level = OutputLevel::ALL.into_iter().find(|level| level.name() == text);
     level.ok_or_else(|| format!("no level `{text}`; there are error, warn, info, debug, trace").into())
 }
 

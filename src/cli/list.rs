@@ -1,11 +1,11 @@
 //! `rohrpost list`.
 
-use super::summary::{ModuleLine, module_lines, print_modules};
+use super::summary::{ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
 use super::target::Target;
 use super::{Failure, say};
 use rohrpost::config::Installation;
-use rohrpost::mailbox::{Full, Loss, MailboxInfo};
+use rohrpost::mailbox::{Loss, MailboxInfo};
 use rohrpost::survey::{Survey, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
@@ -37,6 +37,8 @@ pub(super) struct MailboxLine {
     pub(super) sent: u64,
     pub(super) received: u64,
     pub(super) lost: Vec<(&'static str, u64)>,
+    #[serde(skip)]
+    pub(super) losses: String,
 }
 
 #[derive(Serialize)]
@@ -68,14 +70,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-impl MailboxLine {
-    /// Its losses by cause, in words.
-    pub(super) fn losses(&self) -> String {
-        let lost: Vec<String> = self.lost.iter().map(|(cause, n)| format!("{n} {cause}")).collect();
-        if lost.is_empty() { "none".into() } else { lost.join(", ") }
-    }
-}
-
 /// Mailboxes, one a line.
 pub(super) fn mailbox_lines(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<MailboxLine> {
     mailboxes.iter().map(|mailbox| mailbox_line(installation, mailbox)).collect()
@@ -89,14 +83,12 @@ fn mailbox_line(installation: &Installation, mailbox: &MailboxInfo) -> MailboxLi
         owner: mailbox.owner,
         slots: mailbox.shape.slots,
         body_bytes_max: mailbox.shape.body_bytes_max,
-        full: match mailbox.shape.full {
-            Full::Displace => "displace",
-            Full::Reject => "reject",
-        },
+        full: mailbox.shape.full.name(),
         waiting: mailbox.depth,
         waiting_max: mailbox.depth_max,
         sent: mailbox.sent,
         received: mailbox.classes.iter().map(|class| class.received).sum(),
+        losses: losses(lost),
         lost: Loss::ALL.into_iter().map(|cause| (cause.name(), lost(cause))).filter(|(_, n)| *n > 0).collect(),
     }
 }
@@ -112,7 +104,7 @@ fn print_mailboxes(lines: &[MailboxLine]) -> String {
             format!("{} (most {})", line.waiting, line.waiting_max),
             line.sent.to_string(),
             line.received.to_string(),
-            line.losses(),
+            line.losses.clone(),
         ]
     });
     table(["mailbox", "for", ">owner", ">slots", "when full", ">waiting", ">sent", ">received", "lost"], rows)

@@ -142,7 +142,7 @@ impl Sending<'_> {
             self.tool.link.collect();
             let mut answers = Vec::new();
             let link = &mut self.tool.link;
-            self.under_way.retain(|call| match link.poll_as(*call, |bytes| Ok(bytes.to_vec())) {
+            self.under_way.retain(|call| match link.poll_for(*call, |bytes| Ok(bytes.to_vec())) {
                 Some(answer) => {
                     answers.push(answer);
                     false

@@ -29,6 +29,10 @@ pub(super) struct Running {
 }
 
 impl Target {
+    pub(super) fn new(config: Option<PathBuf>, node: Option<String>) -> Self {
+        Self { config, node }
+    }
+
     /// Finds the node that is meant.
     pub(super) fn find(&self) -> Result<Running, Failure> {
         let (config, node_name) = match &self.config {

@@ -115,7 +115,21 @@ fn a_mistaken_command_line_is_usage() {
         assert!(said.err.contains("--help") || said.err.contains("Usage"), "{arguments:?}: {said:?}");
     }
     assert!(place.say(&["--help"]).ok().contains("rohrpost demo"));
-    for command in ["check", "launch", "demo", "list", "status", "call", "echo", "log", "clean", "run"] {
+    for command in [
+        "check",
+        "launch",
+        "demo",
+        "list",
+        "status",
+        "call",
+        "echo",
+        "log",
+        "clean",
+        "run",
+        "doctor",
+        "new",
+        "completions",
+    ] {
         let help = place.say(&[command, "--help"]).ok();
         assert!(help.contains("Example"), "{command} has no example:\n{help}");
     }
@@ -146,7 +160,9 @@ fn many_tools_work_at_the_same_time() {
     let mut echo = Running::start(place.command(&["echo", "probe.0", "beat", "--json"]));
     echo.wait_for("\n");
     let mut calls: Vec<Running> = (1..=8)
-        .map(|number| Running::start(place.command(&["call", "probe.0", "count", &number.to_string()])))
+        .map(|number| {
+            Running::start(place.command(&["call", "probe.0", "count", &number.to_string(), "--timeout", "30"]))
+        })
         .collect();
     let mut answers: Vec<u64> = Vec::new();
     for call in &mut calls {

@@ -209,11 +209,11 @@ impl Link {
     /// The outcome of a call without a result, if it is known by now; none while it is under way. Repeats the command when
     /// it is time.
     pub fn poll(&mut self, sequence: u32) -> Option<Result<(), CallError>> {
-        self.poll_as(sequence, |_| Ok(()))
+        self.poll_for(sequence, |_| Ok(()))
     }
 
-    /// The same for a call with a result, whose bytes it hands to `read`.
-    pub fn poll_as<T>(
+    /// The same of a call with a result, whose bytes `read` takes.
+    pub fn poll_for<T>(
         &mut self,
         sequence: u32,
         read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,

@@ -2,10 +2,11 @@
 
 use super::context::Context;
 use super::face::Offer;
+use super::parameters;
 use super::runner::Life;
 use super::server::{Call, Servant, read_arguments, write_result};
 use crate::call::Fault;
-use crate::common::{self, OutputLevel, Subscribe};
+use crate::common::{self, OutputLevel, SetParameters, Subscribe};
 use crate::module::Module;
 use crate::output;
 use rohrpost_mailbox::{Label, Name, SendError, local, monotonic_ns};
@@ -65,10 +66,20 @@ impl<M: Module> Hosted<'_, M> {
             }
             common::OUTPUT_LEVEL => {
                 let (level,): (OutputLevel,) = read_arguments(call.arguments)?;
-                output::set_level(level);
-                Ok(())
+                write_result(reply, &output::set_level(level))
             }
             common::DESCRIBE => call.describe(&self.offer.description, reply),
+            common::PARAMETERS => {
+                let (from,): (u16,) = read_arguments(call.arguments)?;
+                write_result(reply, &parameters::page(&mut self.life.module, self.life.changes, from))
+            }
+            common::SET_PARAMETERS => {
+                let wish: SetParameters = read_arguments(call.arguments)?;
+                let by = self.context.installation.classes.format(call.head.from.module());
+                let set = parameters::set(&mut self.life.module, self.context, &wish, &by);
+                self.life.changes = self.life.changes.wrapping_add(u32::from(set.is_ok() && !wish.only_check));
+                write_result(reply, &set)
+            }
             other => Err(Fault::Unknown(other)),
         }
     }

@@ -13,6 +13,7 @@ mod face;
 mod follow;
 mod host;
 mod hosted;
+mod parameters;
 mod runner;
 pub(crate) mod server;
 mod start;

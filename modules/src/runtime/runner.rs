@@ -37,7 +37,7 @@ pub fn run<M: Module>() -> ExitCode {
 pub fn exit(result: Result<(), StartError>) -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
     tracing::error!("{error}");
-    output::drain();
+    output::flush();
     if !output::is_installed() {
         output::print(&error);
     }
@@ -49,7 +49,11 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 /// # Errors
 /// See [`StartError`].
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
-    let mut running = start.join::<M>()?;
+    let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
+    let mut running = joined.unwrap_or_else(|panic| {
+        output::flush();
+        std::panic::resume_unwind(panic)
+    })?;
     let worked = catch_unwind(AssertUnwindSafe(|| {
         running.turn_on_if_wanted();
         running.go();
@@ -65,6 +69,8 @@ pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
 /// The module and the state it is in.
 pub(crate) struct Life<M> {
     pub(crate) module: M,
+    /// Times that parameters were set.
+    pub(crate) changes: u32,
     participant: Arc<Participant>,
     state: ModuleState,
     error: String,
@@ -73,8 +79,8 @@ pub(crate) struct Life<M> {
 
 impl<M: Module> Life<M> {
     pub(crate) fn new(module: M, participant: Arc<Participant>) -> Self {
-        let mut life =
-            Self { module, participant, state: ModuleState::Starting, error: String::new(), started: Instant::now() };
+        let (state, started) = (ModuleState::Starting, Instant::now());
+        let mut life = Self { module, changes: 0, participant, state, error: String::new(), started };
         life.enter(ModuleState::Off);
         life
     }
@@ -151,6 +157,8 @@ impl<M: Module> Life<M> {
             missed: context.subscriptions.missed(),
             lost: context.followings.lost,
             output_lost: output::lost(),
+            output_suppressed: output::suppressed(),
+            output_level: output::level(),
         }
     }
 }
@@ -203,7 +211,7 @@ impl<M: Module> Running<M> {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told");
         self.life.panicked(text, &mut self.context);
-        output::drain();
+        output::flush();
     }
 
     fn commands(&mut self) -> bool {
@@ -274,7 +282,7 @@ impl<M: Module> Running<M> {
         self.context.followings.end(&mut self.context.link.borrow_mut());
         self.life.enter(ModuleState::Stopping);
         tracing::debug!("ends");
-        output::drain();
+        output::flush();
         self.life.participant.leave();
         if !self.by_hand {
             return;

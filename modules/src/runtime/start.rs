@@ -2,13 +2,14 @@
 
 use super::context::Context;
 use super::face::Face;
+use super::parameters;
 use super::runner::{Life, Running, served};
 use crate::call::Link;
 use crate::module::Module;
 use crate::output;
 use nix::sys::signal::Signal;
 use rohrpost_config::{
-    Errors, Full, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState,
+    Errors, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState,
 };
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, base_directory, local,
@@ -173,7 +174,9 @@ impl Start {
         let names = faces.iter().map(|face: &Face<M>| face.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock);
         let settings = installation.settings_as(module)?;
-        let made = M::new(settings, &mut context).map_err(|error| StartError::Module(text, error.to_string()))?;
+        let mut made =
+            M::new(settings, &mut context).map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
+        parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
         let life = Life::new(made, participant);
@@ -186,10 +189,7 @@ pub(crate) fn shape(spec: &MailboxSpec) -> Shape {
     Shape {
         slots: spec.slots,
         body_bytes_max: u16::try_from(spec.size).unwrap_or(u16::MAX),
-        full: match spec.full {
-            Full::Displace => rohrpost_mailbox::Full::Displace,
-            Full::Reject => rohrpost_mailbox::Full::Reject,
-        },
+        full: spec.full,
         max_age: spec.max_age,
         claims: spec.claims,
     }

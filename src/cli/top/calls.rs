@@ -114,7 +114,7 @@ impl Calls {
         self.tool.link.collect();
         let mut answers = Vec::new();
         for call in std::mem::take(&mut self.under_way) {
-            let Some(outcome) = self.tool.link.poll_as(call.sequence, |bytes| Ok(bytes.to_vec())) else {
+            let Some(outcome) = self.tool.link.poll_for(call.sequence, |bytes| Ok(bytes.to_vec())) else {
                 self.under_way.push(call);
                 continue;
             };

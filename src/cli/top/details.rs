@@ -112,7 +112,7 @@ fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> Stri
             line.full.into(),
             format!("{} (most {})", line.waiting, line.waiting_max),
             line.received.to_string(),
-            line.losses(),
+            line.losses.clone(),
         ]
     });
     table(["", ">slots", "when full", ">waiting", ">received", "lost"], rows)

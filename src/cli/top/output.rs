@@ -19,8 +19,8 @@ const SHOWN: usize = 500;
 pub(super) struct Output {
     collector: Option<Name>,
     lines: VecDeque<OutputLine>,
-    /// Number of the next line; none until the collector has said how far it is.
-    next: Option<u64>,
+    /// Number of the next line, in this life of the collector; none until it has said how far it is.
+    next: Option<(u32, u64)>,
     /// Why there is none.
     pub(super) silence: Option<String>,
 }
@@ -38,7 +38,7 @@ impl Output {
     /// Whom to ask for lines, and from which number on.
     pub(super) fn wants(&self) -> Option<(Name, u64)> {
         // No line has the highest number: the answer tells how far the collector is.
-        Some((self.collector?, self.next.unwrap_or(u64::MAX)))
+        Some((self.collector?, self.next.map_or(u64::MAX, |(_, next)| next)))
     }
 
     /// Takes the collector's answer; true when there is more to ask for at once.
@@ -51,18 +51,18 @@ impl Output {
             }
         };
         self.silence = None;
-        let from = self.next.unwrap_or(u64::MAX);
-        if page.next < from {
+        if self.next.is_none_or(|(life, _)| life != page.life) {
             // The first time, or the collector began anew.
-            self.next = Some(page.next.saturating_sub(BACKLOG));
+            self.next = Some((page.life, page.next.saturating_sub(BACKLOG)));
             return page.next > 0;
         }
         let more = !page.lines.is_empty();
-        self.next = Some(page.first + page.lines.len() as u64);
+        let next = page.first + page.lines.len() as u64;
+        self.next = Some((page.life, next));
         self.lines.extend(page.lines);
         let excess = self.lines.len().saturating_sub(KEPT);
         self.lines.drain(..excess);
-        more && self.next < Some(page.next)
+        more && next < page.next
     }
 
     /// The newest lines that pass, as they are shown.
