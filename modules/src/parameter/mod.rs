@@ -16,7 +16,7 @@ mod words;
 
 pub use declared::{Declared, put_parameter};
 pub use kinds::ParameterType;
-pub use words::{toml_text, value_text};
+pub use words::{from_file, toml_text, value_text};
 
 use crate::value::{Value, WalkError, decode, describe_type};
 use postcard_schema::Schema;

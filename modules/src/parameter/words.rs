@@ -1,6 +1,7 @@
 //! Values of parameters as people and files write them.
 
-use crate::value::Value;
+use crate::value::{Value, describe_type, encode};
+use postcard_schema::schema::owned::{OwnedDataModelType as Ty, OwnedNamedType};
 
 /// A value for people: a choice as a word in kebab-case, all else as ever.
 ///
@@ -14,6 +15,17 @@ pub fn value_text(value: &Value) -> String {
         Value::Variant(name, payload) if **payload == Value::Null => kebab(name),
         other => other.to_string(),
     }
+}
+
+/// The bytes of a value that a file gives.
+///
+/// # Errors
+/// What is wrong with it. On a command line all is text; in a file a number stands without quotes.
+pub fn from_file(ty: &OwnedNamedType, value: &Value) -> Result<Vec<u8>, String> {
+    if let (Value::Text(text), false) = (value, matches!(ty.ty, Ty::String | Ty::Enum(_))) {
+        return Err(format!("{text:?} is text; write a value of type {}, without quotes", describe_type(ty)));
+    }
+    encode(ty, value).map_err(|error| error.to_string())
 }
 
 /// A value as TOML writes it, so that it reads back as the same.
