@@ -9,6 +9,38 @@
 //!
 //! A value travels as postcard of its type, and whoever has no such type reads it by the description that comes with it:
 //! [`Parameter`].
+//!
+//! ```
+//! #[rohrpost_modules::parameters(crate = rohrpost_modules::macro_support)]
+//! struct Settings {
+//!     /// Speed when nothing is in the way.
+//!     #[parameter(unit = "m/s", min = 0.0, max = 1.5, default = 0.5)]
+//!     cruise_m_s: f64,
+//! }
+//! let settings: Settings = toml::from_str("cruise-m-s = 1.2").unwrap();
+//! assert_eq!(settings.cruise_m_s, 1.2);
+//! assert!(toml::from_str::<Settings>("cruise-m-s = 7.0").is_err());
+//! ```
+//!
+//! A range or a default that cannot be does not compile:
+//!
+//! ```compile_fail
+//! #[rohrpost_modules::parameters(crate = rohrpost_modules::macro_support)]
+//! struct Settings {
+//!     /// Beams to leave out.
+//!     #[parameter(min = 5, max = 3)]
+//!     skip: u8,
+//! }
+//! ```
+//!
+//! ```compile_fail
+//! #[rohrpost_modules::parameters(crate = rohrpost_modules::macro_support)]
+//! struct Settings {
+//!     /// Speed when nothing is in the way.
+//!     #[parameter(max = 1.5, default = 2.0)]
+//!     cruise_m_s: f64,
+//! }
+//! ```
 
 mod declared;
 mod kinds;
@@ -118,7 +150,7 @@ pub enum Refusal {
         text: String,
     },
     /// A value too small or too large.
-    #[error("`{name}` is {value}, which is out of its range {range}")]
+    #[error("`{name}` is {value}, out of range: {range}")]
     Range {
         /// The parameter.
         name: String,

@@ -17,7 +17,11 @@ impl Contents {
     /// What stands in a file already, without its comments; nothing, if there is none.
     pub(super) fn of(path: &Path, installation: &Installation) -> Result<Self, Failure> {
         let saved = Saved::load(path, installation).map_err(|errors| {
-            format!("{errors}\n{} is no file of parameters that could be added to; name or remove it", path.display())
+            let problem = errors.problems().first().map_or("", |problem| problem.message.as_str());
+            format!(
+                "{} is no file of parameters, and is left alone: {problem}; name another, or mend it",
+                path.display()
+            )
         })?;
         let mut modules = BTreeMap::new();
         for module in saved.modules() {
