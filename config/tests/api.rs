@@ -134,7 +134,7 @@ fn missing_programs_matter_where_they_should_run() {
     assert_eq!(missing.len(), 1);
     assert!(!missing[0].optional);
     let expected = format!(
-        "{}:40: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
+        "{}:41: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
          `program`",
         path.display(),
         folder.path().display()

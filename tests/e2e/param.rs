@@ -1,6 +1,6 @@
 //! `rohrpost param`, as a person uses it on a robot that runs.
 
-use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, signal, wait};
 use crate::process::Running;
 use crate::tuned::{shown, tuned};
 use nix::sys::signal::Signal;
@@ -232,7 +232,6 @@ fn a_file_that_is_something_else_is_not_written_over() {
 #[test]
 fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
     let place = Place::new();
-    let pilot = "[[module]]\nname = \"probe.1\"\nbuiltin = \"pilot\"\nsettings = { laser = \"probe.0\", motor = \"probe.0\" }\n";
     let file = config(&place, &[&tuned("probe.0", "", "restart = \"never\"")]);
     let file = file.to_str().unwrap();
     let tuned_file = |text: &str| std::fs::write(place.path("tuned.toml"), text).unwrap();
@@ -260,7 +259,34 @@ fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
         let said = launch.out() + &launch.err();
         assert!(said.contains(says), "{text}\n  says: {said}\n  should say: {says}");
     }
-    let _ = (pilot, probe("probe.2", "", ""));
+}
+
+#[test]
+fn saved_values_of_built_in_modules_are_checked_before_anything_runs() {
+    let place = Place::new();
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/config");
+    std::fs::copy(format!("{folder}/building.map"), place.path("building.map")).unwrap();
+    let demo = std::fs::read_to_string(format!("{folder}/demo.toml")).unwrap();
+    std::fs::write(place.path("demo.toml"), format!("parameters = \"tuned.toml\"\n{demo}")).unwrap();
+    for (text, says) in [
+        (
+            "[\"pilot.0\"]\ncruise-m-s = 7\n",
+            "tuned.toml:2: [\"pilot.0\"]: `cruise-m-s` is 7 m/s, out of range: 0..=1.5 m/s",
+        ),
+        (
+            "[\"pilot.0\"]\ncruise = 7\n",
+            "tuned.toml:2: [\"pilot.0\"]: `cruise` is no parameter; did you mean `cruise-m-s`?",
+        ),
+        ("[\"motor.0\"]\nseed = 7\n", "tuned.toml:2: [\"motor.0\"]: `seed` is no parameter; there are laser-rate-hz, "),
+        ("[\"mapper.0\"]\nlaser = 7\n", "tuned.toml:2: [\"mapper.0\"]: `laser` is no parameter; the module has none"),
+    ] {
+        std::fs::write(place.path("tuned.toml"), text).unwrap();
+        for command in [&["check", "demo.toml"][..], &["launch", "demo.toml"]] {
+            let told = place.say(command).fails();
+            assert!(told.contains(says), "{command:?}\n  says: {told}\n  should say: {says}");
+        }
+    }
+    place.assert_empty();
 }
 
 #[test]

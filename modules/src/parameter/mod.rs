@@ -48,11 +48,11 @@ mod words;
 
 pub use declared::{Declared, put_parameter};
 pub use kinds::ParameterType;
-pub use words::{from_file, toml_text, value_text};
+pub use words::{from_file, from_word, toml_text, value_text};
 
-use crate::value::{Value, WalkError, decode, describe_type};
+use crate::value::{Value, WalkError, decode};
 use postcard_schema::Schema;
-use postcard_schema::schema::owned::{OwnedDataModelType, OwnedNamedType};
+use postcard_schema::schema::owned::OwnedNamedType;
 use serde::{Deserialize, Serialize};
 
 /// The parameters of a module and their present values. Written by [`crate::parameters`] for the settings struct.
@@ -107,14 +107,11 @@ impl Parameter {
             let value = bytes.as_ref().and_then(|bytes| decode(&self.ty, bytes).ok());
             value.map(|value| value_text(&value))
         };
-        match (bound(&self.least), bound(&self.most), &self.ty.ty) {
-            (Some(least), Some(most), _) => format!("{least}..={most}"),
-            (Some(least), None, _) => format!("at least {least}"),
-            (None, Some(most), _) => format!("at most {most}"),
-            (None, None, OwnedDataModelType::Enum(variants)) => {
-                variants.iter().map(|variant| words::kebab(&variant.name)).collect::<Vec<_>>().join("|")
-            }
-            (None, None, _) => describe_type(&self.ty),
+        match (bound(&self.least), bound(&self.most)) {
+            (Some(least), Some(most)) => format!("{least}..={most}"),
+            (Some(least), None) => format!("at least {least}"),
+            (None, Some(most)) => format!("at most {most}"),
+            (None, None) => words::type_text(&self.ty),
         }
     }
 

@@ -3,16 +3,15 @@
 use super::{Failure, Session, find, say};
 use rohrpost::Name;
 use rohrpost::common::{Change, SetParameters};
-use rohrpost::parameter::{Parameter, value_text};
-use rohrpost::value::{decode, encode, parse_argument};
+use rohrpost::parameter::{Parameter, from_word, value_text};
+use rohrpost::value::decode;
 use std::process::ExitCode;
 
 pub(super) fn run(session: &mut Session, name: &str, parameter: &str, value: &str) -> Result<ExitCode, Failure> {
     let module = session.running.module(name)?;
     let parameters = session.parameters(module)?;
     let wanted = find(&parameters, name, parameter)?;
-    let value = parse_argument(&wanted.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;
-    let bytes = encode(&wanted.ty, &value).map_err(|error| format!("`{parameter}`: {error}"))?;
+    let bytes = from_word(&wanted.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;
     let changes = set(session, module, vec![(wanted.name.clone(), bytes)], false)?;
     for change in &changes {
         say(format_args!("{name} {}", told(change, wanted)?));
