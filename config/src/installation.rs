@@ -8,7 +8,7 @@ use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::module::{Context, Module};
 use crate::node::{Node, System};
-use crate::output::Output;
+use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
@@ -95,6 +95,20 @@ impl Installation {
     /// The node of a name.
     pub fn node(&self, name: &str) -> Option<&Node> {
         self.nodes.iter().find(|node| node.name == name)
+    }
+
+    /// The node that a module, a face or a tool belongs to; none for names that the file does not know.
+    pub fn node_of(&self, name: Name) -> Option<&str> {
+        let is_tool = name.class() == self.classes.tool() && name.system() == self.system.id;
+        let tools = || self.nodes.iter().find(|node| is_tool && node.tools.contains(&name.instance()));
+        self.module(name).map(|module| module.node.as_str()).or_else(|| Some(tools()?.name.as_str()))
+    }
+
+    /// From which level on a module sends lines at its start; said of a face, it is said of its module.
+    pub fn output_level(&self, module: Name) -> Level {
+        let names = |own: &Name| self.module(module).is_some_and(|module| module.names().any(|name| name == *own));
+        let own = self.output.levels.iter().find(|(name, _)| *name == module.module() || names(name));
+        own.map_or(self.output.level, |(_, level)| *level)
     }
 
     /// How the processes of a class are scheduled.

@@ -18,7 +18,7 @@ pub const GET_DATA: u16 = 4;
 pub const SUBSCRIBE: u16 = 5;
 /// Ends a subscription: its id (u16).
 pub const UNSUBSCRIBE: u16 = 6;
-/// Sets which output lines the module sends: [`OutputLevel`].
+/// Sets which output lines the module sends: [`OutputLevel`]. The answer is the level before, as in [`Status`].
 pub const OUTPUT_LEVEL: u16 = 7;
 /// Asks for a part of the description, from a byte on (u32): [`DescriptionPart`].
 pub const DESCRIBE: u16 = 8;
@@ -57,6 +57,10 @@ pub struct Status {
     pub lost: u64,
     /// Output lines that found no room.
     pub output_lost: u64,
+    /// Output lines that were suppressed, since there were too many of them.
+    pub output_suppressed: u64,
+    /// Which output lines it sends; none when the configuration has no class `output`.
+    pub output_level: Option<OutputLevel>,
 }
 
 /// What a module is doing.

@@ -7,6 +7,7 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod check;
+mod control;
 mod crash;
 mod demo;
 mod harness;
@@ -15,6 +16,8 @@ mod mailboxes;
 mod nodes;
 mod once;
 mod once_wrap;
+mod output;
+mod output_log;
 mod param;
 mod probe;
 mod process;
