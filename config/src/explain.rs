@@ -1,9 +1,12 @@
 //! Says in words what an installation means: the page that `rohrpost check` prints, readable at 100 columns.
 
+use crate::Full;
 use crate::installation::Installation;
-use crate::mailbox::{Full, MailboxSpec};
+use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
+use crate::output::LineFormat;
+use crate::saved::SavedValue;
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
@@ -84,6 +87,10 @@ impl Page<'_> {
             TimeSource::Log => "the log that is replayed".into(),
         };
         self.entry("time", &time);
+        if let Some(file) = &self.installation.parameters {
+            let words = format!("values saved in {} go before settings", file.display());
+            self.entry("parameters", &words);
+        }
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
@@ -113,8 +120,9 @@ impl Page<'_> {
             self.entry("address", address);
         }
         self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
-        let (first, last) = (node.tools.start(), node.tools.end());
-        self.entry("tools", &format!("programs run by hand are tool.{first} to tool.{last}"));
+        let (hand, launch) = (node.tools_by_hand(), node.launch_instance());
+        let (first, last) = (hand.start(), hand.end());
+        self.entry("tools", &format!("launch is tool.{launch}; programs run by hand are tool.{first} to tool.{last}"));
         for module in modules {
             self.module(module);
         }
@@ -141,6 +149,11 @@ impl Page<'_> {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));
         }
+        let values = self.installation.saved.as_ref().map(|saved| saved.values(self.installation, module.name));
+        if let Some(Ok(values)) = values.filter(|values| values.as_ref().is_ok_and(|values| !values.is_empty())) {
+            let text = |saved: &SavedValue<toml::Value>| format!("{} = {}", saved.name, saved.value);
+            self.entry("saved", &values.iter().map(text).collect::<Vec<_>>().join(", "));
+        }
         for (key, spec) in module.mailboxes.each() {
             self.entry(key, &mailbox(spec));
         }
@@ -154,12 +167,24 @@ impl Page<'_> {
         for (module, level) in &output.levels {
             let _ = write!(words, "; {} from {}", self.name(*module), level.as_str());
         }
-        if let Some(file) = &output.file {
-            let _ = write!(words, "; written to {} as well", file.display());
-        }
         self.line("Output");
         self.line("");
         self.entry("keeps", &words);
+        let (rate, burst) = (output.rate, output.burst);
+        let words = format!("{rate} lines a second from each module, {burst} at once; errors are counted apart");
+        self.entry("takes", &words);
+        if let Some(file) = &output.file {
+            let format = match output.format {
+                LineFormat::Text => "text",
+                LineFormat::Json => "JSON",
+            };
+            let size = size_text(output.file_size);
+            let kept = count(output.files as usize, "full file");
+            self.entry("writes", &format!("{} as {format}; a new one after {size}, {kept} kept", file.display()));
+        }
+        if output.journal {
+            self.entry("", "the system's journal");
+        }
     }
 
     fn gui(&mut self) {
@@ -228,6 +253,7 @@ fn restart(restart: &Restart) -> String {
 fn mailbox(spec: &MailboxSpec) -> String {
     let full = match spec.full {
         Full::Displace => "full: the least important gives way",
+        Full::Latest => "latest: the newer replaces the older",
         Full::Reject => "full: new ones are refused",
     };
     let (size, memory) = (size_text(spec.size.into()), about(spec.memory()));

@@ -1,22 +1,13 @@
 //! How large the mailboxes of a module are and what they do when full.
 
 use crate::reader::Section;
-use rohrpost_mailbox::{BODY_BYTES_MAX, Shape};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Full, Shape};
 use std::time::Duration;
 
 /// Most slots of one mailbox.
 pub const SLOTS_MAX: u16 = rohrpost_mailbox::SLOTS_MAX as u16;
 /// Most unfinished claims of one participant.
 pub const CLAIMS_MAX: u8 = 16;
-
-/// What happens when a package comes to a full mailbox.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Full {
-    /// The newest of the least important gives way to a more important one.
-    Displace,
-    /// The package that comes is refused.
-    Reject,
-}
 
 /// One mailbox of a module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,8 +93,7 @@ impl MailboxSpec {
             line.size = item.line;
             self.size = item.size(1..=BODY_BYTES_MAX as u64, "1 KiB").map_or(self.size, |size| size as u32);
         }
-        let full =
-            section.get("full").and_then(|item| item.choice(&[("displace", Full::Displace), ("reject", Full::Reject)]));
+        let full = section.get("full").and_then(|item| item.choice(&Full::ALL.map(|full| (full.name(), full))));
         self.full = full.unwrap_or(self.full);
         self.max_age = section.get("max-age").and_then(|item| item.duration_above_zero("2 s"));
         let claims = section.get("claims").and_then(|item| item.whole(1..=CLAIMS_MAX.into(), 1));

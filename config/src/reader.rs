@@ -36,6 +36,17 @@ impl<'d> Reader<'d> {
         self.problems.borrow_mut().push(Problem { line: Some(line), message: message.into() });
     }
 
+    /// What the parser says of a text that is no TOML.
+    pub(crate) fn report_syntax(&self, error: &toml::de::Error) {
+        let span = error.span().unwrap_or(0..0);
+        let there = self.text.get(span.clone()).unwrap_or_default();
+        let message = match error.message() {
+            "duplicate key" => format!("`{there}` is given twice; drop one of them"),
+            message => format!("this is no TOML: {}", message.replace('\n', " ")),
+        };
+        self.report(self.line(span), message);
+    }
+
     pub(crate) fn into_problems(self) -> Vec<Problem> {
         self.problems.into_inner()
     }

@@ -22,7 +22,7 @@ use std::time::Duration;
 /// `rohrpost` in ASCII, little-endian.
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"rohrpost");
 /// Raised with every change of a layout in shared memory.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 pub(crate) const PAGE: usize = 4096;
 /// Bytes of a slot before its body: time of publishing and head.
 pub(crate) const SLOT_PREFIX: usize = 8 + HEAD_BYTES;
@@ -106,13 +106,6 @@ impl Shape {
         let max_age = self.max_age.map(|age| Duration::from_nanos(stored_ns(age)));
         Self { max_age, ..self }
     }
-
-    fn full_code(&self) -> u32 {
-        match self.full {
-            Full::Displace => 0,
-            Full::Reject => 1,
-        }
-    }
 }
 
 /// 0 is kept for none.
@@ -142,7 +135,7 @@ impl Identity {
         self.name.store(name.raw(), Relaxed);
         self.slots.store(u32::from(shape.slots), Relaxed);
         self.body_bytes_max.store(u32::from(shape.body_bytes_max), Relaxed);
-        self.full.store(shape.full_code(), Relaxed);
+        self.full.store(shape.full as u32, Relaxed);
         self.claims.store(u32::from(shape.claims), Relaxed);
         self.max_age_ns.store(shape.max_age.map_or(0, stored_ns), Relaxed);
         self.magic.store(MAGIC, std::sync::atomic::Ordering::Release);
@@ -159,11 +152,7 @@ impl Identity {
         let shape = Shape {
             slots: self.slots.load(Relaxed).try_into().ok()?,
             body_bytes_max: self.body_bytes_max.load(Relaxed).try_into().ok()?,
-            full: match self.full.load(Relaxed) {
-                0 => Full::Displace,
-                1 => Full::Reject,
-                _ => return None,
-            },
+            full: *Full::ALL.get(self.full.load(Relaxed) as usize)?,
             max_age: (max_age_ns != 0).then(|| Duration::from_nanos(max_age_ns)),
             claims: self.claims.load(Relaxed).try_into().ok()?,
         };

@@ -114,10 +114,10 @@ impl Receiver {
                 depth_max.store(depth, Ordering::Relaxed);
             }
             // SAFETY: just taken, and freed only below or by its guard.
-            let (published_ns, _, _) = unsafe { self.segment.read(taken.slot) };
+            let (published_ns, _, body) = unsafe { self.segment.read(taken.slot) };
             let waited = Duration::from_nanos(monotonic_ns().saturating_sub(published_ns));
             if self.segment.shape.max_age.is_none_or(|max| waited <= max) {
-                self.segment.page().counters.received(taken.word.priority(), waited);
+                self.segment.page().counters.received(taken.word.priority(), waited, body.len());
                 return Some(taken);
             }
             self.segment.page().counters.lost(taken.word.priority(), Loss::Stale, 1);
@@ -146,7 +146,7 @@ impl Receiver {
         self.deaths_seen = node.page().deaths.load(Ordering::Acquire);
         let me = self.participant.claimant();
         let counters = &self.segment.page().counters;
-        let lost = |priority| counters.lost(priority, Loss::Displaced, 1);
+        let lost = |victim| counters.gave_way(victim);
         let slots = self.segment.slots();
         let mut filling = false;
         let dead = |by| {

@@ -2,12 +2,14 @@
 
 use crate::counters::Loss;
 use crate::doorbell;
+use crate::latest::Posts;
 use crate::name::{Name, Priority};
 use crate::package::{Head, Options, Type};
 use crate::participant::Participant;
 use crate::segment::{BadSegment, Segment};
 use crate::slots::{Claim, NoSlot, Published};
 use crate::step::step;
+use crate::traffic::{Key, Writer};
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.
@@ -72,6 +74,10 @@ pub struct Sender {
     participant: Arc<Participant>,
     segment: Segment,
     cursor: usize,
+    /// Counts what it sends.
+    flows: Writer,
+    /// What a newer package may replace; empty unless the mailbox is `latest`.
+    posts: Posts,
 }
 
 impl Participant {
@@ -90,7 +96,9 @@ impl Participant {
         drop(sending);
         // Senders start at different slots, so that they meet less.
         let cursor = usize::from(self.claimant().participant) * 7;
-        Ok(Sender { participant: self.clone(), segment, cursor })
+        let posts = Posts::new(&segment.shape);
+        let flows = self.traffic().writer();
+        Ok(Sender { participant: self.clone(), segment, cursor, posts, flows })
     }
 }
 
@@ -119,7 +127,7 @@ impl Sender {
     /// When it was not accepted.
     pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
         let len: usize = parts.iter().map(|part| part.len()).sum();
-        let claim = self.claim(label.priority, len)?;
+        let claim = self.claim(label.priority, Some(label), len).map_err(|error| self.refused(label, error))?;
         let mut loan = Loan { sender: self, claim: Some(claim), priority: label.priority };
         let mut body = loan.body();
         for part in parts {
@@ -130,33 +138,45 @@ impl Sender {
         loan.send(label, len)
     }
 
-    /// Borrows a slot to write a package in place. Dropped unsent, the slot is free again.
+    /// Borrows a slot to write a package in place. Dropped unsent, the slot is free again. What it will replace in a `latest`
+    /// mailbox is known only when it is sent; so in a full one it needs somebody to displace.
     ///
     /// # Errors
     /// [`SendError::Full`], or what reopening a replaced mailbox brings.
     pub fn loan(&mut self, priority: Priority) -> Result<Loan<'_>, SendError> {
-        let claim = self.claim(priority, 0)?;
+        // What it would have been was not said yet.
+        let claim = self.claim(priority, None, 0).map_err(|error| self.refused(&Label::default(), error))?;
         Ok(Loan { sender: self, claim: Some(claim), priority })
     }
 
     /// A slot for a body of `len` bytes. One too large is refused before it pushes anybody out.
-    fn claim(&mut self, priority: Priority, len: usize) -> Result<Claim, SendError> {
+    fn claim(&mut self, priority: Priority, label: Option<&Label>, len: usize) -> Result<Claim, SendError> {
         for _ in 0..REOPEN_MAX {
             let me = self.participant.claimant();
             let (max, retired) = (self.body_bytes_max(), self.segment.slots().is_retired());
             if len > max && !retired {
                 return Err(SendError::TooLarge { name: self.name(), len, max });
             }
-            match self.segment.slots().claim(me, &mut self.cursor, priority, self.segment.shape.full) {
+            let old = label.and_then(|label| self.posts.of(label));
+            match self.segment.slots().claim(me, &mut self.cursor, priority, self.segment.shape.full, old) {
                 Ok(claim) => return Ok(claim),
                 Err(NoSlot::Full) => {
                     self.segment.page().counters.lost(priority, Loss::Refused, 1);
                     return Err(SendError::Full(self.name()));
                 }
-                Err(NoSlot::Retired) => self.segment = open(&self.participant, self.name())?,
+                Err(NoSlot::Retired) => {
+                    let successor = open(&self.participant, self.name())?;
+                    self.enter(successor);
+                }
             }
         }
         Err(SendError::NoMailbox(self.name()))
+    }
+
+    /// From now on sends there; the old segment is returned.
+    fn enter(&mut self, successor: Segment) -> Segment {
+        self.posts = Posts::new(&successor.shape);
+        std::mem::replace(&mut self.segment, successor)
     }
 
     /// Publishes a filled claim; on a retired mailbox moves it to the one that took its place.
@@ -164,20 +184,28 @@ impl Sender {
         let name = self.name();
         for _ in 0..REOPEN_MAX {
             // SAFETY: `claim` is ours, and the loan that could reach its bytes has been consumed.
-            unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
-            self.count_displaced(&claim);
-            match self.segment.slots().publish(claim, label.priority) {
-                Published::Accepted { wake } => {
+            let published_ns = unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
+            self.count_victim(&claim);
+            let slots = self.segment.slots();
+            if let Some(instead) = self.posts.of(label).and_then(|old| slots.replace(claim, old)) {
+                claim = instead;
+                self.count_victim(&claim);
+            }
+            match slots.publish(claim, label.priority) {
+                Published::Accepted { posted, wake } => {
+                    self.posts.remember(label, posted, &slots);
                     if wake {
                         self.wake();
                     }
+                    step!("send: before count");
+                    self.flows.accepted(self.participant.traffic(), key(label, name), len, published_ns, 0);
                     return Ok(());
                 }
                 Published::Reclaimed => return Err(SendError::Reclaimed(name)),
                 Published::Retired => claim = self.move_on(claim, label.priority, len)?,
             }
         }
-        self.count_displaced(&claim);
+        self.count_victim(&claim);
         self.segment.slots().abandon(claim);
         Err(SendError::NoMailbox(name))
     }
@@ -186,13 +214,13 @@ impl Sender {
     fn move_on(&mut self, old: Claim, priority: Priority, len: usize) -> Result<Claim, SendError> {
         let successor = open(&self.participant, self.name());
         let retired = match successor {
-            Ok(successor) => std::mem::replace(&mut self.segment, successor),
+            Ok(successor) => self.enter(successor),
             Err(error) => {
                 self.segment.slots().abandon(old);
                 return Err(error);
             }
         };
-        let result = self.claim(priority, len).inspect(|claim| {
+        let result = self.claim(priority, None, len).inspect(|claim| {
             // SAFETY: both claims are ours, on different segments.
             let (from, to) = unsafe { (retired.body_mut(old.slot), self.segment.body_mut(claim.slot)) };
             to[..len].copy_from_slice(&from[..len]);
@@ -201,9 +229,16 @@ impl Sender {
         result
     }
 
-    fn count_displaced(&self, claim: &Claim) {
-        if let Some(priority) = claim.displaced() {
-            self.segment.page().counters.lost(priority, Loss::Displaced, 1);
+    /// Counts what was not accepted; its sender is told.
+    fn refused(&mut self, label: &Label, error: SendError) -> SendError {
+        let key = key(label, self.name());
+        self.flows.refused(self.participant.traffic(), key);
+        error
+    }
+
+    fn count_victim(&self, claim: &Claim) {
+        if let Some(victim) = claim.victim() {
+            self.segment.page().counters.gave_way(victim);
         }
     }
 
@@ -218,11 +253,16 @@ impl Sender {
 
 impl Drop for Sender {
     fn drop(&mut self) {
+        self.flows.leave(self.participant.traffic());
         let mut sending = self.participant.sending();
         if let Some(at) = sending.iter().position(|name| *name == self.segment.name) {
             sending.swap_remove(at);
         }
     }
+}
+
+fn key(label: &Label, to: Name) -> Key {
+    Key { to, from: label.from, kind: label.kind }
 }
 
 /// A slot to write a package in.
@@ -250,10 +290,14 @@ impl Loan<'_> {
     pub fn send(mut self, label: &Label, len: usize) -> Result<(), SendError> {
         let max = self.sender.body_bytes_max();
         if len > max {
-            return Err(SendError::TooLarge { name: self.sender.name(), len, max });
+            let error = SendError::TooLarge { name: self.sender.name(), len, max };
+            return Err(self.sender.refused(label, error));
         }
         match self.claim.take() {
-            Some(claim) => self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len),
+            Some(claim) => {
+                let sent = self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len);
+                sent.map_err(|error| self.sender.refused(label, error))
+            }
             None => Ok(()),
         }
     }
@@ -262,7 +306,7 @@ impl Loan<'_> {
 impl Drop for Loan<'_> {
     fn drop(&mut self) {
         if let Some(claim) = self.claim.take() {
-            self.sender.count_displaced(&claim);
+            self.sender.count_victim(&claim);
             self.sender.segment.slots().abandon(claim);
         }
     }

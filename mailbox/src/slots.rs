@@ -8,7 +8,8 @@
 //! | --- | --- | --- |
 //! | sender, claimed, not published | Filling | receiver's `reclaim`: Free again; the package was never accepted |
 //! | sender, published, hint not set | Ready without hint | receiver's rescan: found and delivered |
-//! | sender, displacing | Filling with the lost priority | `reclaim` counts that loss |
+//! | sender, displacing, reusing | Filling with its victim | `reclaim` counts that loss |
+//! | sender, replacing | Filling with its victim, which may still be Ready | `reclaim` counts a loss, perhaps one too many |
 //! | receiver, package in hand | Taken | the next owner's `adopt`: Ready, redelivered; the second time dropped as poison |
 //!
 //! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
@@ -17,7 +18,7 @@
 use crate::name::Priority;
 use crate::step::step;
 use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
-use crate::word::{Claimant, FREE, State, Word};
+use crate::word::{Claimant, FREE, State, Victim, Word};
 
 /// Most slots that a mailbox can have.
 pub const SLOTS_MAX: usize = 1024;
@@ -41,14 +42,35 @@ pub(crate) struct Hot {
     pub(crate) ready: [AtomicU64; HINT_WORDS],
 }
 
-/// What happens to a package that finds no free slot.
+/// What happens to a package that finds no free slot. The numbers stand in the segment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Full {
     /// It takes the place of the newest of the least important packages, if it is more important; else it is refused.
     #[default]
-    Displace,
+    Displace = 0,
+    /// For state, of which only the newest counts. A package replaces the older one of the same sender, type and id that
+    /// still waits, whether or not the mailbox is full, and takes its place in the order: the older one is counted as
+    /// replaced. One that has nothing to replace and finds no free slot displaces as above.
+    ///
+    /// Commands are never replaced, since each has an id of its own. A sender knows what it sent itself, through this
+    /// [`Sender`](crate::Sender): what it sent before it was started again is received as well, before the newer.
+    Latest = 2,
     /// It is refused (seed 002, 3.2).
-    Reject,
+    Reject = 1,
+}
+
+impl Full {
+    /// All policies, in the order of their codes in a segment.
+    pub const ALL: [Self; 3] = [Self::Displace, Self::Reject, Self::Latest];
+
+    /// The word for it in configuration and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Displace => "displace",
+            Self::Latest => "latest",
+            Self::Reject => "reject",
+        }
+    }
 }
 
 /// Why a slot was not to be had.
@@ -65,15 +87,31 @@ pub(crate) enum NoSlot {
 pub(crate) struct Claim {
     pub(crate) slot: usize,
     word: Word,
+    /// The ticket of the package that this one replaces.
+    place: Option<u64>,
 }
 
 impl Claim {
-    /// Priority of the accepted package that lost its place to this one.
-    pub(crate) fn displaced(&self) -> Option<Priority> {
+    /// The accepted package that lost its place to this one.
+    pub(crate) fn victim(&self) -> Option<Victim> {
         match self.word.state() {
-            State::Filling { displaced, .. } => displaced,
+            State::Filling { victim, .. } => victim,
             _ => None,
         }
+    }
+}
+
+/// A published package, as its sender remembers it. Whether it still waits, only a compare-and-swap tells: a word is not
+/// used twice for different packages, since no two senders have the same ticket.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Posted {
+    pub(crate) slot: usize,
+    pub(crate) word: Word,
+}
+
+impl Posted {
+    fn as_victim(self) -> Victim {
+        Victim { priority: self.word.priority(), replaced: true }
     }
 }
 
@@ -81,7 +119,7 @@ impl Claim {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Published {
     /// Accepted. `wake`: the receiver sleeps, ring its bell.
-    Accepted { wake: bool },
+    Accepted { posted: Posted, wake: bool },
     /// The mailbox was given up meanwhile; the slot is the filler's again, send its package anew.
     Retired,
     /// The receiver held the filler for dead and took the slot back: the package is not accepted.
@@ -137,13 +175,15 @@ impl<'a> Slots<'a> {
 
     // ---- senders ----
 
-    /// A slot to fill. `cursor` is the sender's own: the search goes on where the last one ended.
+    /// A slot to fill. `cursor` is the sender's own: the search goes on where the last one ended. `old` is what the package
+    /// would replace, if it is known by now.
     pub(crate) fn claim(
         &self,
         by: Claimant,
         cursor: &mut usize,
         priority: Priority,
         full: Full,
+        old: Option<Posted>,
     ) -> Result<Claim, NoSlot> {
         if self.is_retired() {
             return Err(NoSlot::Retired);
@@ -155,11 +195,15 @@ impl<'a> Slots<'a> {
             step!("claim: before");
             if Word(self.word(slot).load(Ordering::Relaxed)) == FREE && self.change(slot, FREE, word) {
                 step!("claim: claimed");
-                return Ok(Claim { slot, word });
+                return Ok(Claim { slot, word, place: None });
             }
         }
         match full {
             Full::Displace => self.displace(by, priority).ok_or(NoSlot::Full),
+            Full::Latest => {
+                let reused = old.and_then(|old| self.reuse(by, old));
+                reused.or_else(|| self.displace(by, priority)).ok_or(NoSlot::Full)
+            }
             Full::Reject => Err(NoSlot::Full),
         }
     }
@@ -172,13 +216,52 @@ impl<'a> Slots<'a> {
             let usable =
                 words.filter(|(_, word)| *word == FREE || word.is_ready() && priority.outranks(word.priority()));
             let (slot, last) = usable.min_by_key(|(_, word)| (*word != FREE, word.rank()))?;
-            let word = Word::filling(by, (last != FREE).then(|| last.priority()));
+            let victim = (last != FREE).then(|| Victim { priority: last.priority(), replaced: false });
+            let word = Word::filling(by, victim);
             step!("displace: chosen");
             if self.change(slot, last, word) {
                 step!("displace: claimed");
-                return Some(Claim { slot, word });
+                return Some(Claim { slot, word, place: None });
             }
         }
+        None
+    }
+
+    /// Takes the slot of one's own older package, if it still waits: there is no other. While the newer one is written,
+    /// there is neither.
+    fn reuse(&self, by: Claimant, old: Posted) -> Option<Claim> {
+        let word = Word::filling(by, Some(old.as_victim()));
+        step!("reuse: chosen");
+        let reused = self.change(old.slot, old.word, word);
+        step!("reuse: claimed");
+        reused.then(|| Claim { slot: old.slot, word, place: Some(old.word.ticket()) })
+    }
+
+    /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the order:
+    /// with a new ticket each time, who sends faster than others are received would never be. None: it no longer waits.
+    ///
+    /// If `claim` has a victim, its loss has been counted. That of the old one is to be counted after this.
+    pub(crate) fn replace(&self, claim: Claim, old: Posted) -> Option<Claim> {
+        // It has been replaced in its own slot already.
+        if claim.place.is_some() {
+            return None;
+        }
+        let State::Filling { by, .. } = claim.word.state() else { return None };
+        // First the loss goes into a word that outlives us, then the package. The old one's slot is freed by one step and not
+        // claimed for it: nobody may hold two slots, since mailboxes are as large as one for each sender asks for.
+        let marked = Word::filling(by, Some(old.as_victim()));
+        if !self.change(claim.slot, claim.word, marked) {
+            // Given up meanwhile, or we are held for dead: `publish` finds out.
+            return None;
+        }
+        step!("replace: marked");
+        if self.change(old.slot, old.word, FREE) {
+            step!("replace: freed");
+            return Some(Claim { slot: claim.slot, word: marked, place: Some(old.word.ticket()) });
+        }
+        // It is being received, or was displaced.
+        self.change(claim.slot, marked, claim.word);
+        step!("replace: unmarked");
         None
     }
 
@@ -189,7 +272,8 @@ impl<'a> Slots<'a> {
         // reads T sees the hints of all packages that one sender published before its package T.
         let ticket = self.hot.ticket.fetch_add(1, Ordering::AcqRel);
         step!("publish: ticket");
-        let word = Word::ready(priority, ticket);
+        // A ticket is taken in any case, since they count the packages. What replaces an older one stands where that one stood.
+        let word = Word::ready(priority, claim.place.unwrap_or(ticket));
         if !self.change(slot, claim.word, word) {
             // ORDERING: Acquire; pairs with the Release of the change that was in the way: if it was `settle`'s, then
             // `retired` is seen below.
@@ -207,7 +291,8 @@ impl<'a> Slots<'a> {
             return Published::Retired;
         }
         // A retired mailbox whose word is no longer ours: somebody received it before it retired, so it was accepted.
-        Published::Accepted { wake: self.hot.sleeping.load(Ordering::Acquire) != 0 }
+        let posted = Posted { slot, word };
+        Published::Accepted { posted, wake: self.hot.sleeping.load(Ordering::Acquire) != 0 }
     }
 
     /// Gives a claimed slot back unpublished.
@@ -259,16 +344,16 @@ impl<'a> Slots<'a> {
         (0..self.count.div_ceil(64)).any(|i| self.hot.ready[i].load(Ordering::Acquire) != 0)
     }
 
-    /// Frees slots whose filler is dead, and tells `lost` the priorities of accepted packages they had displaced.
+    /// Frees slots whose filler is dead, and tells `lost` their victims.
     ///
     /// `dead` must never hold a living one for dead. It may hold a dead one for living: this is repeated.
-    pub(crate) fn reclaim(&self, mut dead: impl FnMut(Claimant) -> bool, mut lost: impl FnMut(Priority)) -> usize {
+    pub(crate) fn reclaim(&self, mut dead: impl FnMut(Claimant) -> bool, mut lost: impl FnMut(Victim)) -> usize {
         let mut freed = 0;
         for slot in 0..self.count {
             let word = self.load(slot);
-            let State::Filling { by, displaced } = word.state() else { continue };
+            let State::Filling { by, victim } = word.state() else { continue };
             if dead(by) {
-                displaced.into_iter().for_each(&mut lost);
+                victim.into_iter().for_each(&mut lost);
                 step!("reclaim: counted");
                 freed += usize::from(self.change(slot, word, FREE));
                 step!("reclaim: freed");
@@ -305,13 +390,13 @@ impl<'a> Slots<'a> {
         fence(Ordering::SeqCst);
     }
 
-    /// Of a mailbox given up: tells `lost` what those displaced who still fill, since they could only count it here, where
+    /// Of a mailbox given up: tells `lost` the victims of those who still fill, since they could only count them here, where
     /// nobody looks any more. They find their claim changed, and go on as after any other retirement.
-    pub(crate) fn settle(&self, mut lost: impl FnMut(Priority)) {
+    pub(crate) fn settle(&self, mut lost: impl FnMut(Victim)) {
         for slot in 0..self.count {
             let word = self.load(slot);
-            if let State::Filling { by, displaced: Some(priority) } = word.state() {
-                lost(priority);
+            if let State::Filling { by, victim: Some(victim) } = word.state() {
+                lost(victim);
                 step!("settle: counted");
                 self.change(slot, word, Word::filling(by, None));
             }

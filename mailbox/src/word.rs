@@ -2,9 +2,9 @@
 //!
 //! ```text
 //!  63 62  61        53  52      48 47         32 31                      0
-//!  ┌────┬───┬─────────┬──────────┬─────────────┬──────────────────────────┐
-//!  │Fill│ d │ lost    │  zero    │ participant │ incarnation              │  d: took the place of an accepted package
-//!  └────┴───┴─────────┴──────────┴─────────────┴──────────────────────────┘     of priority `lost`
+//!  ┌────┬───┬─────────┬─┬────────┬─────────────┬──────────────────────────┐
+//!  │Fill│ v │ victim  │n│  zero  │ participant │ incarnation              │  v: took the place of an accepted package
+//!  └────┴───┴─────────┴─┴────────┴─────────────┴──────────────────────────┘     of priority `victim`; n: as its newer one
 //!  63 62  61        54  53  52                                            0
 //!  ┌────┬─────────────┬───┬───────────────────────────────────────────────┐
 //!  │R/T │ priority    │ r │ ticket                                        │  r: redelivered after its receiver died
@@ -17,7 +17,9 @@
 //!            claim (sender)               publish (its filler)            take (receiver)
 //!   Free ───────────────────▶ Filling ───────────────────────▶ Ready ──────────────────▶ Taken
 //!    ▲                        │  ▲                              │ ▲                       │ │
-//!    ├──── abandon, reclaim ──┘  └── displace (other sender) ───┘ └── adopt (new owner) ──┘ │
+//!    ├──── abandon, reclaim ──┘  └── displace (other sender), ──┤ └── adopt (new owner) ──┘ │
+//!    │                               reuse (its sender)         │                           │
+//!    ├────────────────────────────── replace (its sender) ──────┘                           │
 //!    └─────────────────────────── release (receiver), poison (new owner) ────────────────────┘
 //! ```
 
@@ -27,11 +29,13 @@ const STATE: u32 = 62;
 const FILLING: u64 = 1;
 const READY: u64 = 2;
 const TAKEN: u64 = 3;
-const DISPLACED: u64 = 1 << 61;
-const LOST: u32 = 53;
+const HAS_VICTIM: u64 = 1 << 61;
+const VICTIM: u32 = 53;
+const NEWER: u64 = 1 << 52;
 const PARTICIPANT: u32 = 32;
 const PRIORITY: u32 = 54;
 const REDELIVERED: u64 = 1 << 53;
+const RANK: u32 = 53;
 /// Tickets have 53 bits: at ten million packages a second they last 28 years.
 const TICKET: u64 = REDELIVERED - 1;
 
@@ -47,6 +51,14 @@ pub(crate) struct Claimant {
     pub incarnation: u32,
 }
 
+/// An accepted package that lost its place to one that is being written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Victim {
+    pub(crate) priority: Priority,
+    /// What is being written is its own sender's newer one; else it is a more important one.
+    pub(crate) replaced: bool,
+}
+
 /// The word of a slot as it was read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Word(pub(crate) u64);
@@ -56,8 +68,8 @@ pub(crate) struct Word(pub(crate) u64);
 pub(crate) enum State {
     /// Anybody may claim it.
     Free,
-    /// A sender writes its package; `displaced` is the priority of the accepted package it pushed out for that.
-    Filling { by: Claimant, displaced: Option<Priority> },
+    /// A sender writes its package, for which perhaps an accepted one had to go.
+    Filling { by: Claimant, victim: Option<Victim> },
     /// An accepted package waits.
     Ready,
     /// The receiver reads it.
@@ -65,12 +77,14 @@ pub(crate) enum State {
 }
 
 impl Word {
-    pub(crate) const fn filling(by: Claimant, displaced: Option<Priority>) -> Self {
-        let lost = match displaced {
-            Some(priority) => DISPLACED | (priority.0 as u64) << LOST,
+    pub(crate) const fn filling(by: Claimant, victim: Option<Victim>) -> Self {
+        let victim = match victim {
+            Some(Victim { priority, replaced }) => {
+                HAS_VICTIM | (priority.0 as u64) << VICTIM | if replaced { NEWER } else { 0 }
+            }
             None => 0,
         };
-        Self(FILLING << STATE | lost | (by.participant as u64) << PARTICIPANT | by.incarnation as u64)
+        Self(FILLING << STATE | victim | (by.participant as u64) << PARTICIPANT | by.incarnation as u64)
     }
 
     pub(crate) const fn ready(priority: Priority, ticket: u64) -> Self {
@@ -82,7 +96,11 @@ impl Word {
             0 => State::Free,
             FILLING => State::Filling {
                 by: Claimant { participant: (self.0 >> PARTICIPANT) as u16, incarnation: self.0 as u32 },
-                displaced: if self.0 & DISPLACED == 0 { None } else { Some(Priority((self.0 >> LOST) as u8)) },
+                victim: if self.0 & HAS_VICTIM == 0 {
+                    None
+                } else {
+                    Some(Victim { priority: Priority((self.0 >> VICTIM) as u8), replaced: self.0 & NEWER != 0 })
+                },
             },
             READY => State::Ready,
             _ => State::Taken,
@@ -120,7 +138,7 @@ impl Word {
 
     /// Greater goes first: the more important, then the earlier.
     pub(crate) const fn rank(self) -> u64 {
-        (self.priority().0 as u64) << LOST | (TICKET - self.ticket())
+        (self.priority().0 as u64) << RANK | (TICKET - self.ticket())
     }
 }
 
@@ -131,10 +149,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_goes_in_comes_out(participant: u16, incarnation: u32, lost: Option<u8>, priority: u8, ticket in 0..=TICKET) {
+        fn what_goes_in_comes_out(
+            participant: u16,
+            incarnation: u32,
+            victim: Option<(u8, bool)>,
+            priority: u8,
+            ticket in 0..=TICKET,
+        ) {
             let by = Claimant { participant, incarnation };
-            let displaced = lost.map(Priority);
-            prop_assert_eq!(Word::filling(by, displaced).state(), State::Filling { by, displaced });
+            let victim = victim.map(|(priority, replaced)| Victim { priority: Priority(priority), replaced });
+            prop_assert_eq!(Word::filling(by, victim).state(), State::Filling { by, victim });
             let ready = Word::ready(Priority(priority), ticket);
             for (word, state, redelivered) in [
                 (ready, State::Ready, false),

@@ -40,9 +40,14 @@ fn the_hot_paths_do_not_touch_the_heap() {
     let mut receiver = ground.join().receiver(MAILBOX, shape(8)).unwrap();
     let mut sender = ground.sender();
     let clock = rohrpost_mailbox::SystemClock::open(&node);
-    let round = |id: u16, sender: &mut rohrpost_mailbox::Sender, receiver: &mut rohrpost_mailbox::Receiver| {
-        for _ in 0..9 {
-            let _ = sender.send(&label(LOW, id), &[b"parts", b"of a body"]);
+    let mut publications = rohrpost_mailbox::Publications::new(&ground.join());
+    let mut round = |id: u16, sender: &mut rohrpost_mailbox::Sender, receiver: &mut rohrpost_mailbox::Receiver| {
+        for number in 1..=9 {
+            // More types than a sender remembers, so that it looks for their rows, too.
+            let kind = rohrpost_mailbox::Type::command(number);
+            let label = rohrpost_mailbox::Label { kind, ..label(LOW, id) };
+            let _ = sender.send(&label, &[b"parts", b"of a body"]);
+            publications.published(MAILBOX, rohrpost_mailbox::Type::data(number), 10, Duration::ZERO);
         }
         sender.send(&label(HIGH, id), &[b"displaces"]).unwrap();
         drop(sender.loan(HIGH));

@@ -126,6 +126,9 @@ fn configuration(arguments: &Arguments, temporary: &Path) -> Result<PathBuf, Fai
     // Checked as it was written, so that a mistake is told with its own file and line.
     let installation = super::check::judge(Installation::parse(&text, &own)?)?;
     let mut table: toml::Table = toml::from_str(&text)?;
+    if let (Some(toml::Value::String(file)), true) = (table.get_mut("parameters"), there) {
+        *file = folder.join(&*file).display().to_string();
+    }
     let modules = table.get_mut("module").and_then(toml::Value::as_array_mut).ok_or("no [[module]]")?;
     for (entry, module) in modules.iter_mut().zip(&installation.modules) {
         let Some(entry) = entry.as_table_mut() else { continue };

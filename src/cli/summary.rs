@@ -9,7 +9,7 @@ use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
 
 /// A module, as the tables show it.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(super) struct ModuleLine {
     pub(super) module: String,
     pub(super) faces: Vec<String>,
@@ -36,7 +36,7 @@ pub(super) fn module_lines(
         ModuleLine {
             module: installation.classes.format(module.name),
             faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
-            state: state(module, phase.as_ref(), installation),
+            state: state(module, phase, installation),
             priority: module.name.class().0,
             scheduling: scheduling(module.process.as_ref()),
             pid: module.process.as_ref().map(|process| process.pid),
@@ -60,11 +60,9 @@ fn scheduling(process: Option<&ParticipantInfo>) -> String {
     }
 }
 
-fn state(module: &ModuleSurvey, phase: Option<&Phase>, installation: &Installation) -> String {
+pub(super) fn state(module: &ModuleSurvey, phase: Option<Phase>, installation: &Installation) -> String {
     match (&module.process, phase) {
-        (_, Some(Phase::Failed(_))) => "failed".into(),
-        (_, Some(Phase::Ended)) => "ended".into(),
-        (_, Some(Phase::Waiting)) => "waiting".into(),
+        (_, Some(phase)) if phase.is_over() || phase == Phase::Waiting => phase.name().into(),
         (Some(process), _) => process.state.map_or("-", ModuleState::name).into(),
         (None, _) if is_left_out(module, installation) => "left out".into(),
         (None, _) => "dead".into(),
@@ -105,23 +103,28 @@ fn modules_table(lines: &[ModuleLine], gap: &str, received: &str, of: impl Fn(&M
     table(heads, rows)
 }
 
+/// Losses by cause. Packages that a newer one replaced are nobody's loss, so they stand apart.
+pub(super) fn losses(lost: impl Fn(Loss) -> u64) -> String {
+    let (missed, replaced): (Vec<Loss>, _) =
+        Loss::ALL.into_iter().filter(|cause| lost(*cause) > 0).partition(|cause| cause.is_missed());
+    let list =
+        |causes: &[Loss]| causes.iter().map(|c| format!("{} {}", lost(*c), c.name())).collect::<Vec<_>>().join(", ");
+    let missed = if missed.is_empty() { "none".into() } else { list(&missed) };
+    if replaced.is_empty() { missed } else { format!("{missed} ({})", list(&replaced)) }
+}
+
 /// Traffic by class as a table: packages, losses by cause, waiting times.
 pub(super) fn print_classes(installation: &Installation, classes: &[ClassTraffic]) -> String {
     let rows = classes.iter().map(|class| {
         let name = class.class.map_or("others".into(), |id| {
             installation.classes.name(id).map_or_else(|| id.0.to_string(), ToOwned::to_owned)
         });
-        let losses: Vec<String> = Loss::ALL
-            .into_iter()
-            .filter(|cause| class.lost(*cause) > 0)
-            .map(|cause| format!("{} {}", class.lost(cause), cause.name()))
-            .collect();
         let quantile = |share| class.latency.quantile(share).map_or("-".into(), time);
         [
             name,
             class.class.map_or("-".into(), |id| id.0.to_string()),
             class.received.to_string(),
-            if losses.is_empty() { "none".into() } else { losses.join(", ") },
+            losses(|cause| class.lost(cause)),
             quantile(0.5),
             quantile(0.99),
             if class.received > 0 { time(class.latency.max) } else { "-".into() },

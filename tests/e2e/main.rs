@@ -8,6 +8,7 @@
 
 mod check;
 mod completions;
+mod control;
 mod crash;
 mod demo;
 mod doctor;
@@ -18,6 +19,8 @@ mod new;
 mod nodes;
 mod once;
 mod once_wrap;
+mod output;
+mod output_log;
 mod probe;
 mod process;
 mod readme;

@@ -4,7 +4,7 @@
 use super::{Builtin, description};
 use crate::interface::Interfaces;
 use crate::module::Module;
-use rohrpost_config::{Installation, Module as Configured, Problem, Program, Show, nearest};
+use rohrpost_config::{Installation, Module as Configured, Problem, Program, SettingsError, Show, nearest};
 use serde::de::DeserializeOwned;
 
 /// Settings of a built-in module, as they are looked at before it runs.
@@ -15,6 +15,11 @@ pub(super) trait Settings: DeserializeOwned {
     /// Says which, and what would be right.
     fn check(&self) -> Result<(), Refused> {
         Ok(())
+    }
+
+    /// Those that may change while it runs.
+    fn parameters(&self) -> &'static [&'static str] {
+        &[]
     }
 
     /// Modules that it calls.
@@ -55,11 +60,31 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
     problems
 }
 
+/// Everything that built-in modules would refuse of the values that were saved of their parameters, by line of that file.
+pub fn check_saved(installation: &Installation) -> Vec<Problem> {
+    let wrong = installation.modules.iter().filter_map(|module| {
+        let Program::Builtin(name) = &module.program else { return None };
+        let error = (Builtin::find(name)?.check_saved)(installation, module)?;
+        Some(Problem { line: Some(error.line), message: format!("[\"{}\"]: {}", error.module, error.message) })
+    });
+    wrong.collect()
+}
+
+/// What a built-in module would refuse of the values that were saved of its parameters.
+pub(super) fn saved<M: Module<Settings: Settings>>(
+    installation: &Installation,
+    module: &Configured,
+) -> Option<SettingsError> {
+    let saved = installation.saved.as_ref()?;
+    let settings: Result<M::Settings, _> = installation.settings_as(module);
+    settings.and_then(|settings| saved.check_names(installation, module, settings.parameters())).err()
+}
+
 /// What a built-in module would refuse.
 pub(super) fn module<M: Module<Settings: Settings>>(installation: &Installation, module: &Configured) -> Vec<Problem> {
     let what = format!("module `{}`", installation.classes.format(module.name));
     let mut problems = faces::<M>(installation, module, &what);
-    let settings: M::Settings = match installation.settings_as(module) {
+    let settings: M::Settings = match installation.settings_without_saved(module) {
         Ok(settings) => settings,
         Err(error) => {
             let message = format!("{what}: settings: {}", error.message);

@@ -7,18 +7,19 @@ mod output;
 mod pilot;
 mod sim;
 
-pub use check::check;
+pub use check::{check, check_saved};
 
 use crate::description::Description;
 use crate::interface::Interfaces;
 use crate::module::Module;
 use crate::runtime::{Start, StartError, run_started};
-use rohrpost_config::{Installation, Module as Configured, Problem};
+use rohrpost_config::{Installation, Module as Configured, Problem, SettingsError};
 
 /// What can be done with a built-in module.
 struct Builtin {
     run: fn(Start) -> Result<(), StartError>,
     check: fn(&Installation, &Configured) -> Vec<Problem>,
+    check_saved: fn(&Installation, &Configured) -> Option<SettingsError>,
     /// One for each class that it can answer to.
     descriptions: fn() -> Vec<Description>,
 }
@@ -26,7 +27,7 @@ struct Builtin {
 impl Builtin {
     fn of<M: Module<Settings: check::Settings>>() -> Self {
         let descriptions = || M::Interfaces::table().into_iter().map(|served| served.description).collect();
-        Self { run: run_started::<M>, check: check::module::<M>, descriptions }
+        Self { run: run_started::<M>, check: check::module::<M>, check_saved: check::saved::<M>, descriptions }
     }
 
     fn find(name: &str) -> Option<Self> {

@@ -8,7 +8,7 @@ use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
 use rohrpost_config::{Installation, NameTextError};
 use rohrpost_mailbox::{
-    CreateError, Label, Name, Options, Receiver, SendError, Shape, SystemClock, SystemTime, Type, local,
+    CreateError, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime, Type, local,
 };
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -51,6 +51,8 @@ pub struct Context {
     pub(crate) link: Caller,
     pub(crate) faces: Vec<Name>,
     pub(crate) newest: Vec<Newest>,
+    /// Counts what is published.
+    publications: Publications,
     pub(crate) subscriptions: Subscriptions,
     pub(crate) followings: Followings,
     pub(crate) clock: SystemClock,
@@ -69,12 +71,14 @@ impl Context {
         faces: Vec<Name>,
         clock: SystemClock,
     ) -> Self {
+        let publications = Publications::new(link.participant());
         Self {
             me,
             installation,
             link: Rc::new(RefCell::new(link)),
             faces,
             newest: Vec::new(),
+            publications,
             subscriptions: Subscriptions::default(),
             followings: Followings::default(),
             clock,
@@ -193,6 +197,8 @@ impl Context {
         newest.stamp_ns = stamp_ns;
         std::mem::swap(&mut newest.value, &mut self.scratch);
         let (newest, link, faces) = (&self.newest[at], &self.link, &self.faces);
+        let age = Duration::from_nanos(self.clock.now().ns.saturating_sub(stamp_ns));
+        self.publications.published(faces[face], Type::data(port.number), newest.value.len(), age);
         self.subscriptions.published(newest, |to| deliver(link, faces, newest, to));
         Ok(())
     }

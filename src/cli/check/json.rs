@@ -2,8 +2,7 @@
 
 use rohrpost::Name;
 use rohrpost::config::{
-    Errors, Full, Installation, MailboxSpec, MissingProgram, Module, Program, RestartPolicy, Scheduling, Start,
-    TimeSource,
+    Errors, Installation, MailboxSpec, MissingProgram, Module, Program, RestartPolicy, Scheduling, Start, TimeSource,
 };
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -103,12 +102,8 @@ fn module(installation: &Installation, module: &Module) -> Value {
 }
 
 fn mailbox(spec: &MailboxSpec) -> Value {
-    let full = match spec.full {
-        Full::Displace => "displace",
-        Full::Reject => "reject",
-    };
     json!({
-        "slots": spec.slots, "size": spec.size, "full": full, "max_age_ms": spec.max_age.map(ms),
+        "slots": spec.slots, "size": spec.size, "full": spec.full.name(), "max_age_ms": spec.max_age.map(ms),
         "claims": spec.claims, "memory": spec.memory(),
     })
 }

@@ -36,7 +36,14 @@ pub(super) fn load(file: &Path) -> Result<Installation, Errors> {
 /// Everything that they would refuse, by line.
 pub(super) fn judge(installation: Installation) -> Result<Installation, Errors> {
     let problems = rohrpost_modules::builtin::check(&installation);
-    if problems.is_empty() { Ok(installation) } else { Err(Errors::new(&installation.path, problems)) }
+    if !problems.is_empty() {
+        return Err(Errors::new(&installation.path, problems));
+    }
+    let problems = rohrpost_modules::builtin::check_saved(&installation);
+    match &installation.saved {
+        Some(saved) if !problems.is_empty() => Err(Errors::new(&saved.path, problems)),
+        _ => Ok(installation),
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {

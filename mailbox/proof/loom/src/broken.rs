@@ -216,13 +216,23 @@ pub(crate) const BROKEN: &[Broken] = &[
             ),
             edit(
                 "slots",
-                "return Ok(Claim { slot, word });",
-                "return Ok(Claim { slot, word, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
+                "return Ok(Claim { slot, word, place: None });",
+                "return Ok(Claim { slot, word, place: None, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "return Some(Claim { slot, word });",
-                "return Some(Claim { slot, word, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
+                "return Some(Claim { slot, word, place: None });",
+                "return Some(Claim { slot, word, place: None, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
+            ),
+            edit(
+                "slots",
+                "slot: old.slot, word, place: Some(old.word.ticket()) })",
+                "slot: old.slot, word, place: Some(old.word.ticket()), ticket: 0 })",
+            ),
+            edit(
+                "slots",
+                "word: marked, place: Some(old.word.ticket()) })",
+                "word: marked, place: Some(old.word.ticket()), ticket: 0 })",
             ),
             edit("slots", "let ticket = self.hot.ticket.fetch_add(1, Ordering::AcqRel);", "let ticket = claim.ticket;"),
         ],
@@ -234,7 +244,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "first_come_first_served",
         edits: &[edit(
             "word",
-            "(self.priority().0 as u64) << LOST | (TICKET - self.ticket())",
+            "(self.priority().0 as u64) << RANK | (TICKET - self.ticket())",
             "TICKET - self.ticket()",
         )],
         caught_by: "the_more_important_goes_first",
@@ -273,7 +283,11 @@ pub(crate) const BROKEN: &[Broken] = &[
     // The loss shows nowhere.
     Broken {
         name: "displaced_not_counted",
-        edits: &[edit("slots", "(last != FREE).then(|| last.priority())", "None")],
+        edits: &[edit(
+            "slots",
+            "(last != FREE).then(|| Victim { priority: last.priority(), replaced: false })",
+            "None",
+        )],
         caught_by: "two_displace_two",
         says: WRONG,
     },
@@ -350,7 +364,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "settles_nothing",
         edits: &[edit(
             "slots",
-            "lost(priority);\n                step!(\"settle: counted\");",
+            "lost(victim);\n                step!(\"settle: counted\");",
             "step!(\"settle: counted\");",
         )],
         caught_by: "a_replaced_mailbox_hides_no_loss",
@@ -392,7 +406,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // An accepted package is gone, and no counter knows.
     Broken {
         name: "reclaim_forgets_the_displaced",
-        edits: &[edit("slots", "displaced.into_iter().for_each(&mut lost);", "let _ = (displaced, &mut lost);")],
+        edits: &[edit("slots", "victim.into_iter().for_each(&mut lost);", "let _ = (victim, &mut lost);")],
         caught_by: "a_displacer_dies",
         says: WRONG,
     },
@@ -483,8 +497,11 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         what: "models::Sender::send does the same, change both",
         lines: &[
             "fn publish(",
-            "self.count_displaced(&claim);",
+            "self.count_victim(&claim);",
+            "self.posts.of(label).and_then(|old| slots.replace(claim, old))",
+            "self.count_victim(&claim);",
             ".publish(claim, label.priority)",
+            "self.posts.remember(label, posted, &slots);",
             "if wake {",
             "self.wake();",
         ],
