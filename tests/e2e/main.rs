@@ -29,3 +29,4 @@ mod screen;
 mod start;
 mod tools;
 mod tools_data;
+mod versions;
