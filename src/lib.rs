@@ -60,7 +60,7 @@ pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::macro_support::serde;
 pub use rohrpost_modules::runtime::{
     ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, describe,
-    find_running,
+    find_other_versions, find_running,
 };
 pub use rohrpost_modules::{
     Module, ModuleError, choice, common, data, description, interface, interfaces, launch, output, parameter,

@@ -21,7 +21,7 @@ use crate::step::step;
 use crate::word::Claimant;
 use std::fs::{self, File, OpenOptions};
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -112,7 +112,8 @@ pub enum NodeError {
     Foreign(PathBuf, u32),
     /// Another version's layout.
     #[error(
-        "node directory {0} has layout version {1}, this program version {VERSION}; stop what runs there and remove it"
+        "node {0} was made by another version of Rohrpost (layout {1}, this program has {VERSION}); use the `rohrpost` that \
+         launched it, or stop what runs there and remove the directory"
     )]
     Version(PathBuf, u32),
     /// No such node, or it was removed after it was opened.
@@ -199,6 +200,10 @@ impl Node {
         let failed = |error| NodeError::Io(path.into(), error);
         let file = open_shared(&path.join("node"), create).map_err(failed)?;
         let bytes = size_of::<NodePage>();
+        // Before anything is locked or made longer: what another version made is its own business.
+        if let Some(other) = other_version(&file) {
+            return Err(NodeError::Version(path.into(), other));
+        }
         let lock = RegistryLock::take(path)?;
         if file.metadata().map_err(failed)?.len() < bytes as u64 {
             allocate(&file, bytes).map_err(failed)?;
@@ -225,6 +230,7 @@ impl Node {
             step!("node: before magic");
             page.magic.store(MAGIC, Ordering::Release);
         }
+        // Whoever made it between the look before and the lock may have been another version's.
         match page.version.load(Ordering::Relaxed) {
             VERSION => Ok(()),
             other => Err(NodeError::Version(self.path.clone(), other)),
@@ -407,6 +413,16 @@ pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
             Ok(file)
         }
     }
+}
+
+/// The layout version that a node's file was made with, if it is whole and not ours. Every version begins its files with
+/// the magic number, which is written last, and its version.
+fn other_version(file: &File) -> Option<u32> {
+    let (mut magic, mut version) = ([0; 8], [0; 4]);
+    file.read_exact_at(&mut magic, 0).ok()?;
+    file.read_exact_at(&mut version, 8).ok()?;
+    let version = u32::from_ne_bytes(version);
+    (u64::from_ne_bytes(magic) == MAGIC && version != VERSION).then_some(version)
 }
 
 /// Opens a file of the node's directory to look at it: never through a link, never waiting for a pipe's other end.

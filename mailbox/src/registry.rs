@@ -90,7 +90,7 @@ impl Participant {
         };
         let old = match Segment::check(&file, name) {
             Ok(old) => Some(old),
-            Err(BadSegment::Foreign) => None,
+            Err(BadSegment::Foreign | BadSegment::Version(_)) => None,
             Err(BadSegment::Io(error)) => return Err(memory(error)),
         };
         let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(memory)? else {

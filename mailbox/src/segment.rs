@@ -1,7 +1,7 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
 use crate::clock::monotonic_ns;
-use crate::layout::{Page, SLOT_PREFIX, Shape};
+use crate::layout::{Page, SLOT_PREFIX, Shape, VERSION};
 use crate::memory::Mapping;
 use crate::name::Name;
 use crate::node::{open_shared, open_to_read};
@@ -24,9 +24,12 @@ pub(crate) struct Segment {
 pub(crate) enum BadSegment {
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// Foreign, damaged, or of another version.
-    #[error("it is no mailbox of this version")]
+    /// Foreign, or damaged.
+    #[error("its file is no mailbox, or damaged; end its owner, and remove the file with `rohrpost clean`")]
     Foreign,
+    /// Another version's layout.
+    #[error("it was made by another version (layout {0}, this program {VERSION}); build both from the same version")]
+    Version(u32),
 }
 
 /// The file of a mailbox.
@@ -76,7 +79,11 @@ impl Segment {
             return Err(BadSegment::Foreign);
         }
         let front = Mapping::new(file, size_of::<Page>(), false)?;
-        let (found, shape) = front.at::<Page>(0).identity.read().ok_or(BadSegment::Foreign)?;
+        let identity = &front.at::<Page>(0).identity;
+        if let Some(other) = identity.other_version() {
+            return Err(BadSegment::Version(other));
+        }
+        let (found, shape) = identity.read().ok_or(BadSegment::Foreign)?;
         if found != name || file.metadata()?.len() < shape.segment_bytes() as u64 {
             return Err(BadSegment::Foreign);
         }

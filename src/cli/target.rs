@@ -53,7 +53,14 @@ impl Target {
 fn only_running() -> Result<(PathBuf, String), Failure> {
     let running = rohrpost::find_running();
     match &running[..] {
-        [] => Err("no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into()),
+        [] => {
+            // One that cannot be looked into is no reason to say that none is there.
+            let others = rohrpost::find_other_versions().into_iter().next();
+            Err(others.map_or_else(
+                || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
+                Failure::from,
+            ))
+        }
         [only] => noted_config(only),
         several => {
             let list: Vec<String> = several.iter().map(|path| path.display().to_string()).collect();
@@ -68,7 +75,7 @@ fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
     let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
     match text.lines().collect::<Vec<_>>()[..] {
         [config, node] => Ok((config.into(), node.into())),
-        _ => Err(format!("{} is not what this version of launch writes; say --config FILE", file.display()).into()),
+        _ => Err(format!("{} was written by another version of launch; say --config FILE", file.display()).into()),
     }
 }
 

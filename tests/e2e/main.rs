@@ -32,3 +32,4 @@ mod start;
 mod tools;
 mod tools_data;
 mod tuned;
+mod versions;
