@@ -153,7 +153,9 @@ pub(crate) fn is_installed() -> bool {
 
 /// Sets which lines this process sends from now on; returns which it sent before, if it sends any.
 pub fn set_level(level: OutputLevel) -> Option<OutputLevel> {
-    installed().map(|output| level_from(output.level.swap(level as u8, Ordering::Relaxed)))
+    let before = level_from(installed()?.level.swap(level as u8, Ordering::Relaxed));
+    layer::level_changed();
+    Some(before)
 }
 
 /// Which lines this process sends, if it sends any.
