@@ -112,7 +112,7 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let memory = modules.iter().map(|module| memory(module)).sum();
+        let memory = modules.iter().map(|module| module.memory()).sum();
         self.line("");
         self.line(format!("Node `{}`: {}, {} of mailboxes", node.name, count(modules.len(), "module"), about(memory)));
         self.line("");
@@ -120,8 +120,9 @@ impl Page<'_> {
             self.entry("address", address);
         }
         self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
-        let (first, last) = (node.tools.start(), node.tools.end());
-        self.entry("tools", &format!("programs run by hand are tool.{first} to tool.{last}"));
+        let (hand, launch) = (node.tools_by_hand(), node.launch_instance());
+        let (first, last) = (hand.start(), hand.end());
+        self.entry("tools", &format!("launch is tool.{launch}; programs run by hand are tool.{first} to tool.{last}"));
         for module in modules {
             self.module(module);
         }
@@ -264,12 +265,6 @@ fn mailbox(spec: &MailboxSpec) -> String {
         let _ = write!(words, "; {} claims a sender", spec.claims);
     }
     words
-}
-
-/// Bytes of a module's mailboxes; each face has a command mailbox like the module's.
-fn memory(module: &Module) -> u64 {
-    let [commands, replies, data] = module.mailboxes.each().map(|(_, spec)| spec.memory());
-    commands * (1 + module.faces.len() as u64) + replies + data
 }
 
 /// A size in at most four digits.

@@ -53,7 +53,7 @@ mod settings;
 mod time;
 mod units;
 
-pub use classes::{ClassEntry, ClassTable, NameTextError, TOOL};
+pub use classes::{ClassEntry, ClassTable, NameTextError, TOOL, is_word as is_class_name};
 pub use digest::Digest;
 pub use errors::{Errors, Problem};
 pub use explain::explain;

@@ -106,6 +106,12 @@ impl Module {
     pub fn names(&self) -> impl Iterator<Item = Name> {
         std::iter::once(self.name).chain(self.faces.iter().copied())
     }
+
+    /// Bytes of its mailboxes; each face has a command mailbox like the module's.
+    pub fn memory(&self) -> u64 {
+        let [commands, replies, data] = self.mailboxes.each().map(|(_, spec)| spec.memory());
+        commands * (1 + self.faces.len() as u64) + replies + data
+    }
 }
 
 /// Lines at which parts of a module stand, for checks across modules.

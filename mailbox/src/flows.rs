@@ -16,7 +16,7 @@ const TRIES_AT_ONCE: usize = 8;
 const PATIENCE: Duration = Duration::from_micros(100);
 
 /// Packages of one type that one participant sends from one name to one mailbox, or values of one kind that it publishes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlowInfo {
     /// The process that sends.
     pub pid: u32,
@@ -41,7 +41,7 @@ pub struct FlowInfo {
     /// When the last was sent, monotonic clock, ns; 0 in the rest.
     pub last_ns: u64,
     /// Sum of the squares of the times from one to the next, ns².
-    pub interval_squares_ns2: f64,
+    pub interval_squares_ns2: u128,
     /// Published values: sum of the ages (system time less stamp) that they had, ns.
     pub age_sum_ns: u64,
     /// Extremes of the last seconds in which something was sent, in no order.
@@ -169,7 +169,7 @@ fn read(row: &Row, participant: &ParticipantInfo) -> Option<FlowInfo> {
         refused,
         first_ns: load(&row.first_ns),
         last_ns: load(&row.last_ns),
-        interval_squares_ns2: f64::from_bits(load(&row.squares)),
+        interval_squares_ns2: row.squares_ns2(),
         age_sum_ns: load(&row.age_ns),
         seconds,
     })

@@ -60,7 +60,7 @@ mod word;
 pub use clock::{monotonic_ns, realtime_ns};
 pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss};
 pub use flows::{FlowInfo, FlowSecond, Publications};
-pub use layout::{Shape, ShapeError};
+pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
 pub use node::{
     LaunchLock, ModuleState, Node, NodeError, PARTICIPANTS_MAX, ParticipantInfo, base_directory, node_directory,

@@ -73,11 +73,12 @@ pub(crate) struct Row {
     pub(crate) refused: AtomicU64,
     pub(crate) first_ns: AtomicU64,
     pub(crate) last_ns: AtomicU64,
-    /// Sum of the squares of the intervals, ns², as the bits of an f64.
-    pub(crate) squares: AtomicU64,
+    /// Sum of the squares of the intervals, ns²: the lower and the upper half. Exact, so that what came before a window can be
+    /// subtracted, also after an hour of silence.
+    pub(crate) squares: [AtomicU64; 2],
     /// Publications: sum of the ages that values had.
     pub(crate) age_ns: AtomicU64,
-    spare: [AtomicU64; 6],
+    spare: [AtomicU64; 5],
     pub(crate) seconds: [Second; SECONDS_KEPT],
 }
 
@@ -317,9 +318,14 @@ impl Row {
         self.to.store(key.to.raw(), Ordering::Relaxed);
         self.from.store(key.from.raw(), Ordering::Relaxed);
         self.kind.store(u32::from(key.kind.0 as u16), Ordering::Relaxed);
-        let counts = [&self.packages, &self.bytes, &self.refused, &self.first_ns, &self.last_ns, &self.squares];
-        counts.into_iter().chain([&self.age_ns]).for_each(|count| count.store(0, Ordering::Relaxed));
+        let counts = [&self.packages, &self.bytes, &self.refused, &self.first_ns, &self.last_ns, &self.age_ns];
+        counts.into_iter().chain(&self.squares).for_each(|count| count.store(0, Ordering::Relaxed));
         self.seconds.iter().for_each(|second| second.second.store(0, Ordering::Relaxed));
+    }
+
+    pub(crate) fn squares_ns2(&self) -> u128 {
+        let [low, high] = [0, 1].map(|half| u128::from(self.squares[half].load(Ordering::Relaxed)));
+        high << 64 | low
     }
 
     fn count(&self, bytes: usize, at_ns: u64, age_ns: u64) {
@@ -328,8 +334,9 @@ impl Row {
             None
         } else {
             let interval_ns = at_ns.saturating_sub(self.last_ns.load(Ordering::Relaxed));
-            let squares = f64::from_bits(self.squares.load(Ordering::Relaxed)) + (interval_ns as f64).powi(2);
-            self.squares.store(squares.to_bits(), Ordering::Relaxed);
+            let squares = self.squares_ns2().wrapping_add(u128::from(interval_ns).pow(2));
+            self.squares[0].store(squares as u64, Ordering::Relaxed);
+            self.squares[1].store((squares >> 64) as u64, Ordering::Relaxed);
             Some(interval_ns)
         };
         self.last_ns.store(at_ns, Ordering::Relaxed);

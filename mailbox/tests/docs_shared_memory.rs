@@ -130,14 +130,14 @@ fn a_table_of_traffic_is_as_documented() {
     let slots = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
     let published = [0, 1].map(|slot| slots.u64(4096 + 128 + slot * 128));
     assert_eq!([first, last], [published[0].min(published[1]), published[0].max(published[1])]);
-    assert_eq!(f64::from_bits(there.u64(row + 64)), ((last - first) as f64).powi(2));
+    assert_eq!((there.u64(row + 64), there.u64(row + 72)), ((last - first).pow(2), 0));
     let second = row + 128 + 32 * (last / 1_000_000_000 % 4) as usize;
     assert_eq!([0, 8, 16].map(|at| there.u64(second + at)), [last / 1_000_000_000, last - first, last - first]);
     assert!(there.u32(second + 24) >= 4 && there.u32(second + 28) == 5, "the first may lie in the second before");
 
     let row = 64 + 256;
     assert_eq!([8, 12, 16].map(|at| there.u32(row + at)), [0, me.module().raw(), 0xbff9]);
-    assert_eq!([24, 32, 72].map(|at| there.u64(row + at)), [1, 3, 11]);
+    assert_eq!([24, 32, 80].map(|at| there.u64(row + at)), [1, 3, 11]);
     drop((sender, publications, me));
     assert!(!ground.path().join("traffic.1").exists());
 }

@@ -110,8 +110,7 @@ fn times_tell_the_rate_exactly() {
     assert_eq!(flow.rate_since(seen.as_ref()), Some(40.0 * 1e9 / (times[49] - times[9]) as f64));
     assert_eq!(flow.rate_since(Some(&flow)), None, "nothing came since");
     let intervals: Vec<u64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let squares: f64 = intervals.iter().map(|ns| (*ns as f64).powi(2)).sum();
-    assert!((flow.interval_squares_ns2 - squares).abs() <= squares * 1e-9);
+    assert_eq!(flow.interval_squares_ns2, intervals.iter().map(|ns| u128::from(*ns).pow(2)).sum::<u128>());
     for second in &flow.seconds {
         let here = |i: &usize| times[*i] / 1_000_000_000 == second.second;
         let bytes = || (0..50).filter(here);

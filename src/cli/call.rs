@@ -34,6 +34,15 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// Functions that every module has, besides those of its interface.
+pub(super) const COMMON: [(&str, &str); 5] = [
+    ("on", "Begins to work"),
+    ("off", "Goes to its safe state"),
+    ("status", "Says how it is"),
+    ("get", "Asks for its newest data of a kind"),
+    ("output-level", "Sets which lines it sends"),
+];
+
 /// A time that a user gave in seconds.
 pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())
@@ -110,6 +119,21 @@ fn postcard_u64(bytes: &[u8]) -> Option<(u64, &[u8])> {
 
 fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Result<Value, Failure> {
     let description = tool.describe(module)?;
+    let (function, body) = prepare(&description, name, texts)?;
+    let write = |to: &mut Vec<u8>| {
+        to.extend_from_slice(&body);
+        Ok(())
+    };
+    let bytes = tool.call(module, function.number, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
+    Ok(decode(&function.result, &bytes)?)
+}
+
+/// A function by its name, and its arguments as they go into a package.
+pub(super) fn prepare<'a>(
+    description: &'a Description,
+    name: &str,
+    texts: &[String],
+) -> Result<(&'a Function, Vec<u8>), Failure> {
     let function = description.function(name).ok_or_else(|| {
         let names: Vec<&str> = description.functions.iter().map(|function| function.name.as_str()).collect();
         let own = if names.is_empty() { String::new() } else { format!("{}, ", names.join(", ")) };
@@ -130,12 +154,7 @@ fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Resu
         };
         body.extend(encode(&argument.ty, &value).map_err(|error| format!("{}: {error}", argument.name))?);
     }
-    let write = |to: &mut Vec<u8>| {
-        to.extend_from_slice(&body);
-        Ok(())
-    };
-    let bytes = tool.call(module, function.number, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
-    Ok(decode(&function.result, &bytes)?)
+    Ok((function, body))
 }
 
 /// A function with the names and types of its arguments.

@@ -98,7 +98,7 @@ impl View {
         }
         let survey = launch.survey()?;
         let lines = module_lines(launch.installation(), &survey, self.last.as_ref(), |name| {
-            (launch.restarts(name), launch.phase(name).cloned())
+            (launch.restarts(name), launch.phase(name))
         });
         self.draw(&launch.installation().name, &lines);
         self.last = Some(survey);

@@ -111,6 +111,8 @@ pub(crate) struct Settings {
     panic_at_start: bool,
     /// Ends before it is ready.
     exit_at_start: Option<i32>,
+    /// Only if there is such a file.
+    wait_for: Option<PathBuf>,
     refuse_at_start: bool,
     refuse_on: bool,
     /// Stops itself as Ctrl-Z would, before it is ready.
@@ -164,7 +166,8 @@ impl Module for Probe {
         if probe.settings.panic_at_start {
             panic!("a probe was asked to panic");
         }
-        if let Some(code) = probe.settings.exit_at_start {
+        let wait_for = probe.settings.wait_for.as_ref();
+        if let Some(code) = probe.settings.exit_at_start.filter(|_| wait_for.is_none_or(|file| file.exists())) {
             println!("a probe was asked to end with {code}");
             std::process::exit(code);
         }

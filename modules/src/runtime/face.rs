@@ -1,6 +1,7 @@
-//! One name under which a module's process is reached: its command mailbox, its interface, and what it has run.
+//! One name under which a module's process is reached: its command mailbox, and its interface.
 
-use crate::call::{Fault, Once};
+use super::server::Desk;
+use crate::call::Fault;
 use crate::description::Description;
 use crate::interface::{ServeFunction, Served};
 use rohrpost_mailbox::{Name, NodeError, Receiver};
@@ -8,8 +9,7 @@ use rohrpost_mailbox::{Name, NodeError, Receiver};
 /// One face. A module without further faces has this one.
 pub(crate) struct Face<M> {
     pub(crate) name: Name,
-    pub(crate) commands: Receiver,
-    pub(crate) once: Once,
+    pub(crate) desk: Desk,
     pub(crate) offer: Offer<M>,
 }
 
@@ -32,7 +32,6 @@ impl<M> Face<M> {
         class: &str,
         commands: Receiver,
         served: Option<Served<M>>,
-        started_ns: u64,
     ) -> Result<Self, NodeError> {
         let (serve, description) = match served {
             Some(Served { description, serve, .. }) => (Some(serve), description),
@@ -46,7 +45,7 @@ impl<M> Face<M> {
         // For tools that must not ask: a question would be one more package.
         commands.set_about(&description)?;
         let offer = Offer { idempotent, data, serve, hash, description };
-        Ok(Self { name, commands, once: Once::new(started_ns), offer })
+        Ok(Self { name, desk: Desk::new(commands), offer })
     }
 }
 

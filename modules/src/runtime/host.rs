@@ -30,15 +30,19 @@ pub enum ClientError {
     /// A mailbox.
     #[error(transparent)]
     Mailbox(#[from] CreateError),
-    /// All instances of class `tool` are in use.
-    #[error("all {0} tool instances of node `{1}` are in use; end some, or widen `tools` in the configuration")]
+    /// All instances of class `tool` that programs run by hand may take are in use.
+    #[error(
+        "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, or \
+         widen `tools` in the configuration"
+    )]
     Crowded(usize, String),
     /// The configuration has no such node.
     #[error("the configuration has no node `{0}`")]
     NoNode(String),
 }
 
-/// A tool's place on a node: a link and a data mailbox, under the first free instance of class `tool`.
+/// A tool's place on a node: a link and a data mailbox, under the first free instance of class `tool` but one: that is
+/// launch's.
 pub struct ToolLink {
     /// Sends and calls.
     pub link: Link,
@@ -48,6 +52,8 @@ pub struct ToolLink {
     /// Reads system time.
     pub clock: SystemClock,
     timeout: Duration,
+    /// Launch of this node.
+    launcher: Name,
 }
 
 impl ToolLink {
@@ -63,17 +69,39 @@ impl ToolLink {
     ) -> Result<Self, ClientError> {
         let config = installation.node(name).ok_or_else(|| ClientError::NoNode(name.into()))?;
         let participant = Participant::join(node, Name::NONE)?;
-        let large = Shape { slots: REPLIES_KEPT as u16, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };
-        for instance in config.tools.clone() {
-            let me = Name::new(installation.system.id, installation.classes.tool().0, instance, 0);
-            let replies = match participant.receiver(me.with_local(local::REPLIES), large) {
-                Err(CreateError::Owned(..)) => continue,
-                other => other?,
-            };
-            let link = Link::new(&participant, me, replies);
-            return Ok(Self { link, large, data: None, clock: SystemClock::open(node), timeout });
+        let tool = |instance| Name::new(installation.system.id, installation.classes.tool().0, instance, 0);
+        for instance in config.tools_by_hand() {
+            match Self::take(&participant, tool(instance), tool(config.launch_instance()), timeout) {
+                Err(CreateError::Owned(..)) => {}
+                taken => return Ok(taken?),
+            }
         }
-        Err(ClientError::Crowded(config.tools.clone().count(), name.into()))
+        Err(ClientError::Crowded(config.tools_by_hand().count(), name.into()))
+    }
+
+    /// Joins as the launch of a node: under the first instance, where tools look for it.
+    pub(crate) fn join_as_launch(
+        installation: &Installation,
+        node: &Arc<Node>,
+        name: &str,
+        timeout: Duration,
+    ) -> Result<Self, ClientError> {
+        let config = installation.node(name).ok_or_else(|| ClientError::NoNode(name.into()))?;
+        let participant = Participant::join(node, Name::NONE)?;
+        let me = Name::new(installation.system.id, installation.classes.tool().0, config.launch_instance(), 0);
+        Ok(Self::take(&participant, me, me, timeout)?)
+    }
+
+    fn take(participant: &Arc<Participant>, me: Name, launcher: Name, timeout: Duration) -> Result<Self, CreateError> {
+        let large = Shape { slots: REPLIES_KEPT as u16, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };
+        let replies = participant.receiver(me.with_local(local::REPLIES), large)?;
+        let link = Link::new(participant, me, replies);
+        Ok(Self { link, large, data: None, clock: SystemClock::open(participant.node()), timeout, launcher })
+    }
+
+    /// Where the launch of this node takes commands, if one runs.
+    pub fn launcher(&self) -> Name {
+        self.launcher
     }
 
     /// The mailbox that takes subscribed data; made when it is first asked for.
@@ -207,52 +235,21 @@ impl ToolLink {
 /// # Errors
 /// See [`CallError`].
 pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Description, CallError> {
-    let mut parts = DescriptionParts::new(module);
+    let mut bytes = Vec::new();
     loop {
-        let call = parts.ask(link, timeout)?;
-        let part = link.wait(call, |reply| postcard::from_bytes(reply))?;
-        if let Some(description) = parts.take(part)? {
-            return Ok(description);
-        }
-    }
-}
-
-/// A description on its way: a reply holds a part of it.
-pub struct DescriptionParts {
-    module: Name,
-    bytes: Vec<u8>,
-}
-
-impl DescriptionParts {
-    /// Of this module, and nothing of it yet.
-    pub fn new(module: Name) -> Self {
-        Self { module, bytes: Vec::new() }
-    }
-
-    /// Begins the call for the next part.
-    ///
-    /// # Errors
-    /// As [`Link::begin`].
-    pub fn ask(&self, link: &mut Link, timeout: Duration) -> Result<u32, CallError> {
-        let from = self.bytes.len() as u32;
-        link.begin(self.module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))
-    }
-
-    /// Takes a part; the whole, if that was the last.
-    ///
-    /// # Errors
-    /// [`CallError::BadReply`] when it is too long, or no description.
-    pub fn take(&mut self, part: DescriptionPart) -> Result<Option<Description>, CallError> {
+        let from = bytes.len() as u32;
+        let call = link.begin(module, common::DESCRIBE, common::HASH, timeout, |body| append(body, &(from,)))?;
+        let part: DescriptionPart = link.wait(call, |reply| postcard::from_bytes(reply))?;
         // What it says of itself is a claim.
         if part.total as usize > DESCRIPTION_MAX {
             let text = format!("its description of {} bytes is longer than {DESCRIPTION_MAX}", part.total);
-            return Err(CallError::BadReply(self.module, text));
+            return Err(CallError::BadReply(module, text));
         }
-        self.bytes.extend_from_slice(&part.bytes);
-        if self.bytes.len() < part.total as usize && !part.bytes.is_empty() {
-            return Ok(None);
+        let last = part.bytes.is_empty();
+        bytes.extend_from_slice(&part.bytes);
+        if bytes.len() >= part.total as usize || last {
+            break;
         }
-        let read = postcard::from_bytes(&self.bytes);
-        read.map(Some).map_err(|error| CallError::BadReply(self.module, error.to_string()))
     }
+    postcard::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!             ┌──────────────── one thread ────────────────┐
-//!  commands ─▶│ server: once? dispatch, reply              │─▶ replies
+//!  commands ─▶│ server: once? hosted: dispatch, reply      │─▶ replies
 //!  data     ─▶│ runner: received, tick, on, off            │─▶ data of subscriptions
 //!  replies  ─▶│ link: proxies' calls, renewals             │─▶ commands
 //!             └────────────────────────────────────────────┘
@@ -12,6 +12,7 @@ mod context;
 mod face;
 mod follow;
 mod host;
+mod hosted;
 mod parameters;
 mod runner;
 pub(crate) mod server;
@@ -19,7 +20,7 @@ mod start;
 
 pub use context::{Context, ContextError, Received};
 pub use follow::{Rate, Subscription};
-pub use host::{ClientError, DescriptionParts, ToolLink, describe};
+pub use host::{ClientError, ToolLink, describe};
 pub use runner::{exit, run, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;

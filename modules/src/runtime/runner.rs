@@ -2,7 +2,7 @@
 
 use super::context::{Context, Received};
 use super::face::Face;
-use super::server::Server;
+use super::hosted::Hosted;
 use super::start::{Start, StartError};
 use crate::call::Fault;
 use crate::common::{DataHead, Status};
@@ -187,10 +187,9 @@ impl<M: Module> Running<M> {
     }
 
     fn go(&mut self) {
-        let mut server = Server::new();
         let mut awake_since = Instant::now();
         while !self.stop.load(Ordering::Acquire) {
-            let mut busy = self.commands(&mut server);
+            let mut busy = self.commands();
             busy |= self.take_data();
             self.periodic();
             output::drain();
@@ -215,10 +214,12 @@ impl<M: Module> Running<M> {
         output::flush();
     }
 
-    fn commands(&mut self, server: &mut Server) -> bool {
+    fn commands(&mut self) -> bool {
         let mut any = false;
         for (index, face) in self.faces.iter_mut().enumerate() {
-            any |= burst(|| server.handle(face, index, &mut self.life, &mut self.context));
+            let Face { desk, offer, .. } = face;
+            let mut hosted = Hosted { index, offer, life: &mut self.life, context: &mut self.context };
+            any |= burst(|| desk.handle(&mut hosted));
         }
         any
     }
@@ -266,7 +267,7 @@ impl<M: Module> Running<M> {
         let deadline = [tick, renewal, delivery, output].into_iter().flatten().min();
         let mut link = self.context.link.borrow_mut();
         let mut receivers = empty(std::mem::take(&mut self.receivers));
-        receivers.extend(self.faces.iter_mut().map(|face| &mut face.commands));
+        receivers.extend(self.faces.iter_mut().map(|face| &mut face.desk.commands));
         receivers.push(&mut self.data);
         receivers.extend(&mut self.context.own);
         receivers.push(link.replies());
@@ -288,7 +289,7 @@ impl<M: Module> Running<M> {
         }
         // With it go its proxies, which hold the link.
         drop(self.life);
-        let commands = self.faces.into_iter().map(|face| face.commands);
+        let commands = self.faces.into_iter().map(|face| face.desk.commands);
         for mailbox in commands.chain([self.data]).chain(self.context.own) {
             mailbox.close();
         }

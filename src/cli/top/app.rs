@@ -63,8 +63,6 @@ pub(super) enum Action {
     Quit,
     Switch(Name, bool),
     Restart(Name),
-    /// Its description is wanted.
-    Describe(Name),
 }
 
 impl App {
@@ -167,7 +165,6 @@ impl App {
             (KeyCode::Enter | KeyCode::Right, Screen::Table) => {
                 let name = self.target(model)?;
                 self.show(Screen::Details(name));
-                return Some(Action::Describe(name));
             }
             (key, Screen::Table) => self.table_key(key, model),
             (key, Screen::Details(_) | Screen::Help) => self.scroll_by(key),

@@ -1,13 +1,12 @@
-//! What `top` asks modules: to switch on and off, what was said, what they offer, why they are in error. Nothing here waits:
+//! What `top` asks for: to switch modules on and off, what was said, why a module is in error. Nothing here waits:
 //! calls are begun, and looked after each time round, so that a module that hangs freezes no screen.
 
 use super::super::target::Running;
 use rohrpost::CallError;
-use rohrpost::common::{self, DescriptionPart, Status};
-use rohrpost::description::Description;
+use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::{DescriptionParts, Name, ToolLink};
+use rohrpost::{Name, ToolLink};
 use std::time::Duration;
 
 /// An answer comes within this time, or it does not come.
@@ -24,7 +23,6 @@ struct Call {
 enum Wants {
     Switch(bool),
     Lines,
-    Description(DescriptionParts),
     Why,
 }
 
@@ -32,8 +30,7 @@ enum Wants {
 pub(super) enum Answer {
     Switched(Name, bool, Result<(), String>),
     Lines(Result<Page, String>),
-    Description(Name, Result<Description, String>),
-    Why(Name, Status),
+    Why(Name, String),
 }
 
 /// Top's place among those that call.
@@ -69,12 +66,6 @@ impl Calls {
         self.begun(running, collector, Wants::Lines, begun)
     }
 
-    pub(super) fn describe(&mut self, running: &Running, module: Name) -> Option<Answer> {
-        let parts = DescriptionParts::new(module);
-        let begun = parts.ask(&mut self.tool.link, PATIENCE);
-        self.begun(running, module, Wants::Description(parts), begun)
-    }
-
     /// Asks a module in error why.
     pub(super) fn why(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let begun = self.tool.link.begin(module, common::STATUS, common::HASH, PATIENCE, |_| Ok(()));
@@ -107,34 +98,22 @@ impl Calls {
                 continue;
             };
             answers.extend(match outcome {
-                Ok(bytes) => self.answer(running, call.to, call.wants, &bytes),
+                Ok(bytes) => answer(running, call.to, call.wants, &bytes),
                 Err(error) => failed(running, call.to, call.wants, &error),
             });
         }
         answers
     }
+}
 
-    fn answer(&mut self, running: &Running, to: Name, wants: Wants, bytes: &[u8]) -> Option<Answer> {
-        let unread = |error: &dyn std::fmt::Display| CallError::BadReply(to, error.to_string());
-        match wants {
-            Wants::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
-            Wants::Lines => match from_bytes::<Page>(bytes) {
-                Ok(page) => Some(Answer::Lines(Ok(page))),
-                Err(error) => failed(running, to, Wants::Lines, &unread(&error)),
-            },
-            Wants::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status)),
-            Wants::Description(mut parts) => {
-                let taken = from_bytes::<DescriptionPart>(bytes).map_err(|error| unread(&error));
-                match taken.and_then(|part| parts.take(part)) {
-                    Ok(Some(description)) => Some(Answer::Description(to, Ok(description))),
-                    Ok(None) => {
-                        let begun = parts.ask(&mut self.tool.link, PATIENCE);
-                        self.begun(running, to, Wants::Description(parts), begun)
-                    }
-                    Err(error) => failed(running, to, Wants::Description(parts), &error),
-                }
-            }
-        }
+fn answer(running: &Running, to: Name, wants: Wants, bytes: &[u8]) -> Option<Answer> {
+    match wants {
+        Wants::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
+        Wants::Lines => match from_bytes::<Page>(bytes) {
+            Ok(page) => Some(Answer::Lines(Ok(page))),
+            Err(error) => failed(running, to, wants, &CallError::BadReply(to, error.to_string())),
+        },
+        Wants::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
     }
 }
 
@@ -147,7 +126,6 @@ fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Optio
     match wants {
         Wants::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
         Wants::Lines => Some(Answer::Lines(Err(told))),
-        Wants::Description(_) => Some(Answer::Description(to, Err(told))),
         Wants::Why => None,
     }
 }

@@ -183,7 +183,7 @@ impl Column {
 }
 
 /// What needs a person first.
-fn severity(state: &str) -> usize {
+pub(super) fn severity(state: &str) -> usize {
     let order = ["failed", "dead", "error", "stopping", "waiting", "starting", "off", "ended", "on", "left out"];
     order.iter().position(|known| *known == state).unwrap_or(order.len())
 }

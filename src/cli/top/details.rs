@@ -1,40 +1,32 @@
 //! The page about one module: what it is, its mailboxes and how long packages waited there, what it offers.
 
 use super::super::call::usage;
-use super::super::list::{mailbox_lines, print_mailboxes};
+use super::super::list::mailbox_lines;
 use super::super::summary::print_classes;
 use super::super::table::{table, time};
-use super::super::target::Running;
 use super::columns::{memory, short};
 use super::model::{Model, Peer, Row, Sample};
 use rohrpost::Name;
-use rohrpost::config::Program;
+use rohrpost::config::{Installation, Program};
 use rohrpost::description::Description;
-use rohrpost::mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo, monotonic_ns};
+use rohrpost::mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use rohrpost::survey::sum;
 use rohrpost::value::{describe_result, describe_type};
-use std::collections::HashMap;
 use std::time::Duration;
 
-/// What is known of a module's interface.
-pub(super) enum Offered {
-    /// It was asked.
-    Asked,
-    Known(Description),
-    Unknown(String),
-}
-
-/// The page as lines; those that begin without a blank are headings.
+/// The page as lines; those that begin without a blank are headings. `noted` knows what modules say of themselves.
 pub(super) fn page(
-    running: &Running,
+    installation: &Installation,
     sample: &Sample,
     model: &Model,
     name: Name,
-    offered: &HashMap<Name, Offered>,
+    noted: impl Fn(Name) -> Option<Description>,
 ) -> Vec<String> {
-    let Some(row) = model.row(name) else { return vec![format!("{} is not here any more", running.text(name))] };
+    let Some(row) = model.row(name) else {
+        return vec![format!("{} is not here any more", installation.classes.format(name))];
+    };
     let mut lines = vec![format!("{}: {}", row.line.module, row.line.state)];
-    lines.extend(indented(&about(running, sample, row)));
+    lines.extend(indented(&about(installation, sample, row)));
     let module = sample.survey.module(name);
     let own = |mailbox: &&MailboxInfo| {
         module.is_some_and(|module| {
@@ -45,13 +37,13 @@ pub(super) fn page(
     let mailboxes: Vec<MailboxInfo> = sample.survey.mailboxes.iter().filter(own).cloned().collect();
     if !mailboxes.is_empty() {
         lines.extend(["".into(), "mailboxes".into()]);
-        lines.extend(indented(&print_mailboxes(&mailbox_lines(running, &mailboxes))));
+        lines.extend(indented(&mailbox_table(installation, &mailboxes)));
         let classes = sum(&mailboxes);
         lines.extend(["".into(), "received, by the class that packages came with".into()]);
-        lines.extend(indented(&print_classes(&running.installation, &classes)));
+        lines.extend(indented(&print_classes(installation, &classes)));
         lines.extend(["".into(), "how long packages waited".into()]);
         for class in &classes {
-            let name = class.class.and_then(|id| running.installation.classes.name(id)).unwrap_or("others");
+            let name = class.class.and_then(|id| installation.classes.name(id)).unwrap_or("others");
             lines.extend(histogram(name, &class.latency));
         }
     }
@@ -59,16 +51,7 @@ pub(super) fn page(
     lines.extend(peers("receives from", &row.receives_from));
     let names = module.into_iter().flat_map(|module| std::iter::once(&module.name).chain(&module.faces));
     for face in names {
-        match offered.get(face) {
-            Some(Offered::Known(description)) => lines.extend(interface(running, *face, description)),
-            Some(Offered::Unknown(why)) => {
-                lines.extend(["".into(), format!("{} offers", running.text(*face)), format!("  not known: {why}")]);
-            }
-            Some(Offered::Asked) => {
-                lines.extend(["".into(), format!("{} offers", running.text(*face)), "  asked ...".into()])
-            }
-            None => {}
-        }
+        lines.extend(noted(*face).into_iter().flat_map(|description| interface(installation, *face, &description)));
     }
     lines
 }
@@ -78,8 +61,7 @@ fn indented(text: &str) -> Vec<String> {
 }
 
 /// What it is and how its process does.
-fn about(running: &Running, sample: &Sample, row: &Row) -> String {
-    let installation = &running.installation;
+fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
     let mut lines = Vec::new();
     let mut say = |what: &str, text: String| lines.push(format!("{what:<11}{text}"));
     if let Some(error) = &row.error {
@@ -99,7 +81,7 @@ fn about(running: &Running, sample: &Sample, row: &Row) -> String {
         say("program", format!("{program} ({}:{})", installation.path.display(), module.line));
         let names = |names: Vec<Name>| match &names[..] {
             [] => "nobody".into(),
-            names => names.iter().map(|name| running.text(*name)).collect::<Vec<_>>().join(", "),
+            names => names.iter().map(|name| installation.classes.format(*name)).collect::<Vec<_>>().join(", "),
         };
         say("calls", names(module.calls.clone()));
         let callers =
@@ -108,7 +90,7 @@ fn about(running: &Running, sample: &Sample, row: &Row) -> String {
     }
     let process = sample.survey.module(row.name).and_then(|module| module.process.as_ref());
     if let Some(process) = process {
-        let since = Duration::from_nanos(monotonic_ns().saturating_sub(process.joined_ns));
+        let since = Duration::from_secs_f64(row.uptime_s.unwrap_or(0.0));
         let restarts = match row.line.restarts {
             0 => String::new(),
             count => format!(", started again {count} times"),
@@ -118,6 +100,22 @@ fn about(running: &Running, sample: &Sample, row: &Row) -> String {
         say("takes", format!("{percent} % of a processor, {} of memory", row.memory_bytes.map_or("-".into(), memory)));
     }
     lines.join("\n")
+}
+
+/// Narrower than that of `list`: it stands in a terminal of 80 columns.
+fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> String {
+    let lines = mailbox_lines(installation, mailboxes);
+    let rows = mailboxes.iter().zip(lines).map(|(mailbox, line)| {
+        [
+            format!("{} {}", installation.classes.format(mailbox.name.module()), line.purpose),
+            format!("{} x {} B", line.slots, line.body_bytes_max),
+            line.full.into(),
+            format!("{} (most {})", line.waiting, line.waiting_max),
+            line.received.to_string(),
+            line.losses.clone(),
+        ]
+    });
+    table(["", ">slots", "when full", ">waiting", ">received", "lost"], rows)
 }
 
 /// Whom it has to do with, and how much.
@@ -164,8 +162,8 @@ fn histogram(class: &str, latency: &Latency) -> Vec<String> {
 }
 
 /// Functions and data, as the module itself describes them.
-fn interface(running: &Running, face: Name, description: &Description) -> Vec<String> {
-    let mut lines = vec!["".into(), format!("{} offers: {}", running.text(face), description.text)];
+fn interface(installation: &Installation, face: Name, description: &Description) -> Vec<String> {
+    let mut lines = vec!["".into(), format!("{} offers: {}", installation.classes.format(face), description.text)];
     for function in &description.functions {
         lines.push(format!("  {} -> {}", usage(function), describe_result(&function.result)));
         lines.push(format!("      {}", function.text));

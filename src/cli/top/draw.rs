@@ -55,7 +55,7 @@ impl View<'_> {
         match self.app.screen {
             Screen::Table => {
                 let rows = self.app.rows(self.model);
-                let least = if middle.height > OUTPUT_MIN + 2 { OUTPUT_MIN } else { 0 };
+                let least = OUTPUT_MIN.min(middle.height / 3);
                 let wanted = rows.len().max(1) as u16 + 1;
                 let [table, output] =
                     Layout::vertical([Constraint::Length(wanted.min(middle.height - least)), Constraint::Min(0)])
@@ -86,7 +86,7 @@ impl View<'_> {
             second.push_str(&format!("   only `{}`", self.app.filter));
         }
         for (place, text) in area.rows().zip([first, second]) {
-            to.set_stringn(place.x, place.y, text, place.width.into(), self.palette.head());
+            put(to, place, &text, self.palette.head());
         }
     }
 
@@ -100,7 +100,7 @@ impl View<'_> {
         });
         line(to, head, "", cells);
         if rows.is_empty() {
-            to.set_stringn(body.x, body.y, "  no module is called so; Esc shows all", body.width.into(), Style::new());
+            put(to, body, "  no module is called so; Esc shows all", Style::new());
         }
         let selected = self.app.selected_at(rows);
         let first = (selected + 1).saturating_sub(body.height.into());
@@ -127,13 +127,7 @@ impl View<'_> {
             Some(why) => format!("── no output: {why} "),
         };
         let rest = usize::from(title.width).saturating_sub(text.chars().count());
-        to.set_stringn(
-            title.x,
-            title.y,
-            format!("{text}{}", "─".repeat(rest)),
-            title.width.into(),
-            self.palette.rule(),
-        );
+        put(to, title, &format!("{text}{}", "─".repeat(rest)), self.palette.rule());
         let wrapped = self.output.iter().rev().flat_map(|line| {
             let lines = wrap(&line.text, body.width.into());
             lines.into_iter().rev().map(|text| (line.level, text))
@@ -141,7 +135,7 @@ impl View<'_> {
         let mut newest: Vec<_> = wrapped.take(body.height.into()).collect();
         newest.reverse();
         for (place, (level, text)) in body.rows().zip(newest) {
-            to.set_stringn(place.x, place.y, text, place.width.into(), self.palette.level(level));
+            put(to, place, &text, self.palette.level(level));
         }
     }
 
@@ -157,17 +151,17 @@ impl View<'_> {
         let first = self.app.scroll.min(wrapped.len().saturating_sub(area.height.into()));
         for (place, (heading, text)) in area.rows().zip(wrapped.into_iter().skip(first)) {
             let style = if heading { self.palette.head() } else { Style::new() };
-            to.set_stringn(place.x, place.y, text, place.width.into(), style);
+            put(to, place, &text, style);
         }
     }
 
     fn foot(&self, area: Rect, to: &mut Buffer) {
         let keys = match self.app.screen {
             Screen::Table => {
-                "?help q quit  Enter details  o on  f off  r restart  s sort  / filter  l L output  p pause"
+                "? help  q quit  o on  f off  Enter details  r restart  s sort  / filter  l lines  p pause"
             }
-            Screen::Details(_) => "Esc back  o on  f off  r restart  l L output  p pause  ? help  q quit",
-            Screen::Help => "Esc back  q quit",
+            Screen::Details(_) => "? help  q quit  Esc back  o on  f off  r restart  arrows scroll  l lines  p pause",
+            Screen::Help => "Esc back  q quit  arrows scroll",
         };
         let (text, style) = match (&self.app.prompt, &self.app.message) {
             (Prompt::Filter(_), _) => {
@@ -180,7 +174,14 @@ impl View<'_> {
             (Prompt::None, Some(message)) => (message.clone(), self.palette.message()),
             (Prompt::None, None) => (keys.into(), self.palette.rule()),
         };
-        to.set_stringn(area.x, area.y, text, area.width.into(), style);
+        put(to, area, &text, style);
+    }
+}
+
+/// A text in the first line of a place, cut to its width. On a small terminal a place may be empty.
+fn put(to: &mut Buffer, place: Rect, text: &str, style: Style) {
+    if !place.is_empty() {
+        to.set_stringn(place.x, place.y, text, place.width.into(), style);
     }
 }
 
@@ -214,14 +215,13 @@ fn pad(text: &str, width: u16, right: bool) -> String {
     if right { format!("{text:>width$}") } else { format!("{text:<width$}") }
 }
 
+/// A line of the table.
 fn line(to: &mut Buffer, place: Rect, mark: &str, cells: impl Iterator<Item = (String, Style)>) {
-    to.set_stringn(place.x, place.y, mark, place.width.into(), Style::new());
+    put(to, place, mark, Style::new());
     let mut x = place.x + MARK;
     for (text, style) in cells {
-        if x >= place.right() {
-            return;
-        }
-        (x, _) = to.set_stringn(x, place.y, text, (place.right() - x).into(), style);
-        x += 1;
+        let rest = Rect { x, width: place.right().saturating_sub(x), ..place };
+        put(to, rest, &text, style);
+        x += text.chars().count() as u16 + 1;
     }
 }

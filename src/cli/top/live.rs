@@ -3,7 +3,7 @@
 use super::super::target::Running;
 use super::app::{Action, App, Screen};
 use super::calls::{Answer, Calls};
-use super::details::{self, Offered};
+use super::details;
 use super::draw::{OutputText, View, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
@@ -67,7 +67,6 @@ struct Live {
     output: Output,
     /// Why modules are in error, as they said.
     errors: HashMap<Name, String>,
-    offered: HashMap<Name, Offered>,
 }
 
 impl Live {
@@ -86,7 +85,6 @@ impl Live {
             calls: None,
             output,
             errors: HashMap::new(),
-            offered: HashMap::new(),
         };
         live.join();
         Ok(live)
@@ -103,18 +101,25 @@ impl Live {
     fn watch(&mut self, terminal: &mut DefaultTerminal, stop: impl Fn() -> bool) -> Result<(), Failure> {
         let mut next = Instant::now() + self.interval;
         self.ask();
+        let mut changed = true;
         while !stop() {
-            self.draw(terminal)?;
+            if std::mem::take(&mut changed) {
+                self.draw(terminal)?;
+            }
             let look = if self.calls.as_ref().is_some_and(Calls::waits) { LOOK_WAITING } else { LOOK };
             let wait = if self.app.paused { look } else { look.min(next.saturating_duration_since(Instant::now())) };
-            if event::poll(wait)? && self.event(event::read()?) {
-                return Ok(());
+            if event::poll(wait)? {
+                if self.event(event::read()?) {
+                    return Ok(());
+                }
+                changed = true;
             }
             if Instant::now() >= next && !self.app.paused {
                 next = Instant::now() + self.interval;
                 self.look();
+                changed = true;
             }
-            self.answers();
+            changed |= self.answers();
         }
         Ok(())
     }
@@ -157,7 +162,6 @@ impl Live {
         self.calls.take().map(Calls::close);
         (self.running, self.now, self.earlier) = (running, now, None);
         self.output = Output::new(&self.running.installation);
-        self.offered.clear();
         self.join();
     }
 
@@ -175,10 +179,13 @@ impl Live {
         answers.into_iter().for_each(|answer| self.answer(answer));
     }
 
-    fn answers(&mut self) {
-        let Some(calls) = &mut self.calls else { return };
+    /// Takes the answers that have come; whether there were any.
+    fn answers(&mut self) -> bool {
+        let Some(calls) = &mut self.calls else { return false };
         let answers = calls.poll(&self.running);
+        let some = !answers.is_empty();
         answers.into_iter().for_each(|answer| self.answer(answer));
+        some
     }
 
     fn answer(&mut self, answer: Answer) {
@@ -194,12 +201,8 @@ impl Live {
                     self.ask();
                 }
             }
-            Answer::Description(name, description) => {
-                let offered = description.map_or_else(Offered::Unknown, Offered::Known);
-                self.offered.insert(name, offered);
-            }
-            Answer::Why(name, status) => {
-                self.errors.insert(name, status.error);
+            Answer::Why(name, error) => {
+                self.errors.insert(name, error);
                 self.make_model();
             }
         }
@@ -236,24 +239,20 @@ impl Live {
                 answers.extend(calls.switch(&self.running, name, on));
             }
             Action::Restart(_) => {}
-            Action::Describe(name) => {
-                let faces = self.now.survey.module(name).map(|module| module.faces.clone()).unwrap_or_default();
-                for face in std::iter::once(name).chain(faces) {
-                    self.offered.insert(face, Offered::Asked);
-                    answers.extend(calls.describe(&self.running, face));
-                }
-            }
         }
         answers.into_iter().for_each(|answer| self.answer(answer));
     }
 
     fn draw(&mut self, terminal: &mut DefaultTerminal) -> Result<(), Failure> {
         let details = match self.app.screen {
-            Screen::Details(name) => details::page(&self.running, &self.now, &self.model, name, &self.offered),
+            Screen::Details(name) => {
+                let noted = |face| self.running.noted(face).ok();
+                details::page(&self.running.installation, &self.now, &self.model, name, noted)
+            }
             Screen::Table | Screen::Help => Vec::new(),
         };
         self.app.columns = columns(&self.model, terminal.size()?.width).into_iter().map(|(column, _)| column).collect();
-        let output: Vec<OutputText> = self.output.shown(&self.running, self.app.lines);
+        let output: Vec<OutputText> = self.output.shown(&self.running.installation, self.app.lines);
         let view = View {
             model: &self.model,
             app: &self.app,

@@ -19,6 +19,8 @@ mod output;
 mod palette;
 mod process;
 mod sample;
+#[cfg(test)]
+mod tests;
 mod text;
 
 use super::target::Target;

@@ -1,5 +1,6 @@
 //! What `top` shows: two looks at a node, made into one table. Pure; also what `--json` prints.
 
+use super::super::list::{MailboxLine, mailbox_lines};
 use super::super::summary::ModuleLine;
 use super::process::Usage;
 use rohrpost::Name;
@@ -18,6 +19,8 @@ pub(super) struct Sample {
     /// By process id.
     pub(super) usage: HashMap<u32, Usage>,
     pub(super) time: TimeNow,
+    /// On the monotonic clock.
+    pub(super) at_ns: u64,
     /// Whether a launch watches over the node.
     pub(super) launched: bool,
 }
@@ -46,9 +49,11 @@ pub(super) struct Model {
     /// Number of modules by state.
     pub(super) states: BTreeMap<String, usize>,
     pub(super) received_per_s: Option<f64>,
+    pub(super) lost: u64,
     #[serde(flatten)]
     pub(super) losses: Losses,
     pub(super) modules: Vec<Row>,
+    pub(super) mailboxes: Vec<MailboxLine>,
 }
 
 /// A module.
@@ -68,6 +73,8 @@ pub(super) struct Row {
     /// What the packages waited that it took in the interval; none when it took none.
     pub(super) waited_p50_ns: Option<u64>,
     pub(super) waited_p99_ns: Option<u64>,
+    /// Since its process joined the node.
+    pub(super) uptime_s: Option<f64>,
     /// Share of one processor.
     pub(super) cpu_percent: Option<f64>,
     pub(super) memory_bytes: Option<u64>,
@@ -114,6 +121,10 @@ impl Model {
                 sent_per_s: before.and_then(|(before, interval)| sent_per_s(module, before, interval)),
                 waited_p50_ns: quantile(0.5),
                 waited_p99_ns: quantile(0.99),
+                uptime_s: module
+                    .process
+                    .as_ref()
+                    .map(|process| now.at_ns.saturating_sub(process.joined_ns) as f64 / 1e9),
                 cpu_percent: line.pid.zip(earlier).and_then(|(pid, earlier)| cpu_percent(pid, now, earlier)),
                 memory_bytes: line.pid.and_then(|pid| now.usage.get(&pid)).map(|usage| usage.memory_bytes),
                 sends_to: peers(installation, now, earlier, |flow| (flow.module == module.name).then_some(flow.to)),
@@ -138,8 +149,10 @@ impl Model {
             interval_s: interval.map(|interval| interval.as_secs_f64()),
             states,
             received_per_s: since.map(|(before, interval)| per_s(received(now), received(before), interval)),
+            lost: lost(now).iter().sum(),
             losses: Losses::new(&lost(now), since.map(|(before, interval)| (lost(before).iter().sum(), interval))),
             modules,
+            mailboxes: mailbox_lines(installation, &now.survey.mailboxes),
         }
     }
 
@@ -158,11 +171,6 @@ impl Losses {
             lost_by_cause: causes.filter(|(_, lost)| *lost > 0).collect(),
             lost_per_s: before.map(|(before, interval)| per_s(lost, before, interval)),
         }
-    }
-
-    /// For any cause.
-    pub(super) fn sum(&self) -> u64 {
-        self.lost_by_cause.values().sum()
     }
 }
 

@@ -1,6 +1,5 @@
 //! The newest output lines, followed in the collector's ring.
 
-use super::super::target::Running;
 use super::app::LineFilter;
 use super::draw::OutputText;
 use rohrpost::Name;
@@ -67,16 +66,16 @@ impl Output {
     }
 
     /// The newest lines that pass, as they are shown.
-    pub(super) fn shown(&self, running: &Running, filter: LineFilter) -> Vec<OutputText> {
+    pub(super) fn shown(&self, installation: &Installation, filter: LineFilter) -> Vec<OutputText> {
         let passing = self.lines.iter().rev().filter(|line| filter.passes(line)).take(SHOWN);
-        let mut shown: Vec<OutputText> = passing.map(|line| shown(running, line)).collect();
+        let mut shown: Vec<OutputText> = passing.map(|line| shown(installation, line)).collect();
         shown.reverse();
         shown
     }
 }
 
-fn shown(running: &Running, line: &OutputLine) -> OutputText {
+fn shown(installation: &Installation, line: &OutputLine) -> OutputText {
     let lost = if line.lost > 0 { format!("({} lines lost) ", line.lost) } else { String::new() };
-    let (time, level, module) = (line.time_text(), line.level.name(), running.text(line.module()));
+    let (time, level, module) = (line.time_text(), line.level.name(), installation.classes.format(line.module()));
     OutputText { level: line.level, text: format!("{time} {level:5} {module}: {lost}{}", line.text) }
 }

@@ -5,7 +5,7 @@ use super::super::summary::module_lines;
 use super::super::target::Running;
 use super::model::{Sample, TimeNow};
 use super::process::Usage;
-use rohrpost::mailbox::SystemClock;
+use rohrpost::mailbox::{SystemClock, monotonic_ns};
 use rohrpost::survey::Survey;
 
 /// Looks at a node; `earlier` makes rates.
@@ -21,5 +21,6 @@ pub(super) fn take(running: &Running, earlier: Option<&Sample>) -> Result<Sample
         time_source: record.map_or("local", |record| record.source.name()),
         time_pace: record.map_or(1.0, |record| record.pace_ppb as f64 / 1e9),
     };
-    Ok(Sample { survey, lines, usage, time, launched: running.node.launcher().is_some() })
+    let launched = running.node.launcher().is_some();
+    Ok(Sample { survey, lines, usage, time, at_ns: monotonic_ns(), launched })
 }

@@ -1,7 +1,7 @@
 //! Texts of the screen: dates, long lines, the help.
 
 use super::super::table;
-use super::columns::{Column, short};
+use super::columns::{Column, severity, short};
 use super::model::Model;
 
 /// A moment as `2026-11-21 10:40:12` (UTC).
@@ -67,20 +67,22 @@ pub(super) fn head(model: &Model) -> [String; 2] {
     if !model.launched {
         first.push("NOT LAUNCHED".into());
     }
-    let states: Vec<String> = model.states.iter().map(|(state, count)| format!("{count} {state}")).collect();
+    let mut states: Vec<(&String, &usize)> = model.states.iter().collect();
+    states.sort_by_key(|(state, _)| severity(state));
+    let states: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
     let number = |number: Option<f64>| number.map_or("-".into(), short);
     let mut second = vec![
         format!("{} modules: {}", model.modules.len(), states.join(", ")),
         format!("{} packages/s", number(model.received_per_s)),
-        format!("{} lost", model.losses.sum()),
+        format!("{} lost", model.lost),
     ];
-    if model.losses.sum() > 0 {
+    if model.lost > 0 {
         second.push(format!("{} lost/s", number(model.losses.lost_per_s)));
     }
     [first.join("   "), second.join("   ")]
 }
 
-const KEYS: [(&str, &str); 15] = [
+const KEYS: [(&str, &str); 12] = [
     ("arrows, j k", "select a module; g and G the first and the last"),
     ("Enter", "details of the module; Esc goes back"),
     ("o", "switch it on"),
@@ -93,10 +95,10 @@ const KEYS: [(&str, &str); 15] = [
     ("p", "pause: the screen stays as it is; p goes on"),
     ("?", "this help"),
     ("q, Ctrl-C", "end"),
-    ("", ""),
-    ("", "Rates and waiting times are those of the last interval. Counters are read from shared memory: looking"),
-    ("", "changes nothing. Output lines come from the collector, which is asked for new ones once an interval."),
 ];
+
+const WHAT: &str = "  Rates and waiting times are those of the last interval. They are read from shared memory, which \
+    disturbs nobody. For its new lines the collector of output is asked once an interval.";
 
 /// All keys and all columns.
 pub(super) fn help() -> Vec<String> {
@@ -104,6 +106,7 @@ pub(super) fn help() -> Vec<String> {
     lines.extend(KEYS.iter().map(|(key, text)| format!("  {key:<12} {text}")));
     lines.extend(["".into(), "columns; narrow terminals have fewer".into()]);
     lines.extend(Column::ALL.iter().map(|column| format!("  {:<12} {}", column.head(), column.text())));
+    lines.extend(["".into(), "what is shown".into(), WHAT.into()]);
     lines
 }
 

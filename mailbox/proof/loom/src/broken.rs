@@ -11,6 +11,11 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("displacing_keeps_the_order", 2),
     ("who_outranks_all_is_not_refused", 3),
     ("two_displace_two", 3),
+    ("the_newest_replaces_what_waits", 2),
+    ("the_newest_reuses_the_only_slot", 2),
+    ("the_newest_keeps_its_place", 2),
+    ("who_is_displaced_is_not_replaced_too", 2),
+    ("a_retired_mailbox_counts_the_replaced", 3),
     ("no_wake_up_is_lost", 3),
     ("no_wake_up_is_lost_between_two", 2),
     ("no_wake_up_is_lost_when_displaced", 2),
@@ -23,6 +28,9 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_sender_dies_without_its_hint", 2),
     ("a_sender_dies_after_its_hint", 2),
     ("a_displacer_dies", 2),
+    ("a_replacer_dies_before_the_old_one_goes", 2),
+    ("a_replacer_dies_when_the_old_one_is_gone", 2),
+    ("a_replacer_dies_in_the_only_slot", 2),
     ("a_package_without_hint_is_found_in_turn", 3),
     ("a_package_in_dead_hands_is_delivered_once_more", 2),
 ];
@@ -134,8 +142,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
                 "slots",
-                "        let word = Word::ready(priority, ticket);\n",
-                "        let word = Word::ready(priority, ticket);\n        self.hint(slot);\n",
+                "        let word = Word::ready(priority, claim.place.unwrap_or(ticket));\n",
+                "        let word = Word::ready(priority, claim.place.unwrap_or(ticket));\n        self.hint(slot);\n",
             ),
         ],
         caught_by: "everything_arrives_once_and_in_order",
@@ -290,6 +298,109 @@ pub(crate) const BROKEN: &[Broken] = &[
         )],
         caught_by: "two_displace_two",
         says: WRONG,
+    },
+    // ---- only the newest ----
+    // The receiver has it in hand: it is received and counted as replaced, and its slot is freed under it.
+    Broken {
+        name: "replace_without_compare",
+        edits: &[edit(
+            "slots",
+            "if self.change(old.slot, old.word, FREE) {",
+            "if { self.word(old.slot).swap(FREE.0, Ordering::AcqRel); true } {",
+        )],
+        caught_by: "the_newest_replaces_what_waits",
+        says: WRONG,
+    },
+    // The same in a full mailbox.
+    Broken {
+        name: "reuse_without_compare",
+        edits: &[edit(
+            "slots",
+            "let reused = self.change(old.slot, old.word, word);",
+            "let reused = { self.word(old.slot).swap(word.0, Ordering::AcqRel); true };",
+        )],
+        caught_by: "the_newest_reuses_the_only_slot",
+        says: WRONG,
+    },
+    // Received, and counted as replaced.
+    Broken {
+        name: "counted_though_it_was_received",
+        edits: &[edit(
+            "slots",
+            "self.change(claim.slot, marked, claim.word);",
+            "if true { return Some(Claim { word: marked, ..claim }); }",
+        )],
+        caught_by: "the_newest_replaces_what_waits",
+        says: WRONG,
+    },
+    // The older one waits still, and is received after the newer or before it, but beside it.
+    Broken {
+        name: "nothing_is_replaced",
+        edits: &[edit(
+            "slots",
+            "        let State::Filling { by, .. } = claim.word.state() else { return None };",
+            "        let State::Filling { by, .. } = claim.word.state() else { return None };\n        if true { return None; }",
+        )],
+        caught_by: "the_newest_keeps_its_place",
+        says: WRONG,
+    },
+    // In a hurry: published beside the older one, in the same place of the order, and which of them goes first is chance.
+    Broken {
+        name: "replaced_after_publishing",
+        edits: &[
+            edit(
+                "rig",
+                "if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {",
+                "let late = self.last;\n        if let Some(instead) = None {",
+            ),
+            edit("slots", "unwrap_or(ticket)", "unwrap_or(0)"),
+            edit(
+                "rig",
+                "                self.last = (self.full == Full::Latest).then_some(posted);",
+                "                if let Some(old) = late {\n                    if slots.take(old.slot, old.word).map(|old| slots.release(old)).is_some() {\n                        self.mailbox.count(Victim { priority: Priority(priority), replaced: true });\n                    }\n                }\n                self.last = (self.full == Full::Latest).then_some(posted);",
+            ),
+        ],
+        caught_by: "the_newest_replaces_what_waits",
+        says: WRONG,
+    },
+    // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
+    Broken {
+        name: "the_newest_goes_to_the_end",
+        edits: &[edit("slots", "claim.place.unwrap_or(ticket)", "ticket")],
+        caught_by: "the_newest_keeps_its_place",
+        says: WRONG,
+    },
+    // The older one is gone, and who dies now has told nobody.
+    Broken {
+        name: "replaces_unmarked",
+        edits: &[edit(
+            "slots",
+            "let marked = Word::filling(by, Some(old.as_victim()));",
+            "let marked = Word::filling(by, None);",
+        )],
+        caught_by: "a_replacer_dies_when_the_old_one_is_gone",
+        says: "hidden",
+    },
+    Broken {
+        name: "reuses_unmarked",
+        edits: &[edit(
+            "slots",
+            "let word = Word::filling(by, Some(old.as_victim()));",
+            "let word = Word::filling(by, None);",
+        )],
+        caught_by: "a_replacer_dies_in_the_only_slot",
+        says: "hidden",
+    },
+    // The counters went on elsewhere between replacing and counting.
+    Broken {
+        name: "settles_no_replaced",
+        edits: &[edit(
+            "slots",
+            "lost(victim);\n                step!(\"settle: counted\");",
+            "if !victim.replaced { lost(victim); }\n                step!(\"settle: counted\");",
+        )],
+        caught_by: "a_retired_mailbox_counts_the_replaced",
+        says: "hidden",
     },
     // ---- sleeping ----
     // Neither sees the other: the sender reads the old `sleeping`, the receiver the old hints.

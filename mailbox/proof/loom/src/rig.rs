@@ -5,10 +5,10 @@
 
 use crate::name::Priority;
 use crate::queue::Queue;
-use crate::slots::{Full, HINT_WORDS, Hot, NoSlot, Published, Slots};
+use crate::slots::{Full, HINT_WORDS, Hot, NoSlot, Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
-use crate::word::{Claimant, FREE, Word};
+use crate::word::{Claimant, FREE, Victim, Word};
 use loom::cell::UnsafeCell;
 use loom::thread::{self, JoinHandle};
 use std::sync::{Arc, Mutex};
@@ -23,8 +23,8 @@ pub(super) struct Mailbox {
     pub(super) other: AtomicU32,
     /// One bit for each dead participant.
     pub(super) dead: AtomicU32,
-    /// Priorities counted as displaced. Not loom's, so that counting adds no order to the model.
-    pub(super) displaced: Mutex<Vec<u8>>,
+    /// Counted as having lost their place. Not loom's, so that counting adds no order to the model.
+    victims: Mutex<Vec<Victim>>,
 }
 
 // SAFETY: the bodies are the only part that is not Sync by itself, and loom reports every race on them.
@@ -46,7 +46,7 @@ impl Mailbox {
             bell: AtomicU32::new(0),
             other: AtomicU32::new(0),
             dead: AtomicU32::new(0),
-            displaced: Mutex::default(),
+            victims: Mutex::default(),
         })
     }
 
@@ -55,7 +55,7 @@ impl Mailbox {
     }
 
     pub(super) fn sender(&self, participant: u16, full: Full) -> Sender<'_> {
-        Sender { mailbox: self, by: Claimant { participant, incarnation: 1 }, cursor: 0, full }
+        Sender { mailbox: self, by: Claimant { participant, incarnation: 1 }, cursor: 0, full, last: None }
     }
 
     pub(super) fn receiver(&self) -> Receiver<'_> {
@@ -68,17 +68,18 @@ impl Mailbox {
         thread::spawn(move || mailbox.sender(participant, full).send_all(packages))
     }
 
-    /// A sender that dies at this step of sending one package.
+    /// A sender that dies at this step of sending these packages.
     pub(super) fn dies_sending(
         self: &Arc<Self>,
         participant: u16,
+        full: Full,
         step: &'static str,
-        package: &'static (u8, u8),
+        packages: &'static [(u8, u8)],
     ) -> JoinHandle<bool> {
         let mailbox = self.clone();
         thread::spawn(move || {
             let died = dies_at(step, || {
-                mailbox.sender(participant, Full::Displace).send(package.0, package.1);
+                mailbox.sender(participant, full).send_all(packages);
             });
             // The kernel releases the lock by which others see it alive.
             mailbox.dead.fetch_or(u32::from(died) << participant, Ordering::Release);
@@ -90,12 +91,18 @@ impl Mailbox {
         self.dead.load(Ordering::Acquire) >> by.participant & 1 != 0
     }
 
-    pub(super) fn count_displaced(&self, priority: Priority) {
-        self.displaced.lock().unwrap().push(priority.0);
+    pub(super) fn count(&self, victim: Victim) {
+        self.victims.lock().unwrap().push(victim);
     }
 
+    /// Priorities of those that gave way to more important ones.
     pub(super) fn displaced(&self) -> Vec<u8> {
-        self.displaced.lock().unwrap().clone()
+        self.victims.lock().unwrap().iter().filter(|victim| !victim.replaced).map(|victim| victim.priority.0).collect()
+    }
+
+    /// How many gave way to their sender's newer ones.
+    pub(super) fn replaced(&self) -> usize {
+        self.victims.lock().unwrap().iter().filter(|victim| victim.replaced).count()
     }
 
     pub(super) fn all_free(&self) -> bool {
@@ -127,12 +134,14 @@ pub(super) struct Sender<'a> {
     pub(super) by: Claimant,
     pub(super) cursor: usize,
     pub(super) full: Full,
+    /// The last package: all that one sender sends here is of one state.
+    pub(super) last: Option<Posted>,
 }
 
 impl Sender<'_> {
     pub(super) fn send(&mut self, priority: u8, body: u8) -> Sent {
         let slots = self.mailbox.slots();
-        let claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full) {
+        let mut claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full, self.last) {
             Ok(claim) => claim,
             Err(NoSlot::Full) => return Sent::Refused,
             Err(NoSlot::Retired) => return Sent::Retired,
@@ -140,9 +149,14 @@ impl Sender<'_> {
         let cell = &self.mailbox.bodies[claim.slot];
         // SAFETY: the claim is ours; if that were wrong, loom would tell.
         cell.with_mut(|cell| unsafe { *cell = body });
-        claim.displaced().into_iter().for_each(|priority| self.mailbox.count_displaced(priority));
+        claim.victim().into_iter().for_each(|victim| self.mailbox.count(victim));
+        if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {
+            claim = instead;
+            claim.victim().into_iter().for_each(|victim| self.mailbox.count(victim));
+        }
         match slots.publish(claim, Priority(priority)) {
-            Published::Accepted { wake } => {
+            Published::Accepted { posted, wake } => {
+                self.last = (self.full == Full::Latest).then_some(posted);
                 if wake {
                     self.mailbox.ring();
                 }
@@ -219,7 +233,7 @@ impl Receiver<'_> {
     pub(super) fn search(&mut self) -> usize {
         let slots = self.mailbox.slots();
         reached("search: before");
-        let freed = slots.reclaim(|by| self.mailbox.is_dead(by), |priority| self.mailbox.count_displaced(priority));
+        let freed = slots.reclaim(|by| self.mailbox.is_dead(by), |victim| self.mailbox.count(victim));
         self.queue.rescan(&slots);
         freed
     }
