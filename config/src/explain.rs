@@ -196,8 +196,13 @@ impl Page<'_> {
         self.line("GUI");
         self.line("");
         for show in show {
-            let rate = show.rate.map_or("each that comes".into(), |rate| format!("at most {rate} a second"));
-            self.entry("shows", &format!("{} of {}, {rate}", show.data, self.name(show.from)));
+            let rate = match show.rate {
+                Some(rate) if rate > 0.0 => format!("at most {rate} a second"),
+                Some(_) => "each that comes".into(),
+                None => "as often as its view wants".into(),
+            };
+            let data = show.data.as_deref().unwrap_or("all that has a view");
+            self.entry("shows", &format!("{data} of {}, {rate}", self.name(show.from)));
         }
     }
 
