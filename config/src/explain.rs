@@ -242,7 +242,11 @@ fn starts(module: &Module) -> String {
         Start::Off => "off, until it is switched on",
     };
     let (ready, stop) = (duration_text(module.ready_within), duration_text(module.stop_within));
-    format!("{state}; must be ready within {ready}, has {stop} to stop")
+    let mut words = format!("{state}; must be ready within {ready}, has {stop} to stop");
+    if !module.spin.is_zero() {
+        let _ = write!(words, "; spins for {}", duration_text(module.spin));
+    }
+    words
 }
 
 fn restart(restart: &Restart) -> String {

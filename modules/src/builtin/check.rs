@@ -76,8 +76,9 @@ pub(super) fn saved<M: Module<Settings: Settings>>(
     module: &Configured,
 ) -> Option<SettingsError> {
     let saved = installation.saved.as_ref()?;
-    let settings: Result<M::Settings, _> = installation.settings_as(module);
-    settings.and_then(|settings| saved.check_names(installation, module, settings.parameters())).err()
+    let settings: M::Settings = installation.settings_without_saved(module).ok()?;
+    let names = saved.check_names(installation, module, settings.parameters());
+    names.and_then(|()| installation.settings_as::<M::Settings>(module).map(drop)).err()
 }
 
 /// What a built-in module would refuse.
