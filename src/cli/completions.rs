@@ -12,7 +12,7 @@ use clap::{Arg, Command, CommandFactory, ValueEnum};
 use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCandidate, PathCompleter};
 use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
 use rohrpost::common::OutputLevel;
-use rohrpost::config::{BUILTINS, Installation};
+use rohrpost::config::Installation;
 use rohrpost::description::Description;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -74,7 +74,6 @@ fn completed(command: &str, arg: Arg) -> Arg {
     match (command, arg.get_id().as_str()) {
         // A name that there is not yet.
         ("new", _) => arg,
-        (_, "builtin") => from(arg, || BUILTINS.iter().map(CompletionCandidate::new).collect()),
         (_, "name" | "names" | "module" | "modules") => from(arg, modules),
         (_, "node") => from(arg, nodes),
         (_, "function") => from(arg, functions),
