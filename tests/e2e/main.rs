@@ -18,6 +18,7 @@ mod once;
 mod once_wrap;
 mod output;
 mod output_log;
+mod printed;
 mod probe;
 mod process;
 mod readme;
