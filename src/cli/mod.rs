@@ -13,6 +13,7 @@ mod hz;
 mod launch;
 mod list;
 mod log;
+mod manager;
 mod param;
 mod ping;
 mod run;

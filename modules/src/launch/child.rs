@@ -212,6 +212,10 @@ impl Child {
         if self.lives == 0 || !self.turn_on {
             command.env(environment::OFF, "1");
         }
+        // Launch alone speaks to the service manager.
+        for variable in ["NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "JOURNAL_STREAM"] {
+            command.env_remove(variable);
+        }
         command
             .args(&self.arguments)
             .env(environment::CONFIG, &self.config)

@@ -315,6 +315,11 @@ impl Launch {
         self.children.iter().find(|child| child.name() == name).map(Child::phase)
     }
 
+    /// Where launch stands with each module, by its name.
+    pub fn phases(&self) -> impl Iterator<Item = (&str, Phase)> {
+        self.children.iter().map(|child| (child.text(), child.phase()))
+    }
+
     /// How often a module was started again.
     pub fn restarts(&self, name: Name) -> u32 {
         self.children.iter().find(|child| child.name() == name).map_or(0, Child::restarts)
