@@ -89,7 +89,8 @@ impl View {
     fn began(&self, launch: &Launch, node: &str) {
         if !self.live {
             let modules = launch.phases().count();
-            let line = format!("node {node} of {} runs: {modules} modules", launch.installation().name);
+            let word = if modules == 1 { "module" } else { "modules" };
+            let line = format!("node {node} of {} runs: {modules} {word}", launch.installation().name);
             say_all(&[line]);
         }
     }
