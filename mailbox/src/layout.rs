@@ -22,7 +22,7 @@ use std::time::Duration;
 /// `rohrpost` in ASCII, little-endian.
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"rohrpost");
 /// Raised with every change of a layout in shared memory.
-pub(crate) const VERSION: u32 = 2;
+pub const VERSION: u32 = 2;
 pub(crate) const PAGE: usize = 4096;
 /// Bytes of a slot before its body: time of publishing and head.
 pub(crate) const SLOT_PREFIX: usize = 8 + HEAD_BYTES;
@@ -139,6 +139,13 @@ impl Identity {
         self.claims.store(u32::from(shape.claims), Relaxed);
         self.max_age_ns.store(shape.max_age.map_or(0, stored_ns), Relaxed);
         self.magic.store(MAGIC, std::sync::atomic::Ordering::Release);
+    }
+
+    /// The version of the layout, if it is not ours.
+    pub(crate) fn other_version(&self) -> Option<u32> {
+        use std::sync::atomic::Ordering::{Acquire, Relaxed};
+        let version = (self.magic.load(Acquire) == MAGIC).then(|| self.version.load(Relaxed));
+        version.filter(|version| *version != VERSION)
     }
 
     /// What the segment claims to be; none when that cannot be. Another process wrote it, so everything is checked here,

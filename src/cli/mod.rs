@@ -4,9 +4,11 @@ mod bw;
 mod call;
 mod check;
 mod clean;
+mod completions;
 mod control;
 mod delay;
 mod demo;
+mod doctor;
 mod echo;
 mod graph;
 mod hz;
@@ -14,6 +16,7 @@ mod launch;
 mod list;
 mod log;
 mod manager;
+mod new;
 mod param;
 mod ping;
 mod run;
@@ -23,6 +26,7 @@ mod summary;
 mod table;
 mod target;
 mod top;
+mod version;
 mod watch;
 
 use clap::{Parser, Subcommand};
@@ -33,7 +37,7 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Prioritised mailboxes for robots: check a configuration, launch it, look at it, call it.
 #[derive(Parser)]
-#[command(name = "rohrpost", version, after_help = "Try `rohrpost demo`, then in another terminal `rohrpost list`.")]
+#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost list`.")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -81,12 +85,21 @@ enum Command {
     Param(param::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
+    /// Look whether this computer lets a robot run in time.
+    Doctor(doctor::Arguments),
+    /// Begin a module of your own: a project that compiles, runs and has a test.
+    New(new::Arguments),
+    /// Print a script by which a shell completes commands, modules, functions and data.
+    Completions(completions::Arguments),
+    /// Print versions: of this program, and of what it shares with others.
+    Version(version::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
 }
 
 /// Runs the command that was typed.
 pub(crate) fn main() -> ExitCode {
+    completions::answer();
     let result = match Arguments::parse().command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),
@@ -108,6 +121,10 @@ pub(crate) fn main() -> ExitCode {
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
+        Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {

@@ -8,17 +8,22 @@
 
 mod boot;
 mod check;
+mod completions;
 mod control;
 mod crash;
 mod demo;
+mod doctor;
 mod harness;
 mod launch;
 mod mailboxes;
+mod measure;
+mod new;
 mod nodes;
 mod once;
 mod once_wrap;
 mod output;
 mod output_log;
+mod param;
 mod printed;
 mod probe;
 mod process;
@@ -28,3 +33,5 @@ mod screen;
 mod start;
 mod tools;
 mod tools_data;
+mod tuned;
+mod versions;
