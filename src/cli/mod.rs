@@ -15,6 +15,7 @@ mod hz;
 mod launch;
 mod list;
 mod log;
+mod manager;
 mod new;
 mod param;
 mod ping;

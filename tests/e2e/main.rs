@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod boot;
 mod check;
 mod completions;
 mod control;
@@ -23,6 +24,7 @@ mod once_wrap;
 mod output;
 mod output_log;
 mod param;
+mod printed;
 mod probe;
 mod process;
 mod readme;
