@@ -63,7 +63,8 @@ pub use rohrpost_modules::runtime::{
     find_running,
 };
 pub use rohrpost_modules::{
-    Module, ModuleError, common, data, description, interface, interfaces, launch, output, run, survey, types, value,
+    Module, ModuleError, choice, common, data, description, interface, interfaces, launch, output, parameter,
+    parameters, run, survey, types, value,
 };
 
 /// The tools of the field that our interfaces and types speak: spans and events become output lines.

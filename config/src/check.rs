@@ -1,24 +1,131 @@
 //! Rules across modules.
 
+use crate::flow::Flow;
 use crate::installation::Installation;
-use crate::mailbox::MailboxLines;
-use crate::module::Module;
+use crate::module::{Lines, Module};
 use crate::reader::Reader;
+use crate::units::{duration_text, size_text};
+use rohrpost_mailbox::Name;
 
 /// Tools that may be inside a module's command mailbox at the same time.
 const TOOLS: usize = 2;
 
+/// Most bytes a second that a flow may ask for: past it, somebody has mistaken a unit.
+const FLOW_BYTES_MAX: u64 = 1 << 30;
+
+/// Judges all that takes more than one module to see; `lines` are those of the modules.
+pub(crate) fn across(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
+    claims(installation, lines, reader);
+    for (module, lines) in installation.modules.iter().zip(lines) {
+        for (to, line) in module.calls.iter().zip(&lines.calls) {
+            importance(installation, module, *to, *line, reader);
+        }
+    }
+    for flow in &installation.flows {
+        self::flow(installation, flow, lines, reader);
+    }
+}
+
+/// Who waits for a less important module waits for all that goes before that one, too.
+fn importance(installation: &Installation, module: &Module, to: Name, line: usize, reader: &Reader<'_>) {
+    let classes = &installation.classes;
+    // What the kernel and the mailboxes know is the class of the process, not of a face.
+    let Some(host) = installation.module(to) else { return };
+    let (own, other) = (module.name.class(), host.name.class());
+    let although = module.although.iter().any(|(name, _)| *name == to);
+    let (name, called) = (classes.format(module.name), classes.format(to));
+    if other < own && !although {
+        let in_process = if host.name == to {
+            String::new()
+        } else {
+            format!(" (in the process of `{}`)", classes.format(host.name))
+        };
+        reader.report(
+            line,
+            format!(
+                "module `{name}`, of priority {}, calls `{called}`, of priority {}{in_process}: it would wait for \
+                 something that all others go before; give one of them another class, or say why it may: \
+                 `{{ to = \"{called}\", although = \"…\" }}`",
+                own.0, other.0
+            ),
+        );
+    }
+    if other >= own && although {
+        reader.report(
+            line,
+            format!(
+                "module `{name}`: `although` for `{called}` excuses nothing, since its priority {} is not below {}; \
+                 write \"{called}\" alone",
+                other.0, own.0
+            ),
+        );
+    }
+}
+
+/// A flow is one that can be: between two processes of which one calls the other, and into a mailbox that holds it.
+fn flow(installation: &Installation, flow: &Flow, lines: &[Lines], reader: &Reader<'_>) {
+    let (Some(from), Some(to)) = (installation.module(flow.from), installation.module(flow.to)) else { return };
+    let (from_text, to_text) = (installation.classes.format(flow.from), installation.classes.format(flow.to));
+    let what = format!("[[flow]] from `{from_text}` to `{to_text}`");
+    if from.name == to.name {
+        reader.report(flow.line, format!("{what}: both are the process of one module; drop the flow"));
+        return;
+    }
+    let bytes_a_second = u128::from(flow.size) * 1_000_000_000 / flow.period.as_nanos().max(1);
+    if bytes_a_second > u128::from(FLOW_BYTES_MAX) {
+        reader.report(
+            flow.line,
+            format!(
+                "{what}: {} each {} are more than {} a second, which no module can send; write a longer `period`",
+                size_text(flow.size.into()),
+                duration_text(flow.period),
+                size_text(FLOW_BYTES_MAX)
+            ),
+        );
+    }
+    // What was subscribed to comes into `data`, a command into `commands`. If each calls the other, it may be either.
+    let ways = [(calls(from, to), 0), (calls(to, from), 2)];
+    let mut boxes =
+        ways.iter().filter(|(way, _)| *way).map(|(_, index)| (to.mailboxes.each()[*index], *index)).peekable();
+    if boxes.peek().is_none() {
+        reader.report(
+            flow.line,
+            format!(
+                "{what}: neither calls the other, so nothing passes; add \"{from_text}\" to `calls` of the module \
+                 that has `{to_text}` if it subscribes, \"{to_text}\" to `calls` of the other if it sends commands"
+            ),
+        );
+        return;
+    }
+    let largest = boxes.max_by_key(|((_, spec), _)| spec.size);
+    if let Some(((key, spec), index)) = largest.filter(|((_, spec), _)| spec.size < flow.size) {
+        let line = installation.modules.iter().zip(lines).find(|(module, _)| module.name == to.name);
+        reader.report(
+            line.map_or(flow.line, |(_, lines)| lines.mailboxes[index].size),
+            format!(
+                "module `{}`, mailbox `{key}` holds bodies of {}, and the flow from `{from_text}` in line {} sends \
+                 {}; write at least `size = \"{}\"`",
+                installation.classes.format(to.name),
+                size_text(spec.size.into()),
+                flow.line,
+                size_text(flow.size.into()),
+                size_text(flow.size.into())
+            ),
+        );
+    }
+}
+
 /// Each mailbox has more slots than its participants may hold unfinished: else senders that were stopped close it.
-pub(crate) fn claims(installation: &Installation, lines: &[MailboxLines], reader: &Reader<'_>) {
+fn claims(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
     for (module, lines) in installation.modules.iter().zip(lines) {
         let callers = Senders::of(installation, module, |other| calls(other, module));
         let called = Senders::of(installation, module, |other| calls(module, other));
-        for ((key, spec), line) in module.mailboxes.each().into_iter().zip(lines.0) {
+        for ((key, spec), line) in module.mailboxes.each().into_iter().zip(lines.mailboxes) {
             let (senders, tools) = if key == "commands" { (&callers, TOOLS) } else { (&called, 0) };
             let claims = (senders.count() + tools) * usize::from(spec.claims);
             if usize::from(spec.slots) <= claims {
                 reader.report(
-                    line,
+                    line.slots,
                     format!(
                         "module `{}`, mailbox `{key}`: {} may hold {claims} unfinished at once, so that \
                          `slots = {}` could be closed by senders that stopped midway; write at least `slots = {}`{}",

@@ -22,7 +22,8 @@ pub struct Errors {
 }
 
 impl Errors {
-    pub(crate) fn new(path: &Path, mut problems: Vec<Problem>) -> Self {
+    /// The problems of a file, in any order.
+    pub fn new(path: &Path, mut problems: Vec<Problem>) -> Self {
         problems.sort_by_key(|problem| problem.line);
         problems.dedup();
         Self { path: path.to_owned(), problems }

@@ -5,6 +5,8 @@ use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
+use crate::output::LineFormat;
+use crate::saved::SavedValue;
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
@@ -85,6 +87,10 @@ impl Page<'_> {
             TimeSource::Log => "the log that is replayed".into(),
         };
         self.entry("time", &time);
+        if let Some(file) = &self.installation.parameters {
+            let words = format!("values saved in {} go before settings", file.display());
+            self.entry("parameters", &words);
+        }
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
@@ -106,7 +112,7 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let memory = modules.iter().map(|module| memory(module)).sum();
+        let memory = modules.iter().map(|module| module.memory()).sum();
         self.line("");
         self.line(format!("Node `{}`: {}, {} of mailboxes", node.name, count(modules.len(), "module"), about(memory)));
         self.line("");
@@ -114,8 +120,9 @@ impl Page<'_> {
             self.entry("address", address);
         }
         self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
-        let (first, last) = (node.tools.start(), node.tools.end());
-        self.entry("tools", &format!("programs run by hand are tool.{first} to tool.{last}"));
+        let (hand, launch) = (node.tools_by_hand(), node.launch_instance());
+        let (first, last) = (hand.start(), hand.end());
+        self.entry("tools", &format!("launch is tool.{launch}; programs run by hand are tool.{first} to tool.{last}"));
         for module in modules {
             self.module(module);
         }
@@ -132,12 +139,20 @@ impl Page<'_> {
         self.entry("starts", &starts(module));
         self.entry("when it ends", &restart(&module.restart));
         self.entry("calls", &self.names(module.calls.iter().copied()));
+        for (to, why) in &module.although {
+            self.entry("although", &format!("{} is less important: {why}", self.name(*to)));
+        }
         let callers =
             self.installation.modules.iter().filter(|other| module.names().any(|own| other.calls.contains(&own)));
         self.entry("called by", &self.names(callers.map(|caller| caller.name)));
         if !module.settings.is_empty() {
             let settings: Vec<String> = module.settings.iter().map(|(key, value)| format!("{key} = {value}")).collect();
             self.entry("settings", &settings.join(", "));
+        }
+        let values = self.installation.saved.as_ref().map(|saved| saved.values(self.installation, module.name));
+        if let Some(Ok(values)) = values.filter(|values| values.as_ref().is_ok_and(|values| !values.is_empty())) {
+            let text = |saved: &SavedValue<toml::Value>| format!("{} = {}", saved.name, saved.value);
+            self.entry("saved", &values.iter().map(text).collect::<Vec<_>>().join(", "));
         }
         for (key, spec) in module.mailboxes.each() {
             self.entry(key, &mailbox(spec));
@@ -152,12 +167,24 @@ impl Page<'_> {
         for (module, level) in &output.levels {
             let _ = write!(words, "; {} from {}", self.name(*module), level.as_str());
         }
-        if let Some(file) = &output.file {
-            let _ = write!(words, "; written to {} as well", file.display());
-        }
         self.line("Output");
         self.line("");
         self.entry("keeps", &words);
+        let (rate, burst) = (output.rate, output.burst);
+        let words = format!("{rate} lines a second from each module, {burst} at once; errors are counted apart");
+        self.entry("takes", &words);
+        if let Some(file) = &output.file {
+            let format = match output.format {
+                LineFormat::Text => "text",
+                LineFormat::Json => "JSON",
+            };
+            let size = size_text(output.file_size);
+            let kept = count(output.files as usize, "full file");
+            self.entry("writes", &format!("{} as {format}; a new one after {size}, {kept} kept", file.display()));
+        }
+        if output.journal {
+            self.entry("", "the system's journal");
+        }
     }
 
     fn gui(&mut self) {
@@ -242,12 +269,6 @@ fn mailbox(spec: &MailboxSpec) -> String {
         let _ = write!(words, "; {} claims a sender", spec.claims);
     }
     words
-}
-
-/// Bytes of a module's mailboxes; each face has a command mailbox like the module's.
-fn memory(module: &Module) -> u64 {
-    let [commands, replies, data] = module.mailboxes.each().map(|(_, spec)| spec.memory());
-    commands * (1 + module.faces.len() as u64) + replies + data
 }
 
 /// A size in at most four digits.

@@ -29,7 +29,15 @@ impl Gui {
         let Some(section) = section else { return Self::default() };
         let example = "[{ from = \"laser.0\", data = \"scan\", rate = 10.0 }]";
         let items = section.get("show").and_then(|item| item.list(example)).unwrap_or_default();
-        let show = items.iter().filter_map(|item| Show::read(item, directory)).collect();
+        let mut show: Vec<Show> = Vec::new();
+        for item in &items {
+            let Some(read) = Show::read(item, directory) else { continue };
+            if let Some(first) = show.iter().find(|first| (first.from, &first.data) == (read.from, &read.data)) {
+                let from = directory.classes.format(read.from);
+                item.report(format!("`{}` of `{from}` is shown in line {} already; drop one", read.data, first.line));
+            }
+            show.push(read);
+        }
         section.finish();
         Self { show }
     }

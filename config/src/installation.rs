@@ -8,8 +8,9 @@ use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::module::{Context, Module};
 use crate::node::{Node, System};
-use crate::output::Output;
+use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
+use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::time::TimeSource;
 use rohrpost_mailbox::{Class, Name};
@@ -43,31 +44,34 @@ pub struct Installation {
     pub gui: Gui,
     /// What passes regularly between modules.
     pub flows: Vec<Flow>,
+    /// Where values of parameters are saved, if anywhere.
+    pub parameters: Option<PathBuf>,
+    /// What is saved there.
+    pub saved: Option<Saved>,
     pub(crate) scheduling: SchedulingRule,
 }
 
 impl Installation {
-    /// Reads and checks a file.
+    /// Reads and checks a file, and the parameters saved beside it.
     pub fn load(path: &Path) -> Result<Self, Errors> {
         let text = std::fs::read_to_string(path).map_err(|error| {
             let message = format!("cannot be read ({error}); name an installation's file, such as config/demo.toml");
             Errors::new(path, vec![Problem { line: None, message }])
         })?;
-        Self::parse(&text, path)
+        let mut installation = Self::parse(&text, path)?;
+        if let Some(file) = &installation.parameters {
+            installation.saved = Some(Saved::load(file, &installation)?);
+        }
+        Ok(installation)
     }
 
-    /// Checks the text of a file; `path` is its name in messages and the place that relative paths start from.
+    /// Checks the text of a file; `path` is its name in messages and the place that relative paths start from. Saved
+    /// parameters are not read.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Errors> {
         let reader = Reader::new(text);
         let (document, syntax) = DeTable::parse_recoverable(text);
         for error in &syntax {
-            let span = error.span().unwrap_or(0..0);
-            let there = text.get(span.clone()).unwrap_or_default();
-            let message = match error.message() {
-                "duplicate key" => format!("`{there}` is given twice; drop one of them"),
-                message => format!("this is no TOML: {}", message.replace('\n', " ")),
-            };
-            reader.report(reader.line(span), message);
+            reader.report_syntax(error);
         }
         // What the parser made up in place of what it could not read is not worth judging.
         let read = if syntax.is_empty() { read(&reader, document.get_ref(), text, path) } else { None };
@@ -93,6 +97,20 @@ impl Installation {
         self.nodes.iter().find(|node| node.name == name)
     }
 
+    /// The node that a module, a face or a tool belongs to; none for names that the file does not know.
+    pub fn node_of(&self, name: Name) -> Option<&str> {
+        let is_tool = name.class() == self.classes.tool() && name.system() == self.system.id;
+        let tools = || self.nodes.iter().find(|node| is_tool && node.tools.contains(&name.instance()));
+        self.module(name).map(|module| module.node.as_str()).or_else(|| Some(tools()?.name.as_str()))
+    }
+
+    /// From which level on a module sends lines at its start; said of a face, it is said of its module.
+    pub fn output_level(&self, module: Name) -> Level {
+        let names = |own: &Name| self.module(module).is_some_and(|module| module.names().any(|name| name == *own));
+        let own = self.output.levels.iter().find(|(name, _)| *name == module.module() || names(name));
+        own.map_or(self.output.level, |(_, level)| *level)
+    }
+
     /// How the processes of a class are scheduled.
     pub fn scheduling(&self, class: Class) -> Scheduling {
         self.scheduling.of(class)
@@ -111,6 +129,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         _ => PathBuf::from("."),
     };
     let name = file.required("installation", "installation = \"demo\"").and_then(|item| item.word("demo"));
+    let parameters = file.get("parameters").and_then(|item| item.text("tuned.toml")).map(|path| folder.join(path));
     let system = System::read(required(&file, "system", "`[system]` with `name = \"robot\"` and `id = 1`"));
     let classes = ClassTable::read(
         required(&file, "classes", "`[classes]` with lines such as `laser = { id = 150, text = \"Tells distances\" }`"),
@@ -150,9 +169,11 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         output,
         gui,
         flows,
+        parameters,
+        saved: None,
         scheduling,
     };
-    check::claims(&installation, &lines, reader);
+    check::across(&installation, &lines, reader);
     Some(installation)
 }
 

@@ -31,6 +31,7 @@
 //! Every key of the file is described in [`manual`].
 #![forbid(unsafe_code)]
 
+mod calls;
 mod check;
 mod classes;
 mod digest;
@@ -46,12 +47,13 @@ mod node;
 mod output;
 mod program;
 mod reader;
+mod saved;
 mod scheduling;
 mod settings;
 mod time;
 mod units;
 
-pub use classes::{ClassEntry, ClassTable, NameTextError, TOOL};
+pub use classes::{ClassEntry, ClassTable, NameTextError, TOOL, is_word as is_class_name};
 pub use digest::Digest;
 pub use errors::{Errors, Problem};
 pub use explain::explain;
@@ -61,9 +63,11 @@ pub use installation::Installation;
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
 pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
 pub use node::{Node, System};
-pub use output::{Level, Output};
+pub use output::{Level, LineFormat, Output};
 pub use program::{MissingProgram, find_program};
+pub use reader::nearest;
 pub use rohrpost_mailbox::Full;
+pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
 pub use time::TimeSource;

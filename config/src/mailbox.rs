@@ -50,9 +50,15 @@ impl Default for Mailboxes {
     }
 }
 
-/// Lines at which the mailboxes of a module stand, for checks across modules.
+/// Lines at which a mailbox of a module stands, or the module if nothing is said of the mailbox.
 #[derive(Clone, Copy)]
-pub(crate) struct MailboxLines(pub(crate) [usize; 3]);
+pub(crate) struct SpecLines {
+    pub(crate) slots: usize,
+    pub(crate) size: usize,
+}
+
+/// Lines of the three, for checks across modules.
+pub(crate) type MailboxLines = [SpecLines; 3];
 
 impl Mailboxes {
     /// The three, with the names that the file gives them.
@@ -62,12 +68,12 @@ impl Mailboxes {
 
     pub(crate) fn read(section: Option<Section<'_>>, module: &str, module_line: usize) -> (Self, MailboxLines) {
         let mut mailboxes = Self::default();
-        let mut lines = MailboxLines([module_line; 3]);
+        let mut lines = [SpecLines { slots: module_line, size: module_line }; 3];
         let Some(section) = section else { return (mailboxes, lines) };
         let specs = [&mut mailboxes.commands, &mut mailboxes.replies, &mut mailboxes.data];
-        for ((key, spec), line) in ["commands", "replies", "data"].into_iter().zip(specs).zip(&mut lines.0) {
+        for ((key, spec), line) in ["commands", "replies", "data"].into_iter().zip(specs).zip(&mut lines) {
             if let Some(section) = section.section(key, &format!("{module}, mailbox `{key}`")) {
-                *line = section.line;
+                *line = SpecLines { slots: section.line, size: section.line };
                 spec.read(section, line);
             }
         }
@@ -78,13 +84,15 @@ impl Mailboxes {
 
 impl MailboxSpec {
     /// Changes what the section says and keeps the rest.
-    fn read(&mut self, section: Section<'_>, line: &mut usize) {
+    fn read(&mut self, section: Section<'_>, line: &mut SpecLines) {
         if let Some(item) = section.get("slots") {
-            *line = item.line;
+            line.slots = item.line;
             self.slots = item.whole(1..=SLOTS_MAX.into(), self.slots.into()).map_or(self.slots, |slots| slots as u16);
         }
-        let size = section.get("size").and_then(|item| item.size(1..=BODY_BYTES_MAX as u64, "1 KiB"));
-        self.size = size.map_or(self.size, |size| size as u32);
+        if let Some(item) = section.get("size") {
+            line.size = item.line;
+            self.size = item.size(1..=BODY_BYTES_MAX as u64, "1 KiB").map_or(self.size, |size| size as u32);
+        }
         let full = section.get("full").and_then(|item| item.choice(&Full::ALL.map(|full| (full.name(), full))));
         self.full = full.unwrap_or(self.full);
         self.max_age = section.get("max-age").and_then(|item| item.duration_above_zero("2 s"));

@@ -1,5 +1,6 @@
 //! Modules: what runs where, with which settings, and what happens when it ends.
 
+use crate::calls::Calls;
 use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes};
 use crate::node::Node;
@@ -84,6 +85,8 @@ pub struct Module {
     pub optional: bool,
     /// Modules and faces it sends commands to; subscribing is a command too.
     pub calls: Vec<Name>,
+    /// Those of [`calls`](Self::calls) that are of a less important class, and why they may be, in the file's words.
+    pub although: Vec<(Name, String)>,
     /// Settings of its own; [`Installation::settings_as`](crate::Installation::settings_as) gives them a type.
     pub settings: toml::Table,
     /// State after launch.
@@ -109,6 +112,19 @@ impl Module {
     pub fn names(&self) -> impl Iterator<Item = Name> {
         std::iter::once(self.name).chain(self.faces.iter().copied())
     }
+
+    /// Bytes of its mailboxes; each face has a command mailbox like the module's.
+    pub fn memory(&self) -> u64 {
+        let [commands, replies, data] = self.mailboxes.each().map(|(_, spec)| spec.memory());
+        commands * (1 + self.faces.len() as u64) + replies + data
+    }
+}
+
+/// Lines at which parts of a module stand, for checks across modules.
+pub(crate) struct Lines {
+    pub(crate) mailboxes: MailboxLines,
+    /// Of each name in [`Module::calls`].
+    pub(crate) calls: Vec<usize>,
 }
 
 /// What a module refers to, looked up.
@@ -119,7 +135,7 @@ pub(crate) struct Context<'d> {
 
 impl Context<'_> {
     /// Reads a module; none if what no default can stand in for is missing. The reader knows why then.
-    pub(crate) fn read(&self, section: Section<'_>, index: usize) -> Option<(Module, MailboxLines)> {
+    pub(crate) fn read(&self, section: Section<'_>, index: usize) -> Option<(Module, Lines)> {
         let name_text = section.get("name").and_then(|item| item.value.get_ref().as_str());
         let what = name_text.map_or("[[module]]".into(), |name| format!("module `{name}`"));
         let section = section.called(&what);
@@ -128,7 +144,7 @@ impl Context<'_> {
         let node = self.node(&section);
         let program = program(&section);
         let optional = section.get("optional").and_then(|item| item.flag()).unwrap_or(false);
-        let calls = section.get("calls").map(|item| self.calls(&item, &what)).unwrap_or_default();
+        let calls = section.get("calls").map(|item| Calls::read(&item, self.directory, &what)).unwrap_or_default();
         let settings = settings(&section).unwrap_or_default();
         let start = section.get("start").and_then(|item| item.choice(&[("on", Start::On), ("off", Start::Off)]));
         let restart = section.get("restart").map(|item| Restart::read(&item, &what)).unwrap_or_default();
@@ -136,7 +152,7 @@ impl Context<'_> {
         let stop_within = section.get("stop-within").and_then(|item| item.duration_above_zero("2 s"));
         let spin = section.get("spin").and_then(|item| spin(&item)).unwrap_or_default();
         let boxes = section.section("mailbox", &format!("{what}, mailbox"));
-        let (mailboxes, lines) = Mailboxes::read(boxes, &what, section.line);
+        let (mailboxes, mailbox_lines) = Mailboxes::read(boxes, &what, section.line);
         let line = section.line;
         section.finish();
         let module = Module {
@@ -145,7 +161,8 @@ impl Context<'_> {
             node: node?,
             program: program?,
             optional,
-            calls,
+            calls: calls.names,
+            although: calls.although,
             settings,
             start: start.unwrap_or_default(),
             restart,
@@ -156,7 +173,7 @@ impl Context<'_> {
             line,
             index,
         };
-        Some((module, lines))
+        Some((module, Lines { mailboxes: mailbox_lines, calls: calls.lines }))
     }
 
     /// The directory has read and judged the texts already.
@@ -191,26 +208,6 @@ impl Context<'_> {
             return None;
         }
         Some(name.into())
-    }
-
-    fn calls(&self, item: &Item<'_>, what: &str) -> Vec<Name> {
-        let mut calls = Vec::new();
-        for (text, line) in item.texts("motor.0") {
-            match self.directory.find(text) {
-                Ok(name) if calls.contains(&name) && name != Name::NONE => {
-                    item.reader.report(line, format!("{what} names `{text}` twice in `calls`; drop one"));
-                }
-                Ok(name) => calls.push(name),
-                Err(unknown) => item.reader.report(
-                    line,
-                    format!(
-                        "{what} calls `{text}`, which no [[module]] defines; {}",
-                        unknown.or("drop it from `calls`")
-                    ),
-                ),
-            }
-        }
-        calls
     }
 }
 

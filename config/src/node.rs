@@ -22,7 +22,7 @@ pub struct Node {
     pub address: Option<String>,
     /// Permission bits of its shared-memory directory.
     pub mode: u32,
-    /// Instances of class `tool` that programs run by hand on this node may take.
+    /// Instances of class `tool` on this node, at least two: the first is launch's, programs run by hand take the others.
     pub tools: RangeInclusive<u8>,
     /// Line in the file.
     pub line: usize,
@@ -45,6 +45,16 @@ impl System {
 }
 
 impl Node {
+    /// The instance of class `tool` under which launch takes commands.
+    pub fn launch_instance(&self) -> u8 {
+        *self.tools.start()
+    }
+
+    /// Those that programs run by hand take.
+    pub fn tools_by_hand(&self) -> RangeInclusive<u8> {
+        self.tools.start().saturating_add(1)..=*self.tools.end()
+    }
+
     pub(crate) fn read_all(section: Option<Section<'_>>) -> Vec<Self> {
         let Some(section) = section else { return Vec::new() };
         let items = section.entries();
@@ -107,6 +117,13 @@ fn read_tools(item: &Item<'_>, earlier: &[Node]) -> Option<RangeInclusive<u8>> {
     if first > last {
         item.report(format!("`tools` ends before it begins; write `tools = [{last}, {first}]`"));
         return None;
+    }
+    if first == last {
+        let (low, high) = if last == u8::MAX { (first - 1, last) } else { (first, last + 1) };
+        item.report(format!(
+            "`tools` [{first}, {last}] is one instance: launch takes the first, and programs run by hand need another; \
+             write `tools = [{low}, {high}]` or more"
+        ));
     }
     if let Some(other) = earlier.iter().find(|node| *node.tools.start() <= last && first <= *node.tools.end()) {
         item.report(format!(

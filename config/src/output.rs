@@ -3,6 +3,7 @@
 use crate::directory::Directory;
 use crate::reader::Section;
 use rohrpost_mailbox::Name;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Importance of an output line, most important first.
@@ -28,6 +29,19 @@ const LEVELS: [(&str, Level); 5] = [
     ("trace", Level::Trace),
 ];
 
+/// How a line stands in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineFormat {
+    /// For people.
+    Text,
+    /// For programs: a JSON object.
+    Json,
+}
+
+/// A file of less would hold no more than a few lines.
+const FILE_SIZE: RangeInclusive<u64> = 4096..=1 << 40;
+const FORMATS: [(&str, LineFormat); 2] = [("text", LineFormat::Text), ("json", LineFormat::Json)];
+
 /// The section `[output]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
@@ -35,15 +49,38 @@ pub struct Output {
     pub level: Level,
     /// Modules with a level of their own.
     pub levels: Vec<(Name, Level)>,
+    /// Lines a second that a module may send; those of level error are counted for themselves.
+    pub rate: u32,
+    /// Lines that a module which was silent before may send at once.
+    pub burst: u32,
     /// Lines that the output module keeps in memory.
     pub ring: u32,
     /// File that lines are written to as well, from the configuration file's folder.
     pub file: Option<PathBuf>,
+    /// Bytes at which the file is put aside and a new one begun.
+    pub file_size: u64,
+    /// Files put aside that are kept.
+    pub files: u32,
+    /// How lines stand in the file.
+    pub format: LineFormat,
+    /// Whether lines go to the system's journal as well.
+    pub journal: bool,
 }
 
 impl Default for Output {
     fn default() -> Self {
-        Self { level: Level::Info, levels: Vec::new(), ring: 1000, file: None }
+        Self {
+            level: Level::Info,
+            levels: Vec::new(),
+            rate: 100,
+            burst: 200,
+            ring: 1000,
+            file: None,
+            file_size: 10 << 20,
+            files: 4,
+            format: LineFormat::Text,
+            journal: false,
+        }
     }
 }
 
@@ -55,11 +92,6 @@ impl Level {
 }
 
 impl Output {
-    /// The level of a module: its own, or the common one.
-    pub fn level_of(&self, module: Name) -> Level {
-        self.levels.iter().find(|(name, _)| *name == module.module()).map_or(self.level, |(_, level)| *level)
-    }
-
     pub(crate) fn read(section: Option<Section<'_>>, directory: &Directory<'_>, folder: &Path) -> Self {
         let mut output = Self::default();
         let Some(section) = section else { return output };
@@ -76,10 +108,34 @@ impl Output {
                 }
             }
         }
-        let ring = section.get("ring").and_then(|item| item.whole(1..=1_000_000, 1000));
-        output.ring = ring.map_or(output.ring, |ring| ring as u32);
+        let whole = |key, range, usual: u32| {
+            let number = section.get(key).and_then(|item| item.whole(range, usual.into()));
+            number.map_or(usual, |number| number as u32)
+        };
+        output.rate = whole("rate", 1..=1_000_000, output.rate);
+        output.burst = whole("burst", 1..=100_000, output.burst);
+        output.ring = whole("ring", 1..=1_000_000, output.ring);
         output.file = section.get("file").and_then(|item| item.text("robot.log")).map(|file| folder.join(file));
+        output.read_file_keys(&section);
+        output.journal = section.get("journal").and_then(|item| item.flag()).unwrap_or(false);
         section.finish();
         output
+    }
+
+    /// What is said of the file has no meaning without one.
+    fn read_file_keys(&mut self, section: &Section<'_>) {
+        let size = section.get("file-size");
+        let files = section.get("files");
+        let format = section.get("format");
+        if self.file.is_none() && section.get("file").is_none() {
+            for item in [&size, &files, &format].into_iter().flatten() {
+                item.report(format!("`{}` is about a file, and there is none; add `file = \"robot.log\"`", item.key));
+            }
+        }
+        let size = size.and_then(|item| item.size(FILE_SIZE, "10 MiB"));
+        self.file_size = size.unwrap_or(self.file_size);
+        let files = files.and_then(|item| item.whole(0..=1000, 4));
+        self.files = files.map_or(self.files, |files| files as u32);
+        self.format = format.and_then(|item| item.choice(&FORMATS)).unwrap_or(self.format);
     }
 }

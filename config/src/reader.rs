@@ -36,6 +36,17 @@ impl<'d> Reader<'d> {
         self.problems.borrow_mut().push(Problem { line: Some(line), message: message.into() });
     }
 
+    /// What the parser says of a text that is no TOML.
+    pub(crate) fn report_syntax(&self, error: &toml::de::Error) {
+        let span = error.span().unwrap_or(0..0);
+        let there = self.text.get(span.clone()).unwrap_or_default();
+        let message = match error.message() {
+            "duplicate key" => format!("`{there}` is given twice; drop one of them"),
+            message => format!("this is no TOML: {}", message.replace('\n', " ")),
+        };
+        self.report(self.line(span), message);
+    }
+
     pub(crate) fn into_problems(self) -> Vec<Problem> {
         self.problems.into_inner()
     }
@@ -248,12 +259,13 @@ impl<'d> Item<'d> {
     /// The texts of a list, with the lines they stand in.
     pub(crate) fn texts(&self, example: &str) -> Vec<(&'d str, usize)> {
         let list = self.list(&format!("[\"{example}\"]")).unwrap_or_default();
-        list.iter()
-            .filter_map(|item| match item.value.get_ref().as_str() {
-                Some(text) if !text.is_empty() => Some((text, item.line)),
-                _ => item.wrong(&format!("a list of texts, such as `{} = [\"{example}\"]`", self.key)),
-            })
-            .collect()
+        list.iter().filter_map(|item| Some((item.text_of_list(example)?, item.line))).collect()
+    }
+
+    /// The text that an element of a list is.
+    pub(crate) fn text_of_list(&self, example: &str) -> Option<&'d str> {
+        let text = self.value.get_ref().as_str().filter(|text| !text.is_empty());
+        text.or_else(|| self.wrong(&format!("a list of texts, such as `{} = [\"{example}\"]`", self.key)))
     }
 
     pub(crate) fn is_table(&self) -> bool {
@@ -287,8 +299,8 @@ fn shown(value: &DeValue<'_>) -> String {
     }
 }
 
-/// The candidate that is most like `word`, if one is like it at all.
-pub(crate) fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+/// The candidate that is most like `word`, if one is like it at all: what messages ask back.
+pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     // Both measures: edits for slips of the finger, Jaro-Winkler for words begun right (`max` for `max-age`).
     let likeness = |candidate: &str| {
         let edits = strsim::normalized_damerau_levenshtein(word, candidate);

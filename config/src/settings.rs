@@ -24,16 +24,28 @@ pub struct SettingsError {
 
 impl Installation {
     /// Turns a module's settings into a type, best one with `#[serde(deny_unknown_fields)]`. An error names the line of the
-    /// very setting.
+    /// very setting. Saved values of parameters go before the settings, which must be complete without them.
     ///
     /// Paths in settings start from the file's folder: see [`resolve`](Self::resolve).
     pub fn settings_as<T: DeserializeOwned>(&self, module: &Module) -> Result<T, SettingsError> {
-        // The text is read again, since only it knows the places.
-        let document = DeTable::parse(&self.text).map(Spanned::into_inner).unwrap_or_default();
-        let entry = document.get("module").and_then(|modules| modules.get_ref().get(module.index));
-        let place = entry.map_or(0..0, Spanned::span);
-        let nothing = || Spanned::new(place.clone(), DeValue::Table(DeTable::new()));
-        let settings = entry.and_then(|entry| entry.get_ref().get("settings")).cloned().unwrap_or_else(nothing);
+        let configured = self.settings_without_saved(module)?;
+        let document = self.document();
+        let saved = self.saved.as_ref();
+        let merged = saved.and_then(|saved| Some((saved, saved.over(module.name, &settings(&document, module))?)));
+        let Some((saved, merged)) = merged else { return Ok(configured) };
+        let place = merged.span();
+        // What is wrong only now is wrong with the saved values, and so are the places.
+        T::deserialize(ValueDeserializer::from(merged)).map_err(|error| {
+            let at = error.span().unwrap_or(place).start;
+            saved.wrong(self, module.name, at, error.message())
+        })
+    }
+
+    /// The same, as if nothing had been saved.
+    pub fn settings_without_saved<T: DeserializeOwned>(&self, module: &Module) -> Result<T, SettingsError> {
+        let document = self.document();
+        let settings = settings(&document, module);
+        let place = settings.span();
         T::deserialize(ValueDeserializer::from(settings)).map_err(|error| SettingsError {
             path: self.path.clone(),
             line: line_of(&self.text, error.span().unwrap_or(place).start),
@@ -41,4 +53,29 @@ impl Installation {
             message: error.message().into(),
         })
     }
+
+    /// Line of one of a module's settings; of the module, if the setting is not there.
+    pub fn settings_line(&self, module: &Module, key: &str) -> usize {
+        let document = self.document();
+        let settings = entry(&document, module).and_then(|entry| entry.get_ref().get("settings"));
+        let table = settings.and_then(|settings| settings.get_ref().as_table());
+        let place = table.and_then(|table| Some(table.get_key_value(key)?.0.span()));
+        place.map_or(module.line, |place| line_of(&self.text, place.start))
+    }
+
+    /// The text is read again, since only it knows the places.
+    fn document(&self) -> DeTable<'_> {
+        DeTable::parse(&self.text).map(Spanned::into_inner).unwrap_or_default()
+    }
+}
+
+fn entry<'d, 't>(document: &'d DeTable<'t>, module: &Module) -> Option<&'d Spanned<DeValue<'t>>> {
+    document.get("module").and_then(|modules| modules.get_ref().get(module.index))
+}
+
+/// The table of a module's settings; an empty one in the place of the module, if it has none.
+fn settings<'t>(document: &DeTable<'t>, module: &Module) -> Spanned<DeValue<'t>> {
+    let entry = entry(document, module);
+    let nothing = || Spanned::new(entry.map_or(0..0, Spanned::span), DeValue::Table(DeTable::new()));
+    entry.and_then(|entry| entry.get_ref().get("settings")).cloned().unwrap_or_else(nothing)
 }

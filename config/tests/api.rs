@@ -1,7 +1,7 @@
 //! What other crates rely on when they use an installation.
 
 use rohrpost_config::{
-    Full, Installation, Level, Node, Program, RestartPolicy, Scheduling, Start, TimeSource, explain,
+    Full, Installation, Level, LineFormat, Node, Program, RestartPolicy, Scheduling, Start, TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -26,7 +26,10 @@ fn every_key_arrives() {
     let base = Node { name: "base".into(), address: Some("10.0.0.1".into()), mode: 0o770, tools: 0..=15, line: 19 };
     assert_eq!(full.node("base"), Some(&base));
     assert_eq!(full.time, TimeSource::Local);
-    assert_eq!(full.output.file, Some(PathBuf::from("conf/robot.log")));
+    let output = &full.output;
+    assert_eq!((output.rate, output.burst, output.ring, output.journal), (50, 80, 500, true));
+    assert_eq!(output.file, Some(PathBuf::from("conf/robot.log")));
+    assert_eq!((output.file_size, output.files, output.format), (1 << 20, 2, LineFormat::Json));
 
     let motor = full.module(Name::new(7, 200, 0, 0)).unwrap();
     let words = ["./drivers/base", "--port", "/dev/ttyS0"].map(String::from);
@@ -62,8 +65,13 @@ fn modules_are_found_by_every_name_they_answer_to() {
         assert_eq!(found(text).as_deref(), module, "{text}");
     }
     assert_eq!(full.modules_on("desk").count(), 2);
-    assert_eq!(full.output.level_of(Name::new(7, 150, 0, 2)), Level::Trace, "by a mailbox of a face");
-    assert_eq!(full.output.level_of(Name::new(7, 200, 0, 0)), Level::Warn);
+    let level = |text: &str| full.output_level(full.classes.parse_name(text).unwrap());
+    assert_eq!(level("7.laser.0.2"), Level::Trace, "by a mailbox of a face");
+    assert_eq!(level("motor.0"), Level::Trace, "it is one process with its face");
+    assert_eq!((level("mapper.0"), level("output.0")), (Level::Debug, Level::Warn));
+    let node = |text: &str| full.node_of(full.classes.parse_name(text).unwrap());
+    assert_eq!([node("motor.0"), node("laser.0"), node("mapper.0")], [Some("base"), Some("base"), Some("desk")]);
+    assert_eq!([node("tool.3"), node("tool.16"), node("laser.1")], [Some("base"), Some("desk"), None]);
 }
 
 #[derive(Debug, Deserialize, PartialEq)]
@@ -133,8 +141,9 @@ fn missing_programs_matter_where_they_should_run() {
     let missing = full.missing_programs("base", folder.path());
     assert_eq!(missing.len(), 1);
     assert!(!missing[0].optional);
+    let line = 1 + FULL.lines().position(|line| line == "[[module]]").unwrap();
     let expected = format!(
-        "{}:40: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
+        "{}:{line}: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
          `program`",
         path.display(),
         folder.path().display()

@@ -54,6 +54,23 @@ fn files_that_ship_load_and_explain_themselves() {
     }
 }
 
+/// A program that is not here is an error on the node that runs it, and on no other.
+#[test]
+fn programs_that_are_not_here_are_named_for_their_node() {
+    let text = fs::read_to_string(folder().join("tests/programs.toml")).unwrap();
+    let installation =
+        Installation::parse(&text, Path::new("programs.toml")).unwrap_or_else(|errors| panic!("{errors}"));
+    let mut said = String::new();
+    for node in &installation.nodes {
+        for program in installation.missing_programs(&node.name, Path::new("/nowhere")) {
+            said += &format!("{}: {program}\n", node.name);
+        }
+    }
+    if let Some(difference) = check(&folder().join("tests/explained/programs.txt"), &said) {
+        panic!("{difference}");
+    }
+}
+
 /// `full.toml` has every key there is (`every_key_arrives`), so a key that it has and the manual has not was forgotten.
 #[test]
 fn manual_names_every_key_and_its_example_loads() {

@@ -76,6 +76,8 @@ pub(crate) struct Row {
     losses: [AtomicU64; Loss::ALL.len()],
     latency_max_ns: AtomicU64,
     latency: [AtomicU32; LATENCY_BUCKETS],
+    latency_sum_ns: AtomicU64,
+    body_bytes: AtomicU64,
 }
 const _: () = assert!(size_of::<Row>() == 320);
 
@@ -111,7 +113,7 @@ impl Counters {
     }
 
     /// By the receiver alone, which may therefore load and store.
-    pub(crate) fn received(&self, priority: Priority, waited: Duration) {
+    pub(crate) fn received(&self, priority: Priority, waited: Duration, bytes: usize) {
         let row = self.row(Class(priority.0));
         let ns = u64::try_from(waited.as_nanos()).unwrap_or(u64::MAX);
         let bucket = &row.latency[bucket(ns)];
@@ -119,7 +121,12 @@ impl Counters {
         if ns > row.latency_max_ns.load(Ordering::Relaxed) {
             row.latency_max_ns.store(ns, Ordering::Relaxed);
         }
-        row.received.store(row.received.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+        let add = |count: &AtomicU64, more: u64| {
+            count.store(count.load(Ordering::Relaxed).wrapping_add(more), Ordering::Relaxed);
+        };
+        add(&row.latency_sum_ns, ns);
+        add(&row.body_bytes, bytes as u64);
+        add(&row.received, 1);
     }
 
     /// A new segment goes on counting where the one it replaces stopped. The caller owns both.
@@ -130,6 +137,8 @@ impl Counters {
             copy32(&to.class, &from.class);
             copy64(&to.received, &from.received);
             copy64(&to.latency_max_ns, &from.latency_max_ns);
+            copy64(&to.latency_sum_ns, &from.latency_sum_ns);
+            copy64(&to.body_bytes, &from.body_bytes);
             to.losses.iter().zip(&from.losses).for_each(|(to, from)| copy64(to, from));
             to.latency.iter().zip(&from.latency).for_each(|(to, from)| copy32(to, from));
         }
@@ -160,9 +169,11 @@ impl Row {
         Some(ClassTraffic {
             class,
             received: self.received.load(Ordering::Relaxed),
+            body_bytes: self.body_bytes.load(Ordering::Relaxed),
             losses: std::array::from_fn(|i| self.losses[i].load(Ordering::Relaxed)),
             latency: Latency {
                 max: Duration::from_nanos(self.latency_max_ns.load(Ordering::Relaxed)),
+                sum: Duration::from_nanos(self.latency_sum_ns.load(Ordering::Relaxed)),
                 buckets: std::array::from_fn(|i| self.latency[i].load(Ordering::Relaxed)),
             },
         })
@@ -191,6 +202,8 @@ pub struct ClassTraffic {
     pub class: Option<Class>,
     /// Packages received.
     pub received: u64,
+    /// Bytes of their bodies.
+    pub body_bytes: u64,
     /// Packages lost, in the order of [`Loss::ALL`].
     pub losses: [u64; Loss::ALL.len()],
     /// Time from publishing to being taken.
@@ -211,6 +224,7 @@ impl ClassTraffic {
     /// Adds what the same class did in another mailbox.
     pub fn add(&mut self, other: &Self) {
         self.received += other.received;
+        self.body_bytes += other.body_bytes;
         self.losses.iter_mut().zip(&other.losses).for_each(|(a, b)| *a += b);
         self.latency.add(&other.latency);
     }
@@ -221,28 +235,53 @@ impl ClassTraffic {
 pub struct Latency {
     /// The longest.
     pub max: Duration,
+    /// All together.
+    pub sum: Duration,
     /// Packages by waiting time.
     pub buckets: [u32; LATENCY_BUCKETS],
+}
+
+impl Default for Latency {
+    fn default() -> Self {
+        Self { max: Duration::ZERO, sum: Duration::ZERO, buckets: [0; LATENCY_BUCKETS] }
+    }
 }
 
 impl Latency {
     /// Adds another histogram.
     pub fn add(&mut self, other: &Self) {
         self.max = self.max.max(other.max);
+        self.sum += other.sum;
         self.buckets.iter_mut().zip(&other.buckets).for_each(|(a, b)| *a = a.saturating_add(*b));
+    }
+
+    /// Shortest time that counts in a bucket; each begins where the one before ends.
+    pub fn bucket_start(bucket: usize) -> Duration {
+        Duration::from_nanos(bucket_start_ns(bucket) as u64)
     }
 
     /// What was counted since `earlier` was read. The longest is not known for a part: it stays the longest of all.
     pub fn since(&self, earlier: &Self) -> Self {
-        Self { max: self.max, buckets: std::array::from_fn(|i| self.buckets[i].saturating_sub(earlier.buckets[i])) }
+        let buckets = std::array::from_fn(|i| self.buckets[i].saturating_sub(earlier.buckets[i]));
+        Self { max: self.max, sum: self.sum.saturating_sub(earlier.sum), buckets }
+    }
+
+    /// Packages counted.
+    pub fn count(&self) -> u64 {
+        self.buckets.iter().map(|n| u64::from(*n)).sum()
+    }
+
+    /// The mean, exact; none when nothing was received.
+    pub fn mean(&self) -> Option<Duration> {
+        let count = self.count();
+        (count > 0).then(|| Duration::from_secs_f64(self.sum.as_secs_f64() / count as f64))
     }
 
     /// The time that this share of the packages (0..=1) did not exceed, interpolated inside its bucket (so within a
     /// quarter or so); none when nothing was received.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
-        let total: u64 = self.buckets.iter().map(|n| u64::from(*n)).sum();
         let mut before = 0.0;
-        let wanted = share.clamp(0.0, 1.0) * total as f64;
+        let wanted = share.clamp(0.0, 1.0) * self.count() as f64;
         for (i, n) in self.buckets.iter().enumerate().filter(|(_, n)| **n > 0) {
             let here = f64::from(*n);
             if before + here >= wanted {
@@ -269,6 +308,8 @@ mod tests {
             losses: std::array::from_fn(|_| AtomicU64::new(0)),
             latency_max_ns: AtomicU64::new(0),
             latency: std::array::from_fn(|_| AtomicU32::new(0)),
+            latency_sum_ns: AtomicU64::new(0),
+            body_bytes: AtomicU64::new(0),
         }))
     }
 
@@ -277,7 +318,7 @@ mod tests {
         let counters = counters();
         for class in 0..=255 {
             counters.lost(Priority(class), Loss::Refused, 1);
-            counters.received(Priority(class), Duration::from_micros(1));
+            counters.received(Priority(class), Duration::from_micros(1), 1);
         }
         let rows = counters.read();
         assert_eq!(rows.len(), ROWS);
@@ -291,8 +332,10 @@ mod tests {
     fn quantiles_of_nothing_are_nothing_and_of_one_are_it() {
         let counters = counters();
         assert!(counters.read().is_empty());
-        counters.received(Priority(9), Duration::from_micros(100));
+        counters.received(Priority(9), Duration::from_micros(100), 40);
+        assert_eq!(counters.read()[0].body_bytes, 40);
         let latency = &counters.read()[0].latency;
+        assert_eq!((latency.count(), latency.mean()), (1, Some(latency.max)));
         assert_eq!(latency.max, Duration::from_micros(100));
         assert_eq!(latency.quantile(1.0), Some(Duration::from_micros(100)));
         assert_eq!(latency.since(latency).quantile(0.5), None);

@@ -11,7 +11,7 @@
 //!
 //! This crate knows no network, no configuration file and no message type. Reading order: `word` (the life of a slot),
 //! `slots` (the protocol, and what each death leaves), `queue`, `doorbell`, then `segment`, `sender`, `receiver`, `node`,
-//! `registry`.
+//! `registry`, `traffic`.
 //!
 //! ```
 //! use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Shape, Type};
@@ -29,10 +29,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod about;
 mod bell;
 mod clock;
 mod counters;
 mod doorbell;
+mod flows;
 mod latest;
 mod layout;
 mod lock;
@@ -53,13 +55,15 @@ pub mod step;
 mod sync;
 pub mod sys;
 mod system_time;
+mod traffic;
 mod waiting;
 mod watch;
 mod word;
 
 pub use clock::{monotonic_ns, realtime_ns};
 pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss};
-pub use layout::{Shape, ShapeError};
+pub use flows::{FlowInfo, FlowSecond, Publications};
+pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
 pub use node::{
     LaunchLock, ModuleState, Node, NodeError, PARTICIPANTS_MAX, ParticipantInfo, base_directory, node_directory,

@@ -22,6 +22,8 @@ unsafe impl Shared for crate::layout::Page {}
 // SAFETY: made of atomics alone.
 unsafe impl Shared for crate::node::NodePage {}
 // SAFETY: made of atomics alone.
+unsafe impl Shared for crate::traffic::TrafficPage {}
+// SAFETY: made of atomics alone.
 unsafe impl Shared for crate::system_time::TimePage {}
 
 /// A shared mapping of a file's beginning. Truncating the file afterwards is outside our contract: all processes of a user

@@ -4,6 +4,7 @@
 //! /dev/shm/rohrpost-UID/INSTALLATION.NODE/     mode 0700
 //!     node           this page: epochs, participants (their bells, states, process ids)
 //!     time           system time (see `system_time`)
+//!     traffic.3      what participant 3 sends (see `traffic`)
 //!     01c80000.mbx   a mailbox: its name in hexadecimal (see `layout`)
 //! ```
 //!
@@ -267,10 +268,16 @@ impl Node {
 
     /// All participants alive, but for those that are joining or leaving just now.
     pub fn participants(&self) -> Vec<ParticipantInfo> {
+        self.living().map(|(_, participant)| participant).collect()
+    }
+
+    /// The same, with their places in the table.
+    pub(crate) fn living(&self) -> impl Iterator<Item = (Claimant, ParticipantInfo)> + '_ {
         let alive = |index: &u16| lock::is_locked(&self.file, u64::from(*index)).unwrap_or(false);
-        let all = (0..PARTICIPANTS_MAX as u16).filter(alive).map(|index| self.entry(index).read());
+        let all = (0..PARTICIPANTS_MAX as u16).filter(alive).map(|index| (index, self.entry(index).read()));
         // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group.
-        all.filter(|participant| participant.pid != 0).collect()
+        let here = all.filter(|(_, participant)| participant.pid != 0);
+        here.map(|(index, found)| (Claimant { participant: index, incarnation: found.incarnation }, found))
     }
 
     /// Process id of the launch that runs this node now.

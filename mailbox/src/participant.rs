@@ -5,6 +5,7 @@ use crate::lock;
 use crate::name::Name;
 use crate::node::{Entry, ModuleState, Node, NodeError, PARTICIPANTS_MAX, open_shared};
 use crate::step::step;
+use crate::traffic::Table;
 use crate::word::Claimant;
 use std::fs::File;
 use std::sync::atomic::Ordering;
@@ -16,6 +17,8 @@ pub struct Participant {
     /// Holds the lock; never inherited by a program that this one starts.
     file: File,
     me: Claimant,
+    /// Counts what it sends.
+    traffic: Table,
     /// Mailboxes it sends to now, so that nobody holds more claims than the mailbox allows. Not on any hot path.
     sending: Mutex<Vec<Name>>,
     /// Whether it watches descriptors.
@@ -37,6 +40,9 @@ impl Participant {
             step!("join: locked");
             node.check_present(&file)?;
             let incarnation = node.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1);
+            let me = Claimant { participant, incarnation };
+            // Before the entry says so: a table is read if the entry has the same incarnation.
+            let traffic = Table::make(node, me)?;
             let entry = node.entry(participant);
             // First of all: the lock is ours, but the name and the number still are those of whoever was here before.
             entry.module.store(0, Ordering::Release);
@@ -58,9 +64,8 @@ impl Participant {
             entry.pid.store(std::process::id(), Ordering::Relaxed);
             entry.module.store(module.module().raw(), Ordering::Release);
             step!("join: joined");
-            let me = Claimant { participant, incarnation };
             let (sending, watching) = Default::default();
-            return Ok(Arc::new(Self { node: node.clone(), file, me, sending, watching }));
+            return Ok(Arc::new(Self { node: node.clone(), file, me, traffic, sending, watching }));
         }
         Err(NodeError::Crowded(node.path().into()))
     }
@@ -110,6 +115,11 @@ impl Participant {
         self.watching.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Counts what it sends.
+    pub(crate) fn traffic(&self) -> &Table {
+        &self.traffic
+    }
+
     pub(crate) fn claimant(&self) -> Claimant {
         self.me
     }
@@ -124,6 +134,10 @@ impl Participant {
         entry.module.store(0, Ordering::Relaxed);
         entry.state.store(0, Ordering::Relaxed);
         entry.pid.store(0, Ordering::Release);
+        // In a directory that was removed and made anew, the file of this name is somebody else's.
+        if self.node.check_present(&self.file).is_ok() {
+            self.traffic.remove();
+        }
     }
 }
 

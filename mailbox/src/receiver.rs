@@ -119,10 +119,10 @@ impl Receiver {
                 depth_max.store(depth, Ordering::Relaxed);
             }
             // SAFETY: just taken, and freed only below or by its guard.
-            let (published_ns, _, _) = unsafe { self.segment.read(taken.slot) };
+            let (published_ns, _, body) = unsafe { self.segment.read(taken.slot) };
             let waited = Duration::from_nanos(monotonic_ns().saturating_sub(published_ns));
             if self.segment.shape.max_age.is_none_or(|max| waited <= max) {
-                self.segment.page().counters.received(taken.word.priority(), waited);
+                self.segment.page().counters.received(taken.word.priority(), waited, body.len());
                 return Some(taken);
             }
             self.segment.page().counters.lost(taken.word.priority(), Loss::Stale, 1);

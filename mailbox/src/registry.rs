@@ -3,6 +3,7 @@
 //! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A file
 //! gets its name last, whole; so nobody ever opens half a mailbox.
 
+use crate::about;
 use crate::counters::{ClassTraffic, Loss};
 use crate::layout::{Shape, ShapeError};
 use crate::lock::{self, Held};
@@ -174,6 +175,7 @@ pub(crate) fn remove(node: &Node, name: Name) -> Result<(), NodeError> {
 }
 
 fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeError> {
+    about::remove(node, name);
     fs::remove_file(path_of(node.path(), name)).map_err(|error| NodeError::Io(path_of(node.path(), name), error))?;
     step!("unlink: gone");
     node.page().registry_epoch.fetch_add(1, Ordering::AcqRel);

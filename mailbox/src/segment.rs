@@ -117,17 +117,18 @@ impl Segment {
         }
     }
 
-    /// Writes a slot's prefix: the time and the head.
+    /// Writes a slot's prefix: the time (which is the result) and the head.
     ///
     /// # Safety
     /// As for [`Segment::body_mut`].
-    pub(crate) unsafe fn write_head(&self, slot: usize, head: &Head) {
-        let prefix = self.slot(slot);
+    pub(crate) unsafe fn write_head(&self, slot: usize, head: &Head) -> u64 {
+        let (prefix, now_ns) = (self.slot(slot), monotonic_ns());
         // SAFETY: inside the slot and aligned (slots start at multiples of 64); the claim makes it ours alone.
         unsafe {
-            prefix.cast::<u64>().write(monotonic_ns());
+            prefix.cast::<u64>().write(now_ns);
             prefix.add(8).cast::<[u8; HEAD_BYTES]>().write(head.to_bytes());
         }
+        now_ns
     }
 
     /// When a slot's package was published (monotonic ns), its head, and its body.

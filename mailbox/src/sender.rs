@@ -9,6 +9,7 @@ use crate::participant::Participant;
 use crate::segment::{BadSegment, Segment};
 use crate::slots::{Claim, NoSlot, Published};
 use crate::step::step;
+use crate::traffic::{Key, Writer};
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.
@@ -73,6 +74,8 @@ pub struct Sender {
     participant: Arc<Participant>,
     segment: Segment,
     cursor: usize,
+    /// Counts what it sends.
+    flows: Writer,
     /// What a newer package may replace; empty unless the mailbox is `latest`.
     posts: Posts,
 }
@@ -94,7 +97,8 @@ impl Participant {
         // Senders start at different slots, so that they meet less.
         let cursor = usize::from(self.claimant().participant) * 7;
         let posts = Posts::new(&segment.shape);
-        Ok(Sender { participant: self.clone(), segment, cursor, posts })
+        let flows = self.traffic().writer();
+        Ok(Sender { participant: self.clone(), segment, cursor, posts, flows })
     }
 }
 
@@ -123,7 +127,7 @@ impl Sender {
     /// When it was not accepted.
     pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
         let len: usize = parts.iter().map(|part| part.len()).sum();
-        let claim = self.claim(label.priority, Some(label), len)?;
+        let claim = self.claim(label.priority, Some(label), len).map_err(|error| self.refused(label, error))?;
         let mut loan = Loan { sender: self, claim: Some(claim), priority: label.priority };
         let mut body = loan.body();
         for part in parts {
@@ -140,7 +144,8 @@ impl Sender {
     /// # Errors
     /// [`SendError::Full`], or what reopening a replaced mailbox brings.
     pub fn loan(&mut self, priority: Priority) -> Result<Loan<'_>, SendError> {
-        let claim = self.claim(priority, None, 0)?;
+        // What it would have been was not said yet.
+        let claim = self.claim(priority, None, 0).map_err(|error| self.refused(&Label::default(), error))?;
         Ok(Loan { sender: self, claim: Some(claim), priority })
     }
 
@@ -179,7 +184,7 @@ impl Sender {
         let name = self.name();
         for _ in 0..REOPEN_MAX {
             // SAFETY: `claim` is ours, and the loan that could reach its bytes has been consumed.
-            unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
+            let published_ns = unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
             self.count_victim(&claim);
             let slots = self.segment.slots();
             if let Some(instead) = self.posts.of(label).and_then(|old| slots.replace(claim, old)) {
@@ -192,6 +197,8 @@ impl Sender {
                     if wake {
                         self.wake();
                     }
+                    step!("send: before count");
+                    self.flows.accepted(self.participant.traffic(), key(label, name), len, published_ns, 0);
                     return Ok(());
                 }
                 Published::Reclaimed => return Err(SendError::Reclaimed(name)),
@@ -222,6 +229,13 @@ impl Sender {
         result
     }
 
+    /// Counts what was not accepted; its sender is told.
+    fn refused(&mut self, label: &Label, error: SendError) -> SendError {
+        let key = key(label, self.name());
+        self.flows.refused(self.participant.traffic(), key);
+        error
+    }
+
     fn count_victim(&self, claim: &Claim) {
         if let Some(victim) = claim.victim() {
             self.segment.page().counters.gave_way(victim);
@@ -239,11 +253,16 @@ impl Sender {
 
 impl Drop for Sender {
     fn drop(&mut self) {
+        self.flows.leave(self.participant.traffic());
         let mut sending = self.participant.sending();
         if let Some(at) = sending.iter().position(|name| *name == self.segment.name) {
             sending.swap_remove(at);
         }
     }
+}
+
+fn key(label: &Label, to: Name) -> Key {
+    Key { to, from: label.from, kind: label.kind }
 }
 
 /// A slot to write a package in.
@@ -271,10 +290,14 @@ impl Loan<'_> {
     pub fn send(mut self, label: &Label, len: usize) -> Result<(), SendError> {
         let max = self.sender.body_bytes_max();
         if len > max {
-            return Err(SendError::TooLarge { name: self.sender.name(), len, max });
+            let error = SendError::TooLarge { name: self.sender.name(), len, max };
+            return Err(self.sender.refused(label, error));
         }
         match self.claim.take() {
-            Some(claim) => self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len),
+            Some(claim) => {
+                let sent = self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len);
+                sent.map_err(|error| self.sender.refused(label, error))
+            }
             None => Ok(()),
         }
     }

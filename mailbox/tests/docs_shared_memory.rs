@@ -39,11 +39,13 @@ fn a_mailbox_is_as_documented() {
         let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
         assert!(there.0.starts_with(b"rohrpost") && there.0.len().is_multiple_of(4096));
         let identity = [8, 12, 16, 20, 24, 28].map(|at| there.u32(at));
-        assert_eq!(identity, [1, MAILBOX.raw(), u32::from(slots), 100, 1, 3]);
+        assert_eq!(identity, [2, MAILBOX.raw(), u32::from(slots), 100, 1, 3]);
         assert_eq!((there.u64(32), there.u32(64), there.u32(68)), (9_000_000_000, 0, std::process::id()));
         assert_eq!((there.u32(72), there.u32(76), there.u64(128)), (0, 2, 2), "adoptions, most waiting, ticket");
         assert_eq!((there.u32(136), there.u32(140), there.u32(320)), (0, 0, 256 + u32::from(HIGH.0)));
         assert_eq!(there.u64(328), 1, "received of the first row");
+        assert!(there.u64(320 + 304) >= there.u64(320 + 72), "all waits, and the longest");
+        assert_eq!(there.u64(320 + 312), 5, "bytes of the first row");
         let words = 4096 + (usize::from(slots) * word_bytes).next_multiple_of(64);
         let mut seen = Vec::new();
         for slot in 0..usize::from(slots) {
@@ -156,7 +158,7 @@ fn the_node_and_its_time_are_as_documented() {
     node.announce_death();
     let there = file(&ground, "node");
     assert!(there.0.starts_with(b"rohrpost") && there.0.len() == 16448);
-    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [1, 1, 1, me.incarnation()]);
+    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [2, 1, 1, me.incarnation()]);
     let entry = [0, 4, 8, 12, 16, 20].map(|at| there.u32(64 + at));
     assert_eq!(entry, [me.incarnation(), std::process::id(), 2, 0x01c8_0000, 3, 7]);
     assert!(there.u64(64 + 24) > 0);
@@ -167,4 +169,43 @@ fn the_node_and_its_time_are_as_documented() {
     let record = 64 + 64 * (there.u64(0) % 2) as usize;
     let fields = [0, 8, 24, 32, 40, 48].map(|at| there.u64(record + at));
     assert_eq!(fields, [1, 3, 1_000, 2_000_000_000, 0, 0]);
+}
+
+#[test]
+fn a_table_of_traffic_is_as_documented() {
+    let ground = Ground::new();
+    let _receiver =
+        ground.join().receiver(MAILBOX, Shape { slots: 2, body_bytes_max: 100, ..Shape::default() }).unwrap();
+    let me = Participant::join(&ground.node(), Name::new(1, 201, 0, 0)).unwrap();
+    let mut sender = me.sender(MAILBOX).unwrap();
+    let (from, kind) = (Name::new(1, 201, 0, 1), rohrpost_mailbox::Type::reply(16));
+    let label = rohrpost_mailbox::Label { from, kind, ..label(LOW, 0) };
+    for body in ["four", "five!"] {
+        sender.send(&label, &[body.as_bytes()]).unwrap();
+    }
+    sender.send(&label, &[b"full"]).unwrap_err();
+    let mut publications = rohrpost_mailbox::Publications::new(&me);
+    publications.published(me.module(), rohrpost_mailbox::Type::data(7), 3, Duration::from_nanos(11));
+
+    let there = file(&ground, "traffic.1");
+    assert!(there.0.starts_with(b"rohrpost") && there.0.len() == 32832);
+    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [2, 1, me.incarnation(), 128]);
+    let row = 64;
+    assert_eq!([8, 12, 16].map(|at| there.u32(row + at)), [MAILBOX.raw(), from.raw(), 0xfff0]);
+    assert_eq!(there.u32(row + 4) % 2, 0, "nobody is inside");
+    assert_eq!([24, 32, 40].map(|at| there.u64(row + at)), [2, 9, 1]);
+    let (first, last) = (there.u64(row + 48), there.u64(row + 56));
+    let slots = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
+    let published = [0, 1].map(|slot| slots.u64(4096 + 128 + slot * 128));
+    assert_eq!([first, last], [published[0].min(published[1]), published[0].max(published[1])]);
+    assert_eq!((there.u64(row + 64), there.u64(row + 72)), ((last - first).pow(2), 0));
+    let second = row + 128 + 32 * (last / 1_000_000_000 % 4) as usize;
+    assert_eq!([0, 8, 16].map(|at| there.u64(second + at)), [last / 1_000_000_000, last - first, last - first]);
+    assert!(there.u32(second + 24) >= 4 && there.u32(second + 28) == 5, "the first may lie in the second before");
+
+    let row = 64 + 256;
+    assert_eq!([8, 12, 16].map(|at| there.u32(row + at)), [0, me.module().raw(), 0xbff9]);
+    assert_eq!([24, 32, 80].map(|at| there.u64(row + at)), [1, 3, 11]);
+    drop((sender, publications, me));
+    assert!(!ground.path().join("traffic.1").exists());
 }

@@ -49,10 +49,15 @@ fn a_round_again_and_again(full: Full) {
     let mut watches = Watches::new(receiver.participant()).unwrap();
     watches.add(&near, Interest::Both).unwrap();
     let clock = rohrpost_mailbox::SystemClock::open(&node);
+    let mut publications = rohrpost_mailbox::Publications::new(&ground.join());
     let mut round = |id: u16, sender: &mut rohrpost_mailbox::Sender, receiver: &mut rohrpost_mailbox::Receiver| {
-        for some in 0..9 {
-            let _ = sender.send(&label(LOW, id), &[b"parts", b"of a body"]);
-            let _ = sender.send(&label(LOW, id + some), &[b"more than it remembers"]);
+        for number in 1..=9 {
+            // More types than a sender remembers, so that it looks for their rows, too.
+            let kind = rohrpost_mailbox::Type::command(number);
+            let label = rohrpost_mailbox::Label { kind, ..label(LOW, id) };
+            let _ = sender.send(&label, &[b"parts", b"of a body"]);
+            let _ = sender.send(&label, &[b"the newer"]);
+            publications.published(MAILBOX, rohrpost_mailbox::Type::data(number), 10, Duration::ZERO);
         }
         sender.send(&label(HIGH, id), &[b"displaces"]).unwrap();
         drop(sender.loan(HIGH));

@@ -75,7 +75,9 @@ fn without_memory_for_its_successor_a_mailbox_stays() {
     sender.send(&label(LOW, 2), &[]).unwrap();
     let mut receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
     assert_eq!([1, 2].map(|_| receiver.try_receive().unwrap().head().id), [1, 2]);
-    assert_eq!(fs::read_dir(ground.path()).unwrap().count(), 2, "nothing unfinished lies about");
+    let unfinished = |name: &str| name == "unfinished" || name.ends_with(".new");
+    let names = fs::read_dir(ground.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert_eq!(names.filter(|name| unfinished(name)).count(), 0, "nothing unfinished lies about");
 }
 
 #[test]
@@ -318,4 +320,29 @@ fn removing_and_joining_at_once_leave_no_ghosts() {
     }
     remover.join().unwrap();
     assert!(joined > 0);
+}
+
+#[test]
+fn words_beside_a_mailbox_are_whole_and_go_with_it() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
+    assert_eq!(node.about(MAILBOX), None);
+    for words in [&b"first"[..], b"", b"of another length"] {
+        receiver.set_about(words).unwrap();
+        assert_eq!(node.about(MAILBOX).as_deref(), Some(words));
+    }
+    drop(receiver);
+    assert!(node.about(MAILBOX).is_some(), "the mailbox stays, and so do they");
+    let receiver = ground.join().receiver(MAILBOX, shape(5)).unwrap();
+    assert!(node.about(MAILBOX).is_some(), "replaced, not removed");
+    receiver.close();
+    assert_eq!(node.about(MAILBOX), None);
+    let receiver = ground.join().receiver(MAILBOX, shape(5)).unwrap();
+    receiver.set_about(&vec![0; (1 << 20) + 1]).unwrap();
+    assert_eq!(node.about(MAILBOX), None, "too long to be read");
+    drop(receiver);
+    assert!(node.remove_orphan(MAILBOX).unwrap());
+    let left = fs::read_dir(ground.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert_eq!(left.filter(|name| name.contains("about")).count(), 0);
 }

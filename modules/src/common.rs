@@ -1,5 +1,6 @@
 //! The functions that every module has (seed 002, 2.2.1), numbers 1 to 15 of the commands.
 
+use crate::parameter::{Parameter, Refusal};
 use crate::value::Data;
 use postcard_schema::Schema;
 use rohrpost_mailbox::ModuleState;
@@ -17,10 +18,14 @@ pub const GET_DATA: u16 = 4;
 pub const SUBSCRIBE: u16 = 5;
 /// Ends a subscription: its id (u16).
 pub const UNSUBSCRIBE: u16 = 6;
-/// Sets which output lines the module sends: [`OutputLevel`].
+/// Sets which output lines the module sends: [`OutputLevel`]. The answer is the level before, as in [`Status`].
 pub const OUTPUT_LEVEL: u16 = 7;
 /// Asks for a part of the description, from a byte on (u32): [`DescriptionPart`].
 pub const DESCRIBE: u16 = 8;
+/// Asks for parameters with their present values, from an index on (u16): [`ParameterPage`].
+pub const PARAMETERS: u16 = 9;
+/// Sets parameters: [`SetParameters`]. Returns `Result<Vec<Change>, Refusal>`.
+pub const SET_PARAMETERS: u16 = 10;
 /// Numbers from here on are the interfaces' own.
 pub const FIRST_OWN: u16 = 16;
 
@@ -29,6 +34,9 @@ pub const HASH: u32 = 1;
 
 /// Bytes of a description that go into one reply, so that it fits every reply mailbox.
 pub const DESCRIPTION_PART: usize = 768;
+
+/// Bytes of parameters that go into one reply, for the same reason; a single one that is longer goes alone.
+pub const PARAMETER_PAGE: usize = 768;
 
 /// How a module is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -49,6 +57,10 @@ pub struct Status {
     pub lost: u64,
     /// Output lines that found no room.
     pub output_lost: u64,
+    /// Output lines that were suppressed, since there were too many of them.
+    pub output_suppressed: u64,
+    /// Which output lines it sends; none when the configuration has no class `output`.
+    pub output_level: Option<OutputLevel>,
 }
 
 /// What a module is doing.
@@ -115,6 +127,37 @@ pub struct DescriptionPart {
     pub bytes: Vec<u8>,
 }
 
+/// Some of a module's parameters, in the order of its struct.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ParameterPage {
+    /// Parameters of the module.
+    pub total: u16,
+    /// Times that parameters were set in this life of the module: pages with different ones do not belong together.
+    pub changes: u32,
+    /// Those from the index that was asked for.
+    pub parameters: Vec<Parameter>,
+}
+
+/// Sets parameters, all of them or none.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SetParameters {
+    /// Names and values; a value is postcard of the parameter's type.
+    pub values: Vec<(String, Vec<u8>)>,
+    /// Only says what would be refused for its name, type or range; the module itself is not asked.
+    pub only_check: bool,
+}
+
+/// A parameter that was set.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Change {
+    /// The parameter.
+    pub name: String,
+    /// Its value before, postcard.
+    pub old: Vec<u8>,
+    /// Its value now, postcard.
+    pub new: Vec<u8>,
+}
+
 /// Before the value in a package of subscribed data, all little-endian:
 /// `system time u64 ns │ sequence u32 │ missed u32 │ value (postcard)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,4 +203,6 @@ const fn _all_common_types_are_data() {
     data::<Subscribe>();
     data::<OutputLevel>();
     data::<DescriptionPart>();
+    data::<SetParameters>();
+    data::<Result<Vec<Change>, Refusal>>();
 }

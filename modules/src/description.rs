@@ -1,6 +1,7 @@
 //! What a module tells of itself: its functions and data, by which tools print, call and record it.
 
 use postcard_schema::schema::owned::OwnedNamedType;
+use rohrpost_mailbox::{Name, Node, local};
 use serde::{Deserialize, Serialize};
 use std::hash::Hasher;
 
@@ -59,6 +60,12 @@ pub struct DataItem {
 }
 
 impl Description {
+    /// What the module under this name has noted of itself beside its command mailbox; asks nobody. None when it noted
+    /// nothing that can be read.
+    pub fn noted(node: &Node, module: Name) -> Option<Self> {
+        postcard::from_bytes(&node.about(module.with_local(local::COMMANDS))?).ok()
+    }
+
     /// Tells interfaces apart: callers and servers must have the same. Numbers, types, and names of functions and arguments
     /// count (to swap two numbers is a mistake that types do not show); texts do not. A mistake goes unseen once in four billion; malice is not what it is for.
     pub fn hash(&self) -> u32 {

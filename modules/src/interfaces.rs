@@ -122,7 +122,9 @@ pub trait Player {
 /// A page of the collector's lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Page {
-    /// Number of the first line here; lines are counted from the collector's start.
+    /// Tells this life of the collector, whose lines are counted from its start, from earlier ones.
+    pub life: u32,
+    /// Number of the first line here.
     pub first: u64,
     /// Number of the next line that will be collected.
     pub next: u64,

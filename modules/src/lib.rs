@@ -5,6 +5,7 @@
 //! call                commands, once, and replies      runtime          the loop of a module's thread
 //! publish             who wants which data             launch           starts, watches and stops a node's modules
 //! value, description  data without its types           output           what modules say
+//! parameter           settings that may change
 //! ```
 //!
 //! Module authors use it through the crate `rohrpost`.
@@ -23,6 +24,7 @@ pub mod launch;
 pub mod macro_support;
 mod module;
 pub mod output;
+pub mod parameter;
 mod publish;
 #[cfg(feature = "builtin")]
 pub mod robot;
@@ -32,5 +34,5 @@ pub mod types;
 pub mod value;
 
 pub use module::{Module, ModuleError};
-pub use rohrpost_macros::{data, interface};
+pub use rohrpost_macros::{choice, data, interface, parameters};
 pub use runtime::run;

@@ -1,6 +1,7 @@
 //! What a module's author writes: a struct, its interface, and what it does when it is switched on, off, ticked or given data.
 
 use crate::interface::Interfaces;
+use crate::parameter::ParameterSet;
 use crate::runtime::{Context, Received};
 use rohrpost_mailbox::Ready;
 use serde::de::DeserializeOwned;
@@ -37,6 +38,20 @@ pub trait Module: Sized {
     /// # Errors
     /// The module is switched off and in error.
     fn tick(&mut self, _context: &mut Context) -> Result<(), ModuleError> {
+        Ok(())
+    }
+
+    /// Its settings that may change while it runs: `Some(&mut self.settings)`, if their struct has [`crate::parameters`].
+    fn parameters(&mut self) -> Option<&mut dyn ParameterSet> {
+        None
+    }
+
+    /// These parameters have new values by now, on or off; what depends on them is changed here. All that one command sets
+    /// comes at once, and only what really differs.
+    ///
+    /// # Errors
+    /// The old values are put back, and whoever set them is told why. So check first, then act.
+    fn parameters_changed(&mut self, _context: &mut Context, _changed: &[&str]) -> Result<(), ModuleError> {
         Ok(())
     }
 

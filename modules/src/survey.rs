@@ -1,7 +1,9 @@
 //! What runs on a node and what it does, read from shared memory: looking changes nothing.
 
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{ClassTraffic, MailboxInfo, Name, Node, NodeError, ParticipantInfo, local};
+use rohrpost_mailbox::{
+    ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, Name, Node, NodeError, ParticipantInfo, local,
+};
 use std::time::Instant;
 
 /// A node at one moment.
@@ -14,6 +16,8 @@ pub struct Survey {
     pub mailboxes: Vec<MailboxInfo>,
     /// What all mailboxes together did, most urgent class first.
     pub classes: Vec<ClassTraffic>,
+    /// What everybody sends and publishes.
+    pub flows: Vec<FlowInfo>,
 }
 
 /// A module at one moment.
@@ -27,8 +31,18 @@ pub struct ModuleSurvey {
     pub process: Option<ParticipantInfo>,
     /// Packages that its mailboxes received so far.
     pub received: u64,
+    /// Bytes of their bodies.
+    pub bytes_in: u64,
     /// Packages that its mailboxes lost so far, for any cause.
     pub lost: u64,
+    /// The same by cause, in the order of [`Loss::ALL`].
+    pub losses: [u64; Loss::ALL.len()],
+    /// How long packages waited in its mailboxes.
+    pub waited: Latency,
+    /// Packages that its process sent since it began; not those that were refused.
+    pub sent: u64,
+    /// Bytes of their bodies.
+    pub bytes_out: u64,
     /// Packages that wait for it.
     pub depth: u32,
 }
@@ -41,17 +55,17 @@ impl Survey {
     pub fn new(node: &Node, installation: &Installation, node_name: &str) -> Result<Self, NodeError> {
         let mailboxes: Vec<MailboxInfo> = node.mailboxes()?.into_iter().filter_map(|name| node.look_at(name)).collect();
         let participants = node.participants();
-        let mut modules: Vec<ModuleSurvey> = installation
-            .modules_on(node_name)
-            .map(|module| survey(module.name, module.faces.clone(), &participants, &mailboxes))
-            .collect();
+        let flows = node.traffic();
+        let survey = |name, faces| survey(name, faces, &participants, &mailboxes, &flows);
+        let mut modules: Vec<ModuleSurvey> =
+            installation.modules_on(node_name).map(|module| survey(module.name, module.faces.clone())).collect();
         for participant in participants.iter().filter(|p| p.module != Name::NONE) {
             if modules.iter().all(|module| module.name != participant.module) {
-                modules.push(survey(participant.module, Vec::new(), &participants, &mailboxes));
+                modules.push(survey(participant.module, Vec::new()));
             }
         }
         let classes = sum(&mailboxes);
-        Ok(Self { at: Instant::now(), modules, mailboxes, classes })
+        Ok(Self { at: Instant::now(), modules, mailboxes, classes, flows })
     }
 
     /// The module of this name, or with this face.
@@ -68,16 +82,34 @@ impl Survey {
     }
 }
 
-fn survey(name: Name, faces: Vec<Name>, participants: &[ParticipantInfo], mailboxes: &[MailboxInfo]) -> ModuleSurvey {
+fn survey(
+    name: Name,
+    faces: Vec<Name>,
+    participants: &[ParticipantInfo],
+    mailboxes: &[MailboxInfo],
+    flows: &[FlowInfo],
+) -> ModuleSurvey {
     let own = |mailbox: &&MailboxInfo| mailbox.name.module() == name || faces.contains(&mailbox.name.module());
-    let (mut received, mut lost, mut depth) = (0, 0, 0);
-    for mailbox in mailboxes.iter().filter(own) {
-        received += mailbox.classes.iter().map(|class| class.received).sum::<u64>();
-        lost += mailbox.classes.iter().map(ClassTraffic::lost_in_all).sum::<u64>();
-        depth += mailbox.depth;
-    }
+    let own: Vec<&MailboxInfo> = mailboxes.iter().filter(own).collect();
+    let classes = || own.iter().flat_map(|mailbox| &mailbox.classes);
     let process = participants.iter().find(|participant| participant.module == name).cloned();
-    ModuleSurvey { name, faces, process, received, lost, depth }
+    let incarnation = process.as_ref().map(|process| process.incarnation);
+    let sends = |flow: &&FlowInfo| Some(flow.incarnation) == incarnation && !flow.is_publication();
+    let mut waited = Latency::default();
+    classes().for_each(|class| waited.add(&class.latency));
+    ModuleSurvey {
+        name,
+        faces,
+        process,
+        received: classes().map(|class| class.received).sum(),
+        bytes_in: classes().map(|class| class.body_bytes).sum(),
+        lost: classes().map(ClassTraffic::lost_in_all).sum(),
+        losses: Loss::ALL.map(|cause| classes().map(|class| class.lost(cause)).sum()),
+        waited,
+        sent: flows.iter().filter(sends).map(|flow| flow.packages).sum(),
+        bytes_out: flows.iter().filter(sends).map(|flow| flow.bytes).sum(),
+        depth: own.iter().map(|mailbox| mailbox.depth).sum(),
+    }
 }
 
 /// Adds up all mailboxes, class by class.

@@ -61,6 +61,7 @@ fn a_line_of_output_has_the_documented_bytes() {
         module: MOTOR.raw(),
         level: OutputLevel::Info,
         lost: 0,
+        suppressed: 0,
         text: "is on".into(),
     };
     let data = DataHead { stamp_ns: line.time_ns, sequence: 2, missed: line.lost };

@@ -5,7 +5,9 @@
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, Participant, Receiver, Shape};
 use rohrpost_modules::common::{DataHead, OutputLevel};
-use rohrpost_modules::output::{LINES, OutputLine, TEXT_MAX, drain, install, lost, retry_at, set_level};
+use rohrpost_modules::output::{
+    LINES, OutputLine, TEXT_MAX, drain, flush, install, level, lost, retry_at, set_level, suppressed,
+};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -19,10 +21,15 @@ motor = { id = 200, text = "Drives" }
 output = { id = 32, text = "Collects" }
 tool = { id = 16, text = "By hand" }
 [nodes.main]
+[output]
+burst = 100000
 [[module]]
 name = "motor.0"
 program = "motor"
 optional = true
+[[module]]
+name = "output.0"
+builtin = "output"
 "#;
 const ME: Name = Name::new(1, 200, 0, 0);
 const COLLECTOR: Name = Name::new(1, 32, 0, LINES);
@@ -63,18 +70,27 @@ fn lines_arrive_whole_or_are_counted() {
     assert_eq!(lost(), 44);
     assert!(retry_at().is_some_and(|at| at > Instant::now()), "a time that has passed would keep the module awake");
 
+    // Errors and panics have queues of their own: what waits already takes no room from them.
+    tracing::error!("an error behind the flood");
+    assert!(std::thread::spawn(|| panic!("a panic before there is a collector")).join().is_err());
+    assert_eq!(lost(), 44);
+
     // A collector comes, too small for all at once.
     let shape = Shape { slots: 8, ..Shape::default() };
     let mut collector = Participant::join(&node, Name::NONE).unwrap().receiver(COLLECTOR, shape).unwrap();
-    let mut lines: Vec<OutputLine> = (0..WAITING).map(|_| next(&mut collector)).collect();
-    assert_eq!(lines.iter().map(|line| line.lost).sum::<u32>(), 44, "it is said what was lost, once");
-    lines.sort_by_key(|line| line.text[5..].parse::<u32>().unwrap());
+    // What was tried first, when nobody was there, goes first; then what matters most.
+    let panic = next(&mut collector);
+    assert!(panic.text.ends_with("a panic before there is a collector") && panic.level == OutputLevel::Error);
+    assert_eq!((panic.lost, next(&mut collector).text.as_str()), (44, "an error behind the flood"));
+    let lines: Vec<OutputLine> = (0..WAITING).map(|_| next(&mut collector)).collect();
+    assert_eq!(lines.iter().map(|line| line.lost).sum::<u32>(), 0, "it is said what was lost, once");
     assert!(lines.iter().enumerate().all(|(n, line)| line.text == format!("line {n}") && line.module() == ME));
     nothing_more(&mut collector);
 
     // The level is changed while it runs.
     for (level, heard) in [(OutputLevel::Warn, "w"), (OutputLevel::Error, ""), (OutputLevel::Trace, "dw")] {
-        set_level(level);
+        let before = self::level();
+        assert_eq!((set_level(level), self::level()), (before, Some(level)));
         tracing::debug!("d");
         tracing::warn!("w");
         for text in heard.chars() {
@@ -108,4 +124,45 @@ fn lines_arrive_whole_or_are_counted() {
     tracing::info!("short");
     let line = next(&mut collector);
     assert_eq!((line.text.as_str(), line.lost, lost() - before), ("short", 1, 1));
+
+    // Last words find a collector that comes a little later. A computer may be too busy for that, but not each time.
+    let there = (0..100).any(|_| {
+        std::mem::replace(&mut collector, elsewhere(&node)).close();
+        tracing::error!("last words");
+        let ending = std::thread::spawn(flush);
+        collector = Participant::join(&node, Name::NONE).unwrap().receiver(COLLECTOR, Shape::default()).unwrap();
+        ending.join().unwrap();
+        collector.try_receive().is_some_and(|package| String::from_utf8_lossy(package.body()).ends_with("last words"))
+    });
+    assert!(there, "it ended without its last words");
+    while collector.try_receive().is_some() {}
+
+    // A flood beyond the allowance: the rest is counted before it is written, and told of.
+    let (lost_before, mut said, mut told) = (lost(), 0, 0);
+    let burst = 100_000;
+    for n in 0..2 * burst {
+        tracing::info!("{n}");
+        while collector.try_receive().is_some() {
+            said += 1;
+        }
+    }
+    let began = Instant::now();
+    while told == 0 && began.elapsed() < PATIENCE {
+        drain();
+        while let Some(package) = collector.try_receive() {
+            let (_, value) = DataHead::split(package.body()).unwrap();
+            let line: OutputLine = postcard::from_bytes(value).unwrap();
+            said += u64::from(line.suppressed == 0);
+            told += u64::from(line.suppressed);
+        }
+    }
+    // Some of the allowance was used up above.
+    assert!(said >= burst - 1000 && told > 0, "{said} said, {told} suppressed");
+    assert_eq!((said + told, told, lost()), (2 * burst, suppressed(), lost_before));
+}
+
+/// A mailbox that nobody sends to.
+fn elsewhere(node: &std::sync::Arc<Node>) -> Receiver {
+    let name = Name::new(1, 32, 9, LINES);
+    Participant::join(node, Name::NONE).unwrap().receiver(name, Shape::default()).unwrap()
 }

@@ -34,6 +34,15 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// Functions that every module has, besides those of its interface.
+pub(super) const COMMON: [(&str, &str); 5] = [
+    ("on", "Begins to work"),
+    ("off", "Goes to its safe state"),
+    ("status", "Says how it is"),
+    ("get", "Asks for its newest data of a kind"),
+    ("output-level", "Sets which lines it sends"),
+];
+
 /// A time that a user gave in seconds.
 pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())
@@ -64,7 +73,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
             let json = serde_json::to_value(tool.status(module)?)?;
             serde_json::from_value(json)?
         }
-        ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|()| Value::Null)?,
+        ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|_| Value::Null)?,
         ("get", [data]) => get(module, data, tool)?,
         (_, texts) => call(module, name, texts, tool)?,
     };
@@ -83,8 +92,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
 }
 
 pub(super) fn level_of(text: &str) -> Result<OutputLevel, Failure> {
-    use OutputLevel::{Debug, Error, Info, Trace, Warn};
-    let level = [Error, Warn, Info, Debug, Trace].into_iter().find(|level| level.name() == text);
+    let level = OutputLevel::ALL.into_iter().find(|level| level.name() == text);
     level.ok_or_else(|| format!("no level `{text}`; there are error, warn, info, debug, trace").into())
 }
 
@@ -111,6 +119,21 @@ fn postcard_u64(bytes: &[u8]) -> Option<(u64, &[u8])> {
 
 fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Result<Value, Failure> {
     let description = tool.describe(module)?;
+    let (function, body) = prepare(&description, name, texts)?;
+    let write = |to: &mut Vec<u8>| {
+        to.extend_from_slice(&body);
+        Ok(())
+    };
+    let bytes = tool.call(module, function.number, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
+    Ok(decode(&function.result, &bytes)?)
+}
+
+/// A function by its name, and its arguments as they go into a package.
+pub(super) fn prepare<'a>(
+    description: &'a Description,
+    name: &str,
+    texts: &[String],
+) -> Result<(&'a Function, Vec<u8>), Failure> {
     let function = description.function(name).ok_or_else(|| {
         let names: Vec<&str> = description.functions.iter().map(|function| function.name.as_str()).collect();
         let own = if names.is_empty() { String::new() } else { format!("{}, ", names.join(", ")) };
@@ -131,15 +154,11 @@ fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Resu
         };
         body.extend(encode(&argument.ty, &value).map_err(|error| format!("{}: {error}", argument.name))?);
     }
-    let write = |to: &mut Vec<u8>| {
-        to.extend_from_slice(&body);
-        Ok(())
-    };
-    let bytes = tool.call(module, function.number, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
-    Ok(decode(&function.result, &bytes)?)
+    Ok((function, body))
 }
 
-fn usage(function: &Function) -> String {
+/// A function with the names and types of its arguments.
+pub(super) fn usage(function: &Function) -> String {
     let arguments: Vec<String> = function
         .arguments
         .iter()

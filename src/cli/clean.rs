@@ -7,36 +7,71 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example: rohrpost clean\nWhat a launch or a living process uses is left alone.")]
-pub(super) struct Arguments {}
+pub(super) struct Arguments {
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
 
-pub(super) fn run(_: &Arguments) -> Result<ExitCode, Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let base = base_directory();
-    let Ok(entries) = std::fs::read_dir(&base) else {
-        say(format_args!("nothing to clean: {} does not exist", base.display()));
-        return Ok(ExitCode::SUCCESS);
-    };
-    let mut seen = 0;
+    let entries = std::fs::read_dir(&base).into_iter().flatten();
+    let mut done = Vec::new();
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
-        seen += 1;
         match clean(&path) {
-            Ok(done) => say(done),
             // Its launch has ended meanwhile, and removed it itself.
-            Err(_) if !path.exists() => continue,
-            Err(error) => say(error),
-        };
+            Err(_) if !path.exists() => {}
+            outcome => done.push((path, outcome)),
+        }
     }
-    if seen == 0 {
+    if arguments.json {
+        let nodes: Vec<serde_json::Value> = done.iter().map(|(path, outcome)| json(path, outcome)).collect();
+        say(serde_json::json!({ "directory": base, "nodes": nodes }));
+    } else if done.is_empty() {
         say(format_args!("nothing to clean in {}", base.display()));
+    } else {
+        for (path, outcome) in &done {
+            say(text(path, outcome));
+        }
     }
     remove_base_if_empty();
     Ok(ExitCode::SUCCESS)
 }
 
-/// Removes what is dead of one node; what was done.
-fn clean(path: &Path) -> Result<String, NodeError> {
+/// What was done with one node.
+enum Cleaned {
+    /// Nothing lived in it.
+    Removed,
+    /// It is in use; so many mailboxes in it had no owner.
+    InUse(usize),
+}
+
+fn text(path: &Path, outcome: &Result<Cleaned, NodeError>) -> String {
+    match outcome {
+        Ok(Cleaned::Removed) => format!("removed {}", path.display()),
+        Ok(Cleaned::InUse(1)) => format!("{} is in use; removed 1 mailbox without owner", path.display()),
+        Ok(Cleaned::InUse(removed)) => {
+            format!("{} is in use; removed {removed} mailboxes without owner", path.display())
+        }
+        Err(error) => format!("left alone: {error}"),
+    }
+}
+
+fn json(path: &Path, outcome: &Result<Cleaned, NodeError>) -> serde_json::Value {
+    match outcome {
+        Ok(Cleaned::Removed) => serde_json::json!({ "path": path, "removed": true }),
+        Ok(Cleaned::InUse(mailboxes)) => {
+            serde_json::json!({ "path": path, "removed": false, "mailboxes_removed": mailboxes })
+        }
+        Err(error) => serde_json::json!({ "path": path, "removed": false, "error": error.to_string() }),
+    }
+}
+
+/// Removes what is dead of one node.
+fn clean(path: &Path) -> Result<Cleaned, NodeError> {
     let node = Node::open(path)?;
     if node.remove_if_dead()? {
-        return Ok(format!("removed {}", path.display()));
+        return Ok(Cleaned::Removed);
     }
     let mut removed = 0;
     // A module that its launch is about to start again has no owner for a moment; its packages are waited for.
@@ -45,5 +80,5 @@ fn clean(path: &Path) -> Result<String, NodeError> {
             removed += usize::from(node.remove_orphan(name)?);
         }
     }
-    Ok(format!("{} is in use; removed {removed} mailboxes without owner", path.display()))
+    Ok(Cleaned::InUse(removed))
 }

@@ -56,7 +56,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
     let file = configuration(arguments, folder.path())?;
-    let installation = Arc::new(Installation::load(&file)?);
+    let installation = Arc::new(super::check::load(&file)?);
     let node = choose_node(&installation, None)?.name.clone();
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
@@ -124,8 +124,11 @@ fn configuration(arguments: &Arguments, temporary: &Path) -> Result<PathBuf, Fai
     let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
     let folder = if there { own.parent().unwrap_or(Path::new(".")).canonicalize()? } else { std::env::current_dir()? };
     // Checked as it was written, so that a mistake is told with its own file and line.
-    let installation = Installation::parse(&text, &own)?;
+    let installation = super::check::judge(Installation::parse(&text, &own)?)?;
     let mut table: toml::Table = toml::from_str(&text)?;
+    if let (Some(toml::Value::String(file)), true) = (table.get_mut("parameters"), there) {
+        *file = folder.join(&*file).display().to_string();
+    }
     let modules = table.get_mut("module").and_then(toml::Value::as_array_mut).ok_or("no [[module]]")?;
     for (entry, module) in modules.iter_mut().zip(&installation.modules) {
         let Some(entry) = entry.as_table_mut() else { continue };

@@ -2,7 +2,6 @@
 
 use super::summary::{ModuleLine, module_lines, print_modules_live};
 use super::{Failure, say};
-use rohrpost::config::Installation;
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::survey::Survey;
 use std::io::{IsTerminal, Write};
@@ -28,7 +27,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let installation = Arc::new(Installation::load(&arguments.file)?);
+    let installation = Arc::new(super::check::load(&arguments.file)?);
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
     let mut view = View::new(arguments.quiet);
@@ -99,7 +98,7 @@ impl View {
         }
         let survey = launch.survey()?;
         let lines = module_lines(launch.installation(), &survey, self.last.as_ref(), |name| {
-            (launch.restarts(name), launch.phase(name).cloned())
+            (launch.restarts(name), launch.phase(name))
         });
         self.draw(&launch.installation().name, &lines);
         self.last = Some(survey);

@@ -2,8 +2,9 @@
 
 use super::summary::{ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
-use super::target::{Running, Target};
+use super::target::Target;
 use super::{Failure, say};
+use rohrpost::config::Installation;
 use rohrpost::mailbox::{Loss, MailboxInfo};
 use rohrpost::survey::{Survey, purpose};
 use serde::Serialize;
@@ -22,21 +23,22 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// A mailbox, as the tables show it.
 #[derive(Serialize)]
-struct MailboxLine {
-    mailbox: String,
-    purpose: &'static str,
-    owner: Option<u32>,
-    slots: u16,
-    body_bytes_max: u16,
-    full: &'static str,
-    waiting: u32,
-    waiting_max: u32,
-    sent: u64,
-    received: u64,
-    lost: Vec<(&'static str, u64)>,
+pub(super) struct MailboxLine {
+    pub(super) mailbox: String,
+    pub(super) purpose: &'static str,
+    pub(super) owner: Option<u32>,
+    pub(super) slots: u16,
+    pub(super) body_bytes_max: u16,
+    pub(super) full: &'static str,
+    pub(super) waiting: u32,
+    pub(super) waiting_max: u32,
+    pub(super) sent: u64,
+    pub(super) received: u64,
+    pub(super) lost: Vec<(&'static str, u64)>,
     #[serde(skip)]
-    losses: String,
+    pub(super) losses: String,
 }
 
 #[derive(Serialize)]
@@ -54,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         installation: &running.installation.name,
         node: &running.node_name,
         modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
-        mailboxes: survey.mailboxes.iter().map(|mailbox| mailbox_line(&running, mailbox)).collect(),
+        mailboxes: mailbox_lines(&running.installation, &survey.mailboxes),
     };
     if arguments.json {
         say(serde_json::to_string(&listing)?);
@@ -68,10 +70,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn mailbox_line(running: &Running, mailbox: &MailboxInfo) -> MailboxLine {
+/// Mailboxes, one a line.
+pub(super) fn mailbox_lines(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<MailboxLine> {
+    mailboxes.iter().map(|mailbox| mailbox_line(installation, mailbox)).collect()
+}
+
+fn mailbox_line(installation: &Installation, mailbox: &MailboxInfo) -> MailboxLine {
     let lost = |cause: Loss| mailbox.classes.iter().map(|class| class.lost(cause)).sum();
     MailboxLine {
-        mailbox: running.installation.classes.format_full(mailbox.name),
+        mailbox: installation.classes.format_full(mailbox.name),
         purpose: purpose(mailbox.name.local()),
         owner: mailbox.owner,
         slots: mailbox.shape.slots,

@@ -1,46 +1,69 @@
-//! `rohrpost log`: what modules say.
+//! `rohrpost log`: what modules say, and how much of it.
+
+mod filter;
+mod levels;
+mod reader;
 
 use super::target::{Running, Target};
 use super::{Failure, say};
-use rohrpost::common::OutputLevel;
+use filter::Filter;
+use levels::Setting;
+use reader::Reader;
+use rohrpost::Name;
 use rohrpost::interface::Interface;
-use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::output::OutputLine;
-use rohrpost::{Name, ToolLink};
+use rohrpost::interfaces::CollectorInterface;
+use rohrpost::output::{Format, OutputLine};
+use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::Duration;
 
-const PATIENCE: Duration = Duration::from_secs(1);
 /// New lines are asked for so often.
 const POLL: Duration = Duration::from_millis(200);
 /// Number of `lines_from` in the collector's interface.
-const LINES_FROM: u16 = 16;
+pub(super) const LINES_FROM: u16 = 16;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost log                       what was said so far
-  rohrpost log --follow              and what is said from now on
-  rohrpost log --module pilot.0 --level warn")]
+  rohrpost log                           what was said so far
+  rohrpost log --follow                  and what is said from now on
+  rohrpost log --level warn              only warnings and errors
+  rohrpost log --module pilot.0 --text wall --since '5 min'
+  rohrpost log --level pilot.0=debug     makes pilot.0 say more; with --follow, and shows it
+  rohrpost log --level laser=error       makes all lasers say errors only
+  rohrpost log --levels                  from which level on each module speaks")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
     /// Go on with new lines until Ctrl-C.
     #[arg(long, short)]
     follow: bool,
-    /// Only lines as important as this: error, warn, info, debug, trace.
-    #[arg(long, default_value = "trace", value_name = "LEVEL")]
-    level: String,
-    /// Only lines of this module.
+    /// LEVEL: only lines as important as this: error, warn, info, debug, trace. NAME=LEVEL: set from which level on this
+    /// module, or each of this class, speaks, until it starts anew.
+    #[arg(long, value_name = "LEVEL|NAME=LEVEL")]
+    level: Vec<String>,
+    /// List from which level on each module speaks.
+    #[arg(long, conflicts_with_all = ["follow", "level"])]
+    levels: bool,
+    /// Only lines of this module; may be given several times.
     #[arg(long, value_name = "NAME")]
-    module: Option<String>,
+    module: Vec<String>,
+    /// Only lines of modules of this class; may be given several times.
+    #[arg(long, value_name = "CLASS")]
+    class: Vec<String>,
+    /// Only lines that contain this, in small or capital letters.
+    #[arg(long)]
+    text: Option<String>,
+    /// Only lines of the last while, such as '5 min'.
+    #[arg(long, value_name = "DURATION")]
+    since: Option<String>,
+    /// Only the last lines, so many.
+    #[arg(long, short = 'n', value_name = "COUNT")]
+    last: Option<usize>,
+    /// Wait so long for each answer, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    timeout: f64,
     /// One JSON object a line.
     #[arg(long)]
-    json: bool,
-}
-
-struct Filter {
-    level: OutputLevel,
-    module: Option<Name>,
     json: bool,
 }
 
@@ -49,76 +72,113 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let class = running.installation.classes.id(CollectorInterface::CLASS);
     let class = class.ok_or("the configuration has no class `output`, so nobody collects output")?;
     let collector = Name::new(running.installation.system.id, class.0, 0, 0);
-    let filter = Filter {
-        level: super::call::level_of(&arguments.level)?,
-        module: arguments.module.as_deref().map(|name| running.module(name)).transpose()?,
-        json: arguments.json,
-    };
-    let mut tool = running.join(PATIENCE)?;
-    let stop = rohrpost::launch::events()?;
-    let mut next = 0;
-    let result = loop {
-        match show(&running, collector, &filter, &mut next, &mut tool) {
-            Ok(true) if arguments.follow => {}
-            Ok(_) => break Ok(ExitCode::SUCCESS),
-            Err(error) => break Err(error),
-        }
-        if let Ok(rohrpost::launch::Event::Stop) = stop.recv_timeout(POLL) {
-            break Ok(ExitCode::SUCCESS);
-        }
-    };
+    let (settings, mut filter) = Filter::read(arguments, &running)?;
+    let settings: Vec<Setting> =
+        settings.iter().map(|(name, level)| Setting::read(name, level, &running)).collect::<Result<_, _>>()?;
+    let since = arguments.since.as_deref().map(rohrpost::config::parse_duration).transpose()?;
+    let mut tool = running.join(super::call::seconds(arguments.timeout)?)?;
+    if arguments.levels {
+        let code = levels::list(&running, arguments.json, &mut tool);
+        tool.close();
+        return code;
+    }
+    let code = levels::set(&settings, &running, arguments, &mut tool);
+    if !settings.is_empty() && !arguments.follow {
+        tool.close();
+        return Ok(code);
+    }
+    filter.since_ns = since.map(|since| tool.clock.now().ns.saturating_sub(since.as_nanos() as u64));
+    let show = Show { filter, format: Format::new(&running.installation), arguments };
+    let mut reader = Reader::new(&running, collector);
+    let result = show.all(&mut reader, &mut tool);
     tool.close();
-    result.map_err(|error: Failure| running.told(collector, &*error))
+    result.map(|()| code)
 }
 
-/// Prints all lines from `next` on; false when nobody reads any more.
-fn show(
-    running: &Running,
-    collector: Name,
-    filter: &Filter,
-    next: &mut u64,
-    tool: &mut ToolLink,
-) -> Result<bool, Failure> {
-    loop {
-        let from = *next;
-        let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(from,));
-        let read = |bytes: &[u8]| rohrpost::macro_support::from_bytes::<Page>(bytes);
-        let page = tool.call(collector, LINES_FROM, CollectorInterface::hash(), write, read)?;
-        if page.first > from && from > 0 {
-            say(format_args!("... {} lines are gone: the collector keeps fewer", page.first - from));
-        }
-        for line in &page.lines {
-            if !filter.passes(line) {
-                continue;
+/// What is shown, and how.
+struct Show<'a> {
+    filter: Filter,
+    format: Format<'a>,
+    arguments: &'a Arguments,
+}
+
+impl Show<'_> {
+    fn all(&self, reader: &mut Reader<'_>, tool: &mut rohrpost::ToolLink) -> Result<(), Failure> {
+        let stop = rohrpost::launch::events()?;
+        // With --last, what was said before is shown when all of it has been seen.
+        let mut last = VecDeque::new();
+        let keep = |line: OutputLine| {
+            last.push_back(line);
+            if last.len() > self.arguments.last.unwrap_or(0) {
+                last.pop_front();
             }
-            if !filter.print(running, line)? {
+            true
+        };
+        if self.arguments.last.is_some() {
+            self.pages(reader, tool, keep)?;
+        }
+        if !last.iter().all(|line| self.line(line)) {
+            return Ok(());
+        }
+        while self.pages(reader, tool, |line| self.line(&line))? && self.arguments.follow {
+            if let Ok(rohrpost::launch::Event::Stop) = stop.recv_timeout(POLL) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// All pages that are there; false when nobody reads any more.
+    fn pages(
+        &self,
+        reader: &mut Reader<'_>,
+        tool: &mut rohrpost::ToolLink,
+        mut show: impl FnMut(OutputLine) -> bool,
+    ) -> Result<bool, Failure> {
+        loop {
+            let news = reader.read(tool, self.arguments.follow)?;
+            if !news.note.is_none_or(|note| self.note(&note)) {
                 return Ok(false);
             }
+            let mut lines = news.lines.into_iter().filter(|line| self.filter.passes(line));
+            if !lines.all(&mut show) {
+                return Ok(false);
+            }
+            if !news.more {
+                return Ok(true);
+            }
         }
-        *next = page.first + page.lines.len() as u64;
-        if page.lines.is_empty() || *next >= page.next {
-            return Ok(true);
+    }
+
+    fn line(&self, line: &OutputLine) -> bool {
+        say(if self.arguments.json { self.format.json(line) } else { self.format.short(line) })
+    }
+
+    /// A word of ours between the lines; programs read lines alone.
+    fn note(&self, note: &str) -> bool {
+        if self.arguments.json {
+            eprintln!("… {note}");
+            return true;
         }
+        say(format_args!("… {note}"))
     }
 }
 
-impl Filter {
-    fn passes(&self, line: &OutputLine) -> bool {
-        line.level <= self.level && self.module.is_none_or(|module| module == line.module())
-    }
-
-    fn print(&self, running: &Running, line: &OutputLine) -> Result<bool, Failure> {
-        let module = running.text(line.module());
-        if self.json {
-            let object = serde_json::json!({
-                "time_ns": line.time_ns, "node": running.node_name, "module": module,
-                "level": line.level.name(), "lost_before": line.lost, "text": line.text,
-            });
-            return Ok(say(object));
+/// An answer that did not come, with what to do about it.
+fn told(running: &Running, collector: Name, error: &rohrpost::CallError) -> String {
+    use rohrpost::{CallError, Fault};
+    let name = running.text(collector);
+    let said = running.told(collector, error).to_string();
+    match error {
+        CallError::Fault(_, Fault::ModuleOff) => {
+            format!("the collector {name} is switched off: `rohrpost call {name} on` switches it on")
         }
-        if line.lost > 0 && !say(format_args!("... {} lines of {module} were lost", line.lost)) {
-            return Ok(false);
+        CallError::Timeout(..) => {
+            format!(
+                "{said} It hangs or is stopped: `rohrpost list` shows its process; if you end that, launch starts another"
+            )
         }
-        Ok(say(format_args!("{} {:5} {module}: {}", line.time_text(), line.level.name(), line.text)))
+        CallError::NotSent(_) => format!("{said} It collects what modules say; `rohrpost list` shows what runs"),
+        _ => said,
     }
 }

@@ -1,18 +1,31 @@
 //! The command line: one file a subcommand.
 
+mod bw;
 mod call;
 mod check;
 mod clean;
+mod completions;
+mod control;
+mod delay;
 mod demo;
+mod doctor;
 mod echo;
+mod graph;
+mod hz;
 mod launch;
 mod list;
 mod log;
+mod new;
+mod param;
+mod ping;
 mod run;
+mod send;
 mod status;
 mod summary;
 mod table;
 mod target;
+mod top;
+mod watch;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -36,8 +49,16 @@ enum Command {
     Launch(launch::Arguments),
     /// Run a simulated robot that drives and maps, or play a robot's log.
     Demo(demo::Arguments),
+    /// End a module and start it again.
+    Restart(control::Arguments),
+    /// End a module; it stays ended until it is started.
+    Stop(control::Arguments),
+    /// Start a module that was stopped, has ended, or failed.
+    Start(control::Arguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
+    /// Watch modules, and switch them on and off.
+    Top(top::Arguments),
     /// Ask modules how they are.
     Status(status::Arguments),
     /// Call a function of a module.
@@ -46,24 +67,59 @@ enum Command {
     Echo(echo::Arguments),
     /// Print what modules say.
     Log(log::Arguments),
+    /// Measure how often a module publishes; disturbs nobody.
+    Hz(hz::Arguments),
+    /// Measure the bytes that go in and out of a module; disturbs nobody.
+    Bw(bw::Arguments),
+    /// Measure how long packages wait; disturbs nobody.
+    Delay(delay::Arguments),
+    /// Show or draw who sends what to whom, how often; disturbs nobody.
+    Graph(graph::Arguments),
+    /// Measure how long a module takes to answer.
+    Ping(ping::Arguments),
+    /// Send a command over and over.
+    Send(send::Arguments),
+    /// Show, set, save and load the parameters of modules.
+    Param(param::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
+    /// Look whether this computer lets a robot run in time.
+    Doctor(doctor::Arguments),
+    /// Begin a module of your own: a project that compiles, runs and has a test.
+    New(new::Arguments),
+    /// Print a script by which a shell completes commands, modules, functions and data.
+    Completions(completions::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
 }
 
 /// Runs the command that was typed.
 pub(crate) fn main() -> ExitCode {
+    completions::answer();
     let result = match Arguments::parse().command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Restart(arguments) => control::run(&arguments, control::Order::Restart),
+        Command::Stop(arguments) => control::run(&arguments, control::Order::Stop),
+        Command::Start(arguments) => control::run(&arguments, control::Order::Start),
         Command::List(arguments) => list::run(&arguments),
+        Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),
         Command::Echo(arguments) => echo::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
+        Command::Hz(arguments) => hz::run(&arguments),
+        Command::Bw(arguments) => bw::run(&arguments),
+        Command::Delay(arguments) => delay::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
+        Command::Ping(arguments) => ping::run(&arguments),
+        Command::Send(arguments) => send::run(&arguments),
+        Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {

@@ -9,7 +9,7 @@ use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
 
 /// A module, as the tables show it.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(super) struct ModuleLine {
     pub(super) module: String,
     pub(super) faces: Vec<String>,
@@ -36,7 +36,7 @@ pub(super) fn module_lines(
         ModuleLine {
             module: installation.classes.format(module.name),
             faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
-            state: state(module, phase.as_ref(), installation),
+            state: state(module, phase, installation),
             priority: module.name.class().0,
             scheduling: scheduling(module.process.as_ref()),
             pid: module.process.as_ref().map(|process| process.pid),
@@ -60,11 +60,9 @@ fn scheduling(process: Option<&ParticipantInfo>) -> String {
     }
 }
 
-fn state(module: &ModuleSurvey, phase: Option<&Phase>, installation: &Installation) -> String {
+pub(super) fn state(module: &ModuleSurvey, phase: Option<Phase>, installation: &Installation) -> String {
     match (&module.process, phase) {
-        (_, Some(Phase::Failed(_))) => "failed".into(),
-        (_, Some(Phase::Ended)) => "ended".into(),
-        (_, Some(Phase::Waiting)) => "waiting".into(),
+        (_, Some(phase)) if phase.is_over() || phase == Phase::Waiting => phase.name().into(),
         (Some(process), _) => process.state.map_or("-", ModuleState::name).into(),
         (None, _) if is_left_out(module, installation) => "left out".into(),
         (None, _) => "dead".into(),

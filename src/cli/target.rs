@@ -4,6 +4,7 @@ use super::Failure;
 use clap::Args;
 use rohrpost::ToolLink;
 use rohrpost::config::Installation;
+use rohrpost::description::Description;
 use rohrpost::mailbox::{Name, Node, node_directory};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,6 +29,10 @@ pub(super) struct Running {
 }
 
 impl Target {
+    pub(super) fn new(config: Option<PathBuf>, node: Option<String>) -> Self {
+        Self { config, node }
+    }
+
     /// Finds the node that is meant.
     pub(super) fn find(&self) -> Result<Running, Failure> {
         let (config, node_name) = match &self.config {
@@ -68,6 +73,13 @@ fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
 }
 
 impl Running {
+    /// The same node, launched anew: what it runs may have changed since.
+    pub(super) fn again(&self) -> Result<Self, Failure> {
+        let (config, node_name) = noted_config(self.node.path())?;
+        let node = Node::open(self.node.path())?;
+        Ok(Self { installation: Installation::load(&config)?, node_name, node })
+    }
+
     /// Takes part as a tool.
     pub(super) fn join(&self, timeout: Duration) -> Result<ToolLink, Failure> {
         Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)
@@ -76,6 +88,17 @@ impl Running {
     /// The module or face that a user names.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
         Ok(self.installation.classes.parse_name(text)?.module())
+    }
+
+    /// What the module offers, as it noted beside its mailboxes: nobody is asked.
+    pub(super) fn noted(&self, module: Name) -> Result<Description, Failure> {
+        let text = self.text(module);
+        Description::noted(&self.node, module).ok_or_else(|| {
+            let known = self.installation.module(module).is_some();
+            let next =
+                if known { "is it launched? see `rohrpost list`" } else { "`rohrpost list` shows those that run" };
+            format!("{text} has no mailboxes here; {next}").into()
+        })
     }
 
     /// An error about a module, with its name as users write it: the lower layers know numbers only.

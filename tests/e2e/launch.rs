@@ -56,8 +56,7 @@ fn a_module_that_will_not_stop_is_killed_and_named() {
     wait("probe.3 works", || (place.recorded("work begins") == 1).then_some(()));
     tool.close();
     launch.signal(Signal::SIGTERM);
-    // Who presses Ctrl-C again and again makes it neither faster nor worse.
-    launch.signal(Signal::SIGINT);
+    // Whoever passes a word on at once says it a second time, and means the same.
     launch.signal(Signal::SIGINT);
     assert!(launch.end().success());
     for (module, killed) in [("probe.0", false), ("probe.1", true), ("probe.2", true)] {

@@ -6,14 +6,21 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod check;
+mod completions;
+mod control;
 mod crash;
 mod demo;
+mod doctor;
 mod harness;
 mod launch;
 mod mailboxes;
+mod new;
 mod nodes;
 mod once;
 mod once_wrap;
+mod output;
+mod output_log;
 mod probe;
 mod process;
 mod readme;

@@ -82,6 +82,14 @@ pub(crate) trait Probing {
     #[command(24, idempotent)]
     fn tell(&mut self, number: i64, ratio: f64, word: String, flag: bool, list: Vec<u16>) -> String;
 
+    /// Says so many lines at once.
+    #[command(40)]
+    fn flood(&mut self, level: String, lines: u32);
+
+    /// Panics: `here`, in a `thread`, or `twice`, the second time while the first unwinds.
+    #[command(41)]
+    fn panic(&mut self, place: String);
+
     /// Counts its periods.
     #[data(1)]
     fn beat() -> u64;
@@ -103,12 +111,22 @@ pub(crate) struct Settings {
     panic_at_start: bool,
     /// Ends before it is ready.
     exit_at_start: Option<i32>,
+    /// Only if there is such a file.
+    wait_for: Option<PathBuf>,
     refuse_at_start: bool,
     refuse_on: bool,
     /// Stops itself as Ctrl-Z would, before it is ready.
     hang_at_start: bool,
     /// Does nothing on any signal that asks it to end.
     ignore_stop: bool,
+}
+
+struct PanicsWhenDropped;
+
+impl Drop for PanicsWhenDropped {
+    fn drop(&mut self) {
+        panic!("the second of two");
+    }
 }
 
 pub(crate) struct Probe {
@@ -148,7 +166,8 @@ impl Module for Probe {
         if probe.settings.panic_at_start {
             panic!("a probe was asked to panic");
         }
-        if let Some(code) = probe.settings.exit_at_start {
+        let wait_for = probe.settings.wait_for.as_ref();
+        if let Some(code) = probe.settings.exit_at_start.filter(|_| wait_for.is_none_or(|file| file.exists())) {
             println!("a probe was asked to end with {code}");
             std::process::exit(code);
         }
@@ -222,6 +241,29 @@ impl Probing for Probe {
             "warn" => rohrpost::tracing::warn!("{text}"),
             "debug" => rohrpost::tracing::debug!("{text}"),
             _ => rohrpost::tracing::info!("{text}"),
+        }
+    }
+
+    fn flood(&mut self, level: String, lines: u32) {
+        for line in 0..lines {
+            self.say(level.clone(), format!("flood {line}"));
+        }
+        self.note("flooded");
+    }
+
+    fn panic(&mut self, place: String) {
+        self.note("panic");
+        match place.as_str() {
+            "thread" => {
+                let wheels = std::thread::Builder::new().name("wheels".into());
+                let panicked = wheels.spawn(|| panic!("the wheels came off")).unwrap().join();
+                assert!(panicked.is_err());
+            }
+            "twice" => {
+                let _second = PanicsWhenDropped;
+                panic!("the first of two");
+            }
+            _ => panic!("two lines\nof a panic"),
         }
     }
 

@@ -138,7 +138,9 @@ fn check_explains_good_files_and_places_the_mistakes_of_bad_ones() {
 #[test]
 fn a_module_that_is_configured_wrongly_is_not_started_again() {
     let place = Place::new();
-    let config = place.config(&["[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\nsettings = { colour = 1 }\n"]);
+    // As a program of its own it is asked nothing before it runs.
+    let program = format!("program = [\"{}\", \"run\", \"output\"]", env!("CARGO_BIN_EXE_rohrpost"));
+    let config = place.config(&[&format!("[[module]]\nname = \"output.0\"\n{program}\nsettings = {{ colour = 1 }}\n")]);
     let said = place.say(&["launch", config.to_str().unwrap(), "--quiet"]).fails();
     assert!(said.contains("settings of module `output.0`: unknown field `colour`"), "{said}");
     assert!(said.contains("ended with 78") && !said.contains("starts again"), "{said}");

@@ -96,7 +96,7 @@ fn what_modules_say_is_kept_and_filtered() {
     wait("the debug line", || texts(&[]).contains(&"probe.0 debug fourth".into()).then_some(()));
     let text = place.say(&["log", "--level", "error"]).ok();
     let (time, rest) = text.split_once(' ').unwrap();
-    assert_eq!((time.len(), rest), ("08:36:01.257".len(), "error probe.1: third\n"));
+    assert_eq!((time.len(), rest), ("08:36:01.257".len(), "error main/probe.1: third\n"));
 }
 
 #[test]
@@ -107,7 +107,7 @@ fn a_log_that_is_followed_shows_lines_as_they_come() {
     log.wait_for("probe.0: is on");
     for text in ["one", "two", "three"] {
         place.say(&["call", "probe.0", "say", "info", text]).ok();
-        log.wait_for(&format!("info  probe.0: {text}"));
+        log.wait_for(&format!("info  main/probe.0: {text}"));
     }
     log.stop();
     assert_eq!(log.err(), "");

@@ -1,12 +1,13 @@
 //! From a trait to an interface, a dispatcher, a description and a proxy.
 
+use crate::text::text_of;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 use syn::parse::{Parse, ParseStream};
 use syn::spanned::Spanned;
 use syn::{
-    Attribute, Error, Expr, ExprLit, FnArg, GenericArgument, Ident, ItemTrait, Lit, LitInt, LitStr, Meta, Pat,
-    PathArguments, Result, ReturnType, Signature, Token, TraitItem, TraitItemFn, Type,
+    Error, FnArg, GenericArgument, Ident, ItemTrait, LitInt, LitStr, Pat, PathArguments, Result, ReturnType, Signature,
+    Token, TraitItem, TraitItemFn, Type,
 };
 
 const ARGUMENTS_MAX: usize = 8;
@@ -210,18 +211,6 @@ fn distinct_names<'a>(names: impl Iterator<Item = &'a Ident>) -> Result<()> {
         seen.push(text);
     }
     Ok(())
-}
-
-/// The doc comment, joined to one text.
-fn text_of(attributes: &[Attribute]) -> String {
-    let lines = attributes.iter().filter_map(|attribute| match &attribute.meta {
-        Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
-            Expr::Lit(ExprLit { lit: Lit::Str(line), .. }) => Some(line.value().trim().to_owned()),
-            _ => None,
-        },
-        _ => None,
-    });
-    lines.collect::<Vec<_>>().join(" ").trim().to_owned()
 }
 
 fn interface(

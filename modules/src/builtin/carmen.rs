@@ -1,5 +1,6 @@
 //! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed.
 
+use super::check::{self, Refused, Settings as _};
 use crate::interfaces::{Laser, LaserInterface, Player, PlayerInterface, Progress, Wheels, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::robot::carmen::{self, Record};
@@ -28,6 +29,15 @@ pub(super) struct Settings {
     range_max_m: Option<f32>,
 }
 
+impl check::Settings for Settings {
+    fn check(&self) -> Result<(), Refused> {
+        if self.speed > 0.0 && self.speed <= SPEED_MAX {
+            return Ok(());
+        }
+        Err(Refused { key: "speed", why: format!("is {}; use more than 0, at most {SPEED_MAX}", self.speed) })
+    }
+}
+
 fn one() -> f64 {
     1.0
 }
@@ -49,12 +59,10 @@ impl Module for Carmen {
     type Interfaces = (PlayerInterface, WheelsInterface, LaserInterface);
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+        settings.check()?;
         let mut reading = carmen::Settings::default();
         reading.range_max_m = settings.range_max_m.unwrap_or(reading.range_max_m);
         let reader = carmen::open(&context.path(&settings.file), reading)?;
-        if settings.speed > SPEED_MAX {
-            return Err(ModuleError::new(format!("speed is {}; use at most {SPEED_MAX}", settings.speed)));
-        }
         let playback = Playback::new(reader, settings.speed)?;
         context.set_period(TICK);
         tracing::info!("plays {} at {} times its speed", settings.file, settings.speed);

@@ -1,5 +1,7 @@
 //! `mapper`: draws a map from scans and poses.
 
+use super::check::{self, Called, Refused, Settings as _};
+use crate::interface::Interface;
 use crate::interfaces::{Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::robot::grid::{Mapper, Settings as GridSettings, TileIndex};
@@ -27,6 +29,22 @@ pub(super) struct Settings {
     resolution_m: f64,
 }
 
+impl check::Settings for Settings {
+    fn check(&self) -> Result<(), Refused> {
+        if (0.005..=1.0).contains(&self.resolution_m) {
+            return Ok(());
+        }
+        Err(Refused { key: "resolution-m", why: format!("is {}; use 0.005 to 1", self.resolution_m) })
+    }
+
+    fn calls(&self) -> Vec<Called<'_>> {
+        vec![
+            Called { key: "laser", module: &self.laser, class: LaserInterface::CLASS },
+            Called { key: "odometry", module: &self.odometry, class: WheelsInterface::CLASS },
+        ]
+    }
+}
+
 fn resolution_m() -> f64 {
     GridSettings::default().resolution_m
 }
@@ -49,9 +67,7 @@ impl Module for MapModule {
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         let laser = context.subscribe(LaserInterface::SCAN, &settings.laser, Rate::Each)?;
         let odometry = context.subscribe(WheelsInterface::ODOMETRY, &settings.odometry, Rate::Each)?;
-        if !(0.005..=1.0).contains(&settings.resolution_m) {
-            return Err(ModuleError::new(format!("resolution-m is {}; use 0.005 to 1", settings.resolution_m)));
-        }
+        settings.check()?;
         let settings = GridSettings { resolution_m: settings.resolution_m, ..GridSettings::default() };
         context.set_period(TICK);
         Ok(Self {

@@ -1,24 +1,57 @@
 //! Modules that come with Rohrpost. Each is a thin shell around logic in [`crate::robot`].
 
 mod carmen;
+mod check;
 mod mapper;
 mod output;
 mod pilot;
 mod sim;
 
+pub use check::{check, check_saved};
+
+use crate::description::Description;
+use crate::interface::Interfaces;
+use crate::module::Module;
 use crate::runtime::{Start, StartError, run_started};
+use rohrpost_config::{Installation, Module as Configured, Problem, SettingsError};
+
+/// What can be done with a built-in module.
+struct Builtin {
+    run: fn(Start) -> Result<(), StartError>,
+    check: fn(&Installation, &Configured) -> Vec<Problem>,
+    check_saved: fn(&Installation, &Configured) -> Option<SettingsError>,
+    /// One for each class that it can answer to.
+    descriptions: fn() -> Vec<Description>,
+}
+
+impl Builtin {
+    fn of<M: Module<Settings: check::Settings>>() -> Self {
+        let descriptions = || M::Interfaces::table().into_iter().map(|served| served.description).collect();
+        Self { run: run_started::<M>, check: check::module::<M>, check_saved: check::saved::<M>, descriptions }
+    }
+
+    fn find(name: &str) -> Option<Self> {
+        Some(match name {
+            "sim" => Self::of::<sim::Sim>(),
+            "carmen" => Self::of::<carmen::Carmen>(),
+            "mapper" => Self::of::<mapper::MapModule>(),
+            "pilot" => Self::of::<pilot::PilotModule>(),
+            "output" => Self::of::<output::OutputModule>(),
+            _ => return None,
+        })
+    }
+}
 
 /// Runs a built-in module by its name in the configuration (`builtin = "sim"`).
 ///
 /// # Errors
 /// None for an unknown name; else what starting it brought.
 pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
-    Some(match name {
-        "sim" => run_started::<sim::Sim>(start),
-        "carmen" => run_started::<carmen::Carmen>(start),
-        "mapper" => run_started::<mapper::MapModule>(start),
-        "pilot" => run_started::<pilot::PilotModule>(start),
-        "output" => run_started::<output::OutputModule>(start),
-        _ => return None,
-    })
+    Some((Builtin::find(name)?.run)(start))
+}
+
+/// What a built-in module offers under the name of a class, its own or a face's; none if it knows no such class.
+pub fn description(builtin: &str, class: &str) -> Option<Description> {
+    let all = (Builtin::find(builtin)?.descriptions)();
+    all.into_iter().find(|description| description.class == class)
 }

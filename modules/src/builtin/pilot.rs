@@ -1,32 +1,44 @@
 //! `pilot`: drives about without hitting anything, by what the scanner sees.
 
-use crate::interfaces::{LaserInterface, MotorProxy};
+use super::check::{self, Called};
+use crate::interface::Interface;
+use crate::interfaces::{LaserInterface, MotorInterface, MotorProxy};
 use crate::module::{Module, ModuleError};
+use crate::parameter::ParameterSet;
 use crate::robot::pilot::{Pilot, Settings as PilotSettings};
 use crate::runtime::{Context, Rate, Received, Subscription};
 use crate::types::LaserScan;
-use serde::Deserialize;
 use std::time::Duration;
 
 /// A motor that does not answer in this time is not waited for: the next scan brings the next command.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[crate::parameters(crate = crate::macro_support)]
 pub(super) struct Settings {
     laser: String,
     motor: String,
-    #[serde(default = "cruise_m_s")]
+    /// Speed where there is room.
+    #[parameter(unit = "m/s", min = 0.0, max = 1.5, default = PilotSettings::CRUISE_M_S)]
     cruise_m_s: f64,
     #[serde(default)]
     seed: u64,
 }
 
-fn cruise_m_s() -> f64 {
-    PilotSettings::default().cruise_m_s
+impl check::Settings for Settings {
+    fn parameters(&self) -> &'static [&'static str] {
+        self.names()
+    }
+
+    fn calls(&self) -> Vec<Called<'_>> {
+        vec![
+            Called { key: "laser", module: &self.laser, class: LaserInterface::CLASS },
+            Called { key: "motor", module: &self.motor, class: MotorInterface::CLASS },
+        ]
+    }
 }
 
 pub(super) struct PilotModule {
+    settings: Settings,
     laser: Subscription<LaserScan>,
     motor: MotorProxy,
     pilot: Pilot,
@@ -43,7 +55,16 @@ impl Module for PilotModule {
         let motor = context.proxy::<MotorProxy>(&settings.motor)?.with_timeout(PATIENCE);
         let manners =
             PilotSettings { cruise_m_s: settings.cruise_m_s, seed: settings.seed, ..PilotSettings::default() };
-        Ok(Self { laser, motor, pilot: Pilot::new(manners), trouble: None })
+        Ok(Self { settings, laser, motor, pilot: Pilot::new(manners), trouble: None })
+    }
+
+    fn parameters(&mut self) -> Option<&mut dyn ParameterSet> {
+        Some(&mut self.settings)
+    }
+
+    fn parameters_changed(&mut self, _: &mut Context, _: &[&str]) -> Result<(), ModuleError> {
+        self.pilot.set_cruise(self.settings.cruise_m_s);
+        Ok(())
     }
 
     fn off(&mut self, _: &mut Context) {

@@ -1,24 +1,32 @@
 //! `sim`: a robot in a text map stands in for the drivers of motor, wheels and scanner.
 
+use super::check::{self, Refused, Settings as _};
 use crate::interfaces::{DriveError, LaserInterface, Motor, MotorInterface, WheelsInterface};
 use crate::module::{Module, ModuleError};
+use crate::parameter::ParameterSet;
 use crate::robot::simulator::{STEP_NS, Scanner, Settings as RobotSettings, Simulator};
 use crate::robot::world::World;
 use crate::runtime::Context;
 use crate::types::Twist;
 use rohrpost_mailbox::SystemClock;
-use serde::Deserialize;
 use std::time::Duration;
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+#[crate::parameters(crate = crate::macro_support)]
+#[serde(default)]
 pub(super) struct Settings {
     /// A text map, see `robot::world`.
     map: String,
     /// Side of a cell of an octile map, which does not say it.
     cell_m: f64,
     seed: u64,
+    /// Scans in a second of system time.
+    #[parameter(unit = "Hz", min = 0.01, max = 100.0)]
     laser_rate_hz: f64,
+    /// Standard deviation of a reading of the scanner.
+    #[parameter(unit = "m", min = 0.0, max = 1.0)]
+    laser_noise_m: f64,
+    /// Odometry in a second of system time.
+    #[parameter(unit = "Hz", min = 0.01, max = 100.0)]
     odometry_rate_hz: f64,
     beams: usize,
     range_max_m: f64,
@@ -32,6 +40,7 @@ impl Default for Settings {
             cell_m: 0.5,
             seed: 1,
             laser_rate_hz: 10.0,
+            laser_noise_m: Scanner::default().range_noise_m,
             odometry_rate_hz: 20.0,
             beams: 181,
             range_max_m: 8.0,
@@ -40,17 +49,19 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
-    fn check(&self) -> Result<(), ModuleError> {
-        for (name, value, least, most) in [
+impl check::Settings for Settings {
+    fn parameters(&self) -> &'static [&'static str] {
+        self.names()
+    }
+
+    fn check(&self) -> Result<(), Refused> {
+        for (key, value, least, most) in [
             ("beams", self.beams as f64, 1.0, 10_000.0),
             ("dead-man-ms", self.dead_man_ms as f64, 10.0, 60_000.0),
-            ("laser-rate-hz", self.laser_rate_hz, 0.01, 100.0),
-            ("odometry-rate-hz", self.odometry_rate_hz, 0.01, 100.0),
             ("range-max-m", self.range_max_m, 0.1, 1000.0),
         ] {
             if !(least..=most).contains(&value) {
-                return Err(ModuleError::new(format!("{name} is {value}; use {least} to {most}")));
+                return Err(Refused { key, why: format!("is {value}; use {least} to {most}") });
             }
         }
         Ok(())
@@ -58,6 +69,7 @@ impl Settings {
 }
 
 pub(super) struct Sim {
+    settings: Settings,
     simulator: Simulator,
     clock: SystemClock,
     odometry: Every,
@@ -73,7 +85,14 @@ struct Every {
 
 impl Every {
     fn hz(rate_hz: f64) -> Self {
-        Self { period_ns: (1e9 / rate_hz.clamp(0.01, 100.0)) as u64, next_ns: 0 }
+        Self { period_ns: period_ns(rate_hz), next_ns: 0 }
+    }
+
+    /// From the last time on, at another rate.
+    fn set_hz(&mut self, rate_hz: f64) {
+        let last_ns = self.next_ns.saturating_sub(self.period_ns);
+        self.period_ns = period_ns(rate_hz);
+        self.next_ns = last_ns + self.period_ns;
     }
 
     /// Whether it is time again.
@@ -84,6 +103,10 @@ impl Every {
         self.next_ns = (self.next_ns + self.period_ns).max(now_ns.saturating_sub(self.period_ns));
         true
     }
+}
+
+fn period_ns(rate_hz: f64) -> u64 {
+    (1e9 / rate_hz) as u64
 }
 
 fn world(settings: &Settings, context: &Context) -> Result<World, ModuleError> {
@@ -104,7 +127,8 @@ impl Module for Sim {
         let world = world(&settings, context)?;
         let (width_m, height_m) = world.size_m();
         tracing::info!("simulates a robot in {}, {width_m:.0} m by {height_m:.0} m", settings.map);
-        let scanner = Scanner { beams: settings.beams, range_max_m: settings.range_max_m, ..Scanner::default() };
+        let Settings { beams, range_max_m, laser_noise_m: range_noise_m, .. } = settings;
+        let scanner = Scanner { beams, range_max_m, range_noise_m, ..Scanner::default() };
         let dead_man_ns = settings.dead_man_ms * 1_000_000;
         let robot = RobotSettings { seed: settings.seed, scanner, dead_man_ns, ..RobotSettings::default() };
         // A simulation that runs faster than the world looks at its clock more often.
@@ -116,7 +140,19 @@ impl Module for Sim {
             odometry: Every::hz(settings.odometry_rate_hz),
             laser: Every::hz(settings.laser_rate_hz),
             bumps: 0,
+            settings,
         })
+    }
+
+    fn parameters(&mut self) -> Option<&mut dyn ParameterSet> {
+        Some(&mut self.settings)
+    }
+
+    fn parameters_changed(&mut self, _: &mut Context, _: &[&str]) -> Result<(), ModuleError> {
+        self.laser.set_hz(self.settings.laser_rate_hz);
+        self.odometry.set_hz(self.settings.odometry_rate_hz);
+        self.simulator.set_range_noise(self.settings.laser_noise_m);
+        Ok(())
     }
 
     fn off(&mut self, _: &mut Context) {

@@ -209,10 +209,19 @@ impl Link {
     /// The outcome of a call without a result, if it is known by now; none while it is under way. Repeats the command when
     /// it is time.
     pub fn poll(&mut self, sequence: u32) -> Option<Result<(), CallError>> {
+        self.poll_for(sequence, |_| Ok(()))
+    }
+
+    /// The same of a call with a result, whose bytes `read` takes.
+    pub fn poll_for<T>(
+        &mut self,
+        sequence: u32,
+        read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
+    ) -> Option<Result<T, CallError>> {
         let at = self.calls.iter().position(|call| call.sequence == sequence)?;
         let (call, now) = (&self.calls[at], Instant::now());
         if call.answer.is_some() || now >= call.began + call.timeout {
-            return Some(self.finish(at, |_| Ok(())));
+            return Some(self.finish(at, read));
         }
         if now >= call.repeat_at {
             self.repeat(at, now);

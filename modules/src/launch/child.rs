@@ -1,44 +1,49 @@
-//! One module's process: started, watched, started again, stopped.
+//! One module's process: started, watched, started again, stopped. Nothing here waits: each step looks, and says when to
+//! look again.
 
+use super::control::{ChildState, Phase};
 use super::leftovers::KILL_TIME;
+use super::policy::{Next, Policy};
+use super::printed::Printed;
 use crate::runtime::{StartError, environment};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost_config::{Installation, Module, Program, Restart, RestartPolicy, Start, find_program};
+use rohrpost_config::{Installation, Module, Program, Restart, Start, find_program};
 use rohrpost_mailbox::{ModuleState, Name, Node};
-use std::collections::VecDeque;
-use std::io::{self, BufRead, BufReader, PipeReader};
+use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Longest pause before a restart.
-const BACKOFF_MAX: Duration = Duration::from_secs(10);
-/// Lines of what a module printed that are kept to be told when it ends: a panic and its back trace.
-const PRINTED_MAX: usize = 64;
-
+/// While a module starts or ends it is looked after so often.
+const LOOK: Duration = Duration::from_millis(5);
 /// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes behind
 /// that hold its pipe.
 const PRINTED_WAIT: Duration = Duration::from_millis(100);
+/// Bytes of a text that are told to tools.
+const TOLD_MAX: usize = 1000;
 
-/// Where launch stands with a module.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Phase {
-    /// Not started yet, or waiting to be started again.
-    Waiting,
-    /// Started, not ready.
-    Starting,
-    /// Ready, and not switched on yet.
-    Ready,
-    /// At work, or switched off by somebody.
-    Running,
-    /// Ended, and that was all right.
-    Ended,
-    /// Ended, and not to be started again.
-    Failed(String),
+/// What becomes of a module that is told to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Then {
+    /// It stays ended until somebody starts it.
+    Stay,
+    /// It is started again.
+    Start,
+    /// It is launch that ends.
+    End,
+}
+
+/// A process on its way to its end.
+struct Ending {
+    then: Then,
+    /// When it was told.
+    since: Instant,
+    /// When it was killed, since it did not obey.
+    killed: Option<Instant>,
+    /// Not even that helped.
+    left_behind: bool,
 }
 
 /// A module and its process.
@@ -48,20 +53,28 @@ pub(super) struct Child {
     arguments: Vec<String>,
     config: PathBuf,
     program: PathBuf,
-    restart: Restart,
-    start: Start,
+    policy: Policy,
+    /// Whether it is switched on when it is ready.
+    turn_on: bool,
+    configured_on: bool,
     ready_within: Duration,
     stop_within: Duration,
     phase: Phase,
     process: Option<std::process::Child>,
+    /// Its process has ended so, then; what it printed last may still come.
+    over: Option<(ExitStatus, Instant)>,
+    ending: Option<Ending>,
+    /// It was started then, or will be.
     since: Instant,
-    /// When it was started again, the last times.
-    restarted: VecDeque<Instant>,
+    /// Processes it has had.
+    lives: u32,
+    /// How often its policy started it again.
     restarts: u32,
-    backoff: Duration,
-    printed: Arc<Mutex<VecDeque<String>>>,
-    /// Reads what the process prints.
-    reader: Option<JoinHandle<()>>,
+    /// How it ended, and what it had printed; empty if it never did.
+    last_end: String,
+    printed: Printed,
+    /// Launch ends: nothing is started any more.
+    last_life: bool,
 }
 
 impl Child {
@@ -75,24 +88,28 @@ impl Child {
                 (found.unwrap_or_else(|| program.into()), words.iter().skip(1).cloned().collect())
             }
         };
+        let configured_on = module.start == Start::On;
         Self {
             name: module.name,
             text: installation.classes.format(module.name),
             arguments,
             config: installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone()),
             program,
-            restart: module.restart,
-            start: module.start,
+            policy: Policy::new(module.restart),
+            turn_on: configured_on,
+            configured_on,
             ready_within: module.ready_within,
             stop_within: module.stop_within,
             phase: Phase::Waiting,
             process: None,
+            over: None,
+            ending: None,
             since: Instant::now(),
-            restarted: VecDeque::new(),
+            lives: 0,
             restarts: 0,
-            backoff: module.restart.backoff,
-            printed: Arc::default(),
-            reader: None,
+            last_end: String::new(),
+            printed: Printed::default(),
+            last_life: false,
         }
     }
 
@@ -104,16 +121,32 @@ impl Child {
         &self.text
     }
 
-    pub(super) fn phase(&self) -> &Phase {
-        &self.phase
+    pub(super) fn phase(&self) -> Phase {
+        self.phase
     }
 
     pub(super) fn restarts(&self) -> u32 {
         self.restarts
     }
 
+    /// Processes it has had.
+    pub(super) fn lives(&self) -> u32 {
+        self.lives
+    }
+
+    /// Whether it is there, or on its way, and meant to stay.
+    pub(super) fn is_at_work(&self) -> bool {
+        let running = matches!(self.phase, Phase::Starting | Phase::Ready | Phase::Running);
+        running && self.process.is_some()
+    }
+
+    /// How it ended the last time, and what it had printed.
+    pub(super) fn last_end(&self) -> &str {
+        &self.last_end
+    }
+
     pub(super) fn wants_on(&self) -> bool {
-        self.start == Start::On
+        self.turn_on
     }
 
     /// It has been switched on, or is not meant to be.
@@ -121,25 +154,59 @@ impl Child {
         self.phase = Phase::Running;
     }
 
+    /// As tools are told.
+    pub(super) fn state(&self, now: Instant) -> ChildState {
+        let waits = self.phase == Phase::Waiting && self.process.is_none() && self.lives > 0;
+        ChildState {
+            module: self.text.clone(),
+            phase: self.phase,
+            pid: self.process.as_ref().map(std::process::Child::id),
+            lives: self.lives,
+            restarts: self.restarts,
+            starts_in_ms: waits.then(|| self.since.saturating_duration_since(now).as_millis() as u32),
+            last_end: cut(&self.last_end),
+            printed: cut(&self.printed.last()),
+        }
+    }
+
+    /// When it has to be looked after again, if no signal comes before.
+    pub(super) fn look_again(&self, now: Instant) -> Option<Duration> {
+        match self.phase {
+            _ if self.over.is_some() => Some(LOOK),
+            Phase::Starting | Phase::Stopping => Some(LOOK),
+            // Killed, since it did not get ready.
+            Phase::Waiting if self.process.is_some() => Some(LOOK),
+            Phase::Waiting if !self.last_life => Some(self.since.saturating_duration_since(now)),
+            _ => None,
+        }
+    }
+
     /// Starts the process, in a process group of its own so that a Ctrl-C is launch's to handle.
     pub(super) fn spawn(&mut self) {
         self.since = Instant::now();
         match self.try_spawn() {
-            Ok((process, reader)) => {
-                (self.process, self.reader) = (Some(process), Some(reader));
+            Ok(process) => {
+                self.process = Some(process);
                 self.phase = Phase::Starting;
+                self.lives += 1;
             }
-            Err(error) => self.phase = Phase::Failed(format!("{}: {error}", self.program.display())),
+            Err(error) => {
+                self.last_end = format!("{}: {error}", self.program.display());
+                self.phase = Phase::Failed;
+            }
         }
     }
 
-    fn try_spawn(&self) -> io::Result<(std::process::Child, JoinHandle<()>)> {
-        let (reader, writer) = io::pipe()?;
-        let printed = self.printed.clone();
-        // First: a process without one would be a process that nobody watches.
-        let keep = move || keep_last(reader, &printed);
-        let reader = std::thread::Builder::new().name("printed".into()).spawn(keep)?;
-        let process = Command::new(&self.program)
+    fn try_spawn(&mut self) -> io::Result<std::process::Child> {
+        // First: a process whose words nobody reads would be stuck at the first of them too many.
+        let writer = self.printed.begin()?;
+        let mut command = Command::new(&self.program);
+        // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes before any
+        // word of launch's: so it switches itself on. At the first start launch does, when all are ready.
+        if self.lives == 0 || !self.turn_on {
+            command.env(environment::OFF, "1");
+        }
+        command
             .args(&self.arguments)
             .env(environment::CONFIG, &self.config)
             .env(environment::MODULE, &self.text)
@@ -149,8 +216,7 @@ impl Child {
             .stdout(writer.try_clone()?)
             .stderr(writer)
             .process_group(0)
-            .spawn()?;
-        Ok((process, reader))
+            .spawn()
     }
 
     /// Looks after it; what there is to say.
@@ -159,16 +225,23 @@ impl Child {
             match process.try_wait() {
                 Ok(Some(status)) => {
                     self.process = None;
+                    self.over = Some((status, now));
                     // Receivers look for what it left, and whoever sleeps on it wakes.
                     node.announce_death();
-                    return Some(self.ended(status, now));
                 }
                 Ok(None) => {}
                 Err(error) => return Some(format!("{}: {error}", self.text)),
             }
         }
+        if let Some((status, at)) = self.over {
+            if !self.printed.is_complete() && now - at < PRINTED_WAIT {
+                return None;
+            }
+            self.over = None;
+            return self.ended(status, now);
+        }
         match self.phase {
-            Phase::Starting if self.is_ready(node) => self.phase = Phase::Ready,
+            Phase::Starting if self.state_of(node).is_some_and(is_ready) => self.phase = Phase::Ready,
             Phase::Starting if now - self.since > self.ready_within => {
                 let within = self.ready_within;
                 self.kill(Signal::SIGKILL);
@@ -176,67 +249,140 @@ impl Child {
                 self.phase = Phase::Waiting;
                 return Some(format!("{} was not ready within {within:?}; killed", self.text));
             }
-            Phase::Waiting if self.process.is_none() && now >= self.since => self.spawn(),
+            Phase::Waiting if self.process.is_none() && now >= self.since && !self.last_life => self.spawn(),
+            Phase::Stopping => return self.press(now),
             _ => {}
         }
         None
     }
 
-    fn is_ready(&self, node: &Node) -> bool {
-        let pid = self.process.as_ref().map(std::process::Child::id);
-        let ready = |state| !matches!(state, ModuleState::Starting | ModuleState::Stopping);
-        node.participants().iter().any(|p| p.module == self.name && Some(p.pid) == pid && p.state.is_some_and(ready))
+    /// What its process says of itself in the node's table.
+    fn state_of(&self, node: &Node) -> Option<ModuleState> {
+        let pid = self.process.as_ref()?.id();
+        node.participants().iter().find(|p| p.module == self.name && p.pid == pid)?.state
     }
 
-    /// It has ended: again, or not, as its policy has it.
-    fn ended(&mut self, status: ExitStatus, now: Instant) -> String {
+    /// It has ended: again, or not, as was asked for, or as its policy has it.
+    fn ended(&mut self, status: ExitStatus, now: Instant) -> Option<String> {
         let how = match (status.code(), status.signal()) {
             (Some(code), _) => format!("ended with {code}"),
             (None, Some(signal)) => format!("was killed by signal {signal}"),
             (None, None) => "ended".to_owned(),
         };
+        if let Some(ending) = self.ending.take() {
+            return self.ended_as_told(&ending, &how, now);
+        }
+        // Whoever waits for its work expects it to go on as configured.
+        self.turn_on = self.configured_on;
+        let printed = self.printed.below();
+        self.last_end = format!("{how}{printed}");
         // Started again, it would find the same configuration.
         let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
-        let again = match self.restart.policy {
-            _ if misconfigured => false,
-            RestartPolicy::Never => false,
-            RestartPolicy::OnFailure => !status.success(),
-            RestartPolicy::Always => true,
+        let next = if misconfigured || self.last_life { Next::Stay } else { self.policy.ended(status.success(), now) };
+        let told = match next {
+            Next::Stay => {
+                self.phase = if status.success() { Phase::Ended } else { Phase::Failed };
+                &self.last_end
+            }
+            Next::GivenUp => {
+                let Restart { at_most, within, .. } = self.policy.restart();
+                self.phase = Phase::Failed;
+                self.last_end = format!("{how}; given up after {at_most} restarts within {within:?}{printed}");
+                &self.last_end
+            }
+            Next::Again(pause) => {
+                self.restarts += 1;
+                self.phase = Phase::Waiting;
+                self.since = now + pause;
+                &format!("{how}; starts again in {pause:?}{printed}")
+            }
         };
-        let printed = self.take_printed();
-        if !again {
-            let how_ended = format!("{how}{printed}");
-            self.phase = if status.success() { Phase::Ended } else { Phase::Failed(how_ended.clone()) };
-            return format!("{} {how_ended}", self.text);
-        }
-        self.restarted.push_back(now);
-        self.restarted.retain(|at| now - *at <= self.restart.within);
-        if self.restarted.len() > self.restart.at_most as usize {
-            let Restart { at_most, within, .. } = self.restart;
-            let why = format!("{how}; given up after {at_most} restarts within {within:?}{printed}");
-            self.phase = Phase::Failed(why.clone());
-            return format!("{} {why}", self.text);
-        }
-        // Alone for a while, it begins with the short pause again.
-        if self.restarted.len() == 1 {
-            self.backoff = self.restart.backoff;
-        }
-        let pause = self.backoff;
-        self.backoff = (self.backoff * 2).min(BACKOFF_MAX);
-        self.restarts += 1;
-        self.phase = Phase::Waiting;
-        self.since = now + pause;
-        format!("{} {how}; starts again in {pause:?}{printed}", self.text)
+        Some(format!("{} {told}", self.text))
     }
 
-    fn take_printed(&mut self) -> String {
-        let deadline = Instant::now() + PRINTED_WAIT;
-        while self.reader.as_ref().is_some_and(|reader| !reader.is_finished()) && Instant::now() < deadline {
-            std::thread::sleep(Duration::from_millis(1));
+    fn ended_as_told(&mut self, ending: &Ending, how: &str, now: Instant) -> Option<String> {
+        let obeyed = if ending.killed.is_some() { "since it did not stop when told to" } else { "when told to" };
+        self.last_end = format!("{how} {obeyed}");
+        match ending.then {
+            Then::End => {
+                self.phase = Phase::Ended;
+                None
+            }
+            Then::Stay => {
+                self.phase = Phase::Stopped;
+                Some(format!("{} is stopped, as asked", self.text))
+            }
+            Then::Start => {
+                self.phase = Phase::Waiting;
+                self.since = now;
+                Some(format!("{} is started again, as asked", self.text))
+            }
         }
-        self.reader = None;
-        let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
-        printed.drain(..).map(|line| format!("\n    {line}")).collect()
+    }
+
+    /// Tells its process to end; `step` sees to it that it does. A later wish replaces an earlier one.
+    pub(super) fn tell_to_end(&mut self, then: Then, node: &Node, now: Instant) {
+        self.last_life |= then == Then::End;
+        if then == Then::Start {
+            self.policy.begin_anew();
+        }
+        if let Some(ending) = &mut self.ending {
+            ending.then = then;
+            return;
+        }
+        match self.phase {
+            // Somebody has switched it off, and wants it so.
+            Phase::Running => self.turn_on = self.state_of(node) != Some(ModuleState::Off),
+            _ if self.phase.is_over() => self.turn_on = self.configured_on,
+            _ => {}
+        }
+        if self.process.is_some() || self.over.is_some() {
+            self.kill(Signal::SIGTERM);
+            self.phase = Phase::Stopping;
+            self.ending = Some(Ending { then, since: now, killed: None, left_behind: false });
+        } else if then == Then::Start {
+            (self.phase, self.since) = (Phase::Waiting, now);
+        } else if !self.phase.is_over() {
+            self.phase = if then == Then::Stay { Phase::Stopped } else { Phase::Ended };
+        }
+    }
+
+    /// Sees to it that a process that was told to end does.
+    fn press(&mut self, now: Instant) -> Option<String> {
+        let (within, pid) = (self.stop_within, self.process.as_ref()?.id());
+        let ending = self.ending.as_mut()?;
+        match ending.killed {
+            None if now >= ending.since + within => {
+                self.force(now);
+                Some(format!("{} did not stop within {within:?}; killed", self.text))
+            }
+            Some(at) if now >= at + KILL_TIME && !ending.left_behind => {
+                // It waits for broken hardware, say. The others still have to be looked after.
+                ending.left_behind = true;
+                Some(format!("{} (process {pid}) cannot even be killed; left behind", self.text))
+            }
+            _ => None,
+        }
+    }
+
+    /// Kills a process that was told to end; false when there is none, or it was killed before.
+    pub(super) fn force(&mut self, now: Instant) -> bool {
+        let Some(ending) = self.ending.as_mut().filter(|ending| ending.killed.is_none()) else { return false };
+        ending.killed = Some(now);
+        // A stopped process obeys this one too.
+        self.kill(Signal::SIGKILL);
+        true
+    }
+
+    /// Whether it was told to end and did not within its time.
+    pub(super) fn overran(&self) -> bool {
+        self.ending.as_ref().is_some_and(|ending| ending.killed.is_some())
+    }
+
+    /// Whether there is nothing more to wait for.
+    pub(super) fn is_gone(&self) -> bool {
+        let left_behind = self.ending.as_ref().is_some_and(|ending| ending.left_behind);
+        left_behind || self.process.is_none() && self.over.is_none()
     }
 
     fn kill(&self, signal: Signal) {
@@ -246,47 +392,18 @@ impl Child {
         }
     }
 
-    /// Stops it: by word, then by force. What there is to say.
-    pub(super) fn stop(&mut self, node: &Node) -> Option<String> {
-        self.kill(Signal::SIGTERM);
-        let deadline = Instant::now() + self.stop_within;
-        let mut killed = None;
-        while let Some(process) = &mut self.process {
-            match process.try_wait() {
-                Ok(None) if killed.is_some() && Instant::now() >= deadline + KILL_TIME => {
-                    // It waits for broken hardware, say. The others still have to be stopped.
-                    killed =
-                        Some(format!("{} (process {}) cannot even be killed; left behind", self.text, process.id()));
-                    break;
-                }
-                Ok(None) if Instant::now() < deadline || killed.is_some() => {
-                    std::thread::sleep(Duration::from_millis(2));
-                }
-                Ok(None) => {
-                    let within = self.stop_within;
-                    // A stopped process obeys this one too.
-                    self.kill(Signal::SIGKILL);
-                    killed = Some(format!("{} did not stop within {within:?}; killed", self.text));
-                }
-                Ok(Some(_)) | Err(_) => self.process = None,
-            }
-        }
-        node.announce_death();
-        self.phase = Phase::Ended;
-        killed
+    /// Launch ends: whatever happens, it is not started any more.
+    pub(super) fn begin_last_life(&mut self) {
+        self.last_life = true;
     }
 }
 
-/// Keeps the last lines that come through a pipe, until it closes.
-fn keep_last(pipe: PipeReader, printed: &Mutex<VecDeque<String>>) {
-    let mut pipe = BufReader::new(pipe);
-    let mut line = Vec::new();
-    while let Ok(1..) = io::Read::take(&mut pipe, 4096).read_until(b'\n', &mut line) {
-        let mut printed = printed.lock().unwrap_or_else(PoisonError::into_inner);
-        if printed.len() == PRINTED_MAX {
-            printed.pop_front();
-        }
-        printed.push_back(String::from_utf8_lossy(&line).trim_end().to_owned());
-        line.clear();
-    }
+fn is_ready(state: ModuleState) -> bool {
+    !matches!(state, ModuleState::Starting | ModuleState::Stopping)
+}
+
+/// As much of a text as tools are told.
+fn cut(text: &str) -> String {
+    let end = (0..=TOLD_MAX.min(text.len())).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
+    text[..end].to_owned()
 }

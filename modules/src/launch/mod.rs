@@ -2,39 +2,57 @@
 //!
 //! ```text
 //!           spawn            state ≠ starting          on
-//! Waiting ─────────▶ Starting ───────────────▶ Ready ──────▶ Running ──▶ ended
-//!    ▲  backoff                                                │           │ policy
-//!    └──────────────────────────────────────────────────────────┴───────────┘──▶ Ended, Failed
+//! Waiting ─────────▶ Starting ───────────────▶ Ready ──────▶ Running ──▶ ended ── policy ──▶ Ended, Failed
+//!    ▲                                                           │           │ backoff
+//!    ├───────────────────────────────────────────────────────────│───────────┘
+//!    └── restart, start ── Stopping ◀── told to, from any ───────┘
+//!                             └── stop ──▶ Stopped
 //! ```
+//!
+//! One thread turns round and round: it looks after each module, moves the calls on that switch modules on, and answers
+//! tools (`serve`). Nothing in it waits for a module. It sleeps on launch's mailboxes; signals ring the same bell.
 //!
 //! If launch dies, the kernel tells each module (see `runtime::start`), which goes to its safe state and ends; one that
 //! cannot is ended by the next launch.
 
 mod child;
+mod control;
+mod end;
+mod events;
 mod leftovers;
+mod policy;
+mod printed;
+mod serve;
 
-pub use child::Phase;
+pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase};
+pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
 
 use crate::call::CallError;
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
+use end::Ending;
+use events::Bell;
 use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as ConfiguredTime};
 use rohrpost_mailbox::{
     LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
+    wait_any,
 };
+use serve::{Counter, Orders};
 use std::io::ErrorKind;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 /// Modules answer launch within this time.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// While a module starts it is looked after so often, and while it is switched on: an answer takes moments.
-const LOOK_STARTING: Duration = Duration::from_millis(5);
-const LOOK_SWITCHING: Duration = Duration::from_millis(1);
+/// While a module is being switched on, its call is looked at so often; an answer wakes launch sooner.
+const LOOK_SWITCHING: Duration = Duration::from_millis(50);
+/// While all modules are being stopped, it is looked so often who may be told next.
+const LOOK_ENDING: Duration = Duration::from_millis(20);
 /// Notes that are kept for who asks; the oldest go first.
 const NOTES_MAX: usize = 1000;
 
@@ -70,14 +88,6 @@ pub enum LaunchError {
     NotReady(String, String),
 }
 
-/// What wakes launch.
-pub enum Event {
-    /// End it all: a signal, or whoever runs launch.
-    Stop,
-    /// A child may have ended.
-    Child,
-}
-
 /// A node that is launched. The thread that begins it must live as long as its modules: the kernel takes that thread's end
 /// for launch's, and tells them so.
 pub struct Launch {
@@ -88,9 +98,10 @@ pub struct Launch {
     /// Of each child: the call that switches it on, while it is under way.
     switching: Vec<Option<u32>>,
     tool: ToolLink,
+    counter: Counter,
+    bell: Bell,
     lock: LaunchLock,
     _time: TimeKeeper,
-    events: Receiver<Event>,
     /// What happened, for whoever shows it; oldest first.
     notes: Vec<String>,
 }
@@ -133,7 +144,9 @@ impl Launch {
         notes.extend(missing.iter().map(ToString::to_string));
         let time = begin_time(&node, &installation)?;
         leftovers::note_config(&node, &installation, node_name)?;
-        let tool = ToolLink::join(&installation, &node, node_name, PATIENCE)?;
+        let tool = ToolLink::join_as_launch(&installation, &node, node_name, PATIENCE)?;
+        let counter = Counter::open(&tool.link).map_err(ClientError::from)?;
+        let bell = Bell::listen(events, tool.link.participant())?;
         let children: Vec<Child> = installation
             .modules_on(node_name)
             .filter(|module| missing.iter().all(|program| program.module != module.name))
@@ -142,7 +155,7 @@ impl Launch {
         let node_name = node_name.to_owned();
         let switching = vec![None; children.len()];
         let mut launch =
-            Self { installation, node_name, node, children, switching, tool, lock, _time: time, events, notes };
+            Self { installation, node_name, node, children, switching, tool, counter, bell, lock, _time: time, notes };
         match launch.start_all() {
             Ok(()) => Ok(launch),
             Err(error) => {
@@ -154,18 +167,19 @@ impl Launch {
 
     fn start_all(&mut self) -> Result<(), LaunchError> {
         for index in 0..self.children.len() {
-            self.children[index].spawn();
+            // Unless somebody wants it stopped already.
+            if self.children[index].phase() == Phase::Waiting {
+                self.children[index].spawn();
+            }
             loop {
-                if self.told_to_stop(LOOK_STARTING) {
-                    return Err(LaunchError::NotReady(self.children[index].text().into(), "told to stop".into()));
-                }
-                // Those that were started before may end meanwhile.
-                (0..=index).for_each(|index| self.step(index));
+                self.turn(0..index + 1, Duration::MAX, index)?;
                 let child = &self.children[index];
                 match child.phase() {
-                    Phase::Ready | Phase::Ended => break,
-                    Phase::Failed(why) => return Err(LaunchError::NotReady(child.text().into(), why.clone())),
-                    _ => {}
+                    Phase::Failed => {
+                        return Err(LaunchError::NotReady(child.text().into(), child.last_end().into()));
+                    }
+                    Phase::Starting | Phase::Waiting | Phase::Stopping => {}
+                    Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => break,
                 }
             }
             // At once: switched off, the collector would drop what the others say while they start.
@@ -177,26 +191,40 @@ impl Launch {
         for index in 0..self.children.len() {
             self.switch_on(index);
             while self.switching[index].is_some() {
-                if self.told_to_stop(LOOK_SWITCHING) {
-                    return Err(LaunchError::NotReady(self.children[index].text().into(), "told to stop".into()));
-                }
-                (0..self.children.len()).for_each(|index| self.step(index));
+                self.turn(0..self.children.len(), Duration::MAX, index)?;
                 self.switch_on(index);
             }
         }
         Ok(())
     }
 
+    /// Sleeps until something happens, then looks after those children that were started, and answers tools.
+    fn turn(&mut self, started: Range<usize>, period: Duration, index: usize) -> Result<(), LaunchError> {
+        self.sleep(started.clone(), period);
+        if self.bell.words() > 0 {
+            return Err(LaunchError::NotReady(self.children[index].text().into(), "told to stop".into()));
+        }
+        // Those that were started before may end meanwhile.
+        started.for_each(|index| self.step(index));
+        self.serve(false);
+        Ok(())
+    }
+
     /// Moves one module on.
     fn step(&mut self, index: usize) {
         let child = &mut self.children[index];
-        let over = |child: &Child| matches!(child.phase(), Phase::Ended | Phase::Failed(_));
-        let was_over = over(child);
+        let was_over = child.phase().is_over();
         let note = child.step(&self.node, Instant::now());
-        if !was_over && over(child) {
+        if !was_over && child.phase().is_over() {
             self.give_up(index);
         }
         self.note(note);
+    }
+
+    /// Answers tools.
+    fn serve(&mut self, ending: bool) {
+        let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
+        self.counter.serve(Orders { children, installation, node, ending }, &mut self.tool.link);
     }
 
     /// A module is not started again: its mailboxes go.
@@ -218,7 +246,7 @@ impl Launch {
     fn switch_on(&mut self, index: usize) {
         let child = &mut self.children[index];
         let call = self.switching[index].take();
-        if *child.phase() != Phase::Ready {
+        if child.phase() != Phase::Ready {
             // It ended meanwhile.
             call.into_iter().for_each(|call| self.tool.link.forget(call));
             return;
@@ -244,25 +272,27 @@ impl Launch {
         self.note(note);
     }
 
-    /// Waits for an event, at most for `period`. Whoever could send one being gone is a word to stop, too.
-    fn told_to_stop(&self, period: Duration) -> bool {
-        match self.events.recv_timeout(period) {
-            Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => true,
-            Ok(Event::Child) | Err(RecvTimeoutError::Timeout) => false,
-        }
+    /// Sleeps until there is something to do for launch or for one of these children, at most for `period`.
+    fn sleep(&mut self, children: Range<usize>, period: Duration) {
+        // Late answers must not wait for ever in front of its sleep.
+        self.tool.link.collect();
+        let now = Instant::now();
+        let looks = self.children[children].iter().filter_map(|child| child.look_again(now));
+        let switching = self.switching.iter().any(Option::is_some).then_some(LOOK_SWITCHING);
+        let period = looks.chain(switching).fold(period, Duration::min);
+        let mailboxes = &mut [self.counter.commands(), self.tool.link.replies()];
+        wait_any(mailboxes, now.checked_add(period), || self.bell.was_rung());
     }
 
     /// Watches for at most `period`, or until something happens; false when it is time to stop.
     pub fn watch(&mut self, period: Duration) -> bool {
-        let starting = self.children.iter().any(|child| matches!(child.phase(), Phase::Starting | Phase::Ready));
-        let look = if starting { LOOK_STARTING } else { Duration::MAX };
-        let look = if self.switching.iter().any(Option::is_some) { LOOK_SWITCHING } else { look };
-        let stop = self.told_to_stop(period.min(look));
+        self.sleep(0..self.children.len(), period);
         for index in 0..self.children.len() {
             self.step(index);
             self.switch_on(index);
         }
-        !stop
+        self.serve(false);
+        self.bell.words() == 0
     }
 
     /// What happened since it was last asked.
@@ -272,15 +302,12 @@ impl Launch {
 
     /// Modules that failed for good, and why.
     pub fn failures(&self) -> Vec<(String, String)> {
-        let failed = |child: &Child| match child.phase() {
-            Phase::Failed(why) => Some((child.text().to_owned(), why.clone())),
-            _ => None,
-        };
-        self.children.iter().filter_map(failed).collect()
+        let failed = self.children.iter().filter(|child| child.phase() == Phase::Failed);
+        failed.map(|child| (child.text().to_owned(), child.last_end().to_owned())).collect()
     }
 
     /// Where launch stands with a module.
-    pub fn phase(&self, name: Name) -> Option<&Phase> {
+    pub fn phase(&self, name: Name) -> Option<Phase> {
         self.children.iter().find(|child| child.name() == name).map(Child::phase)
     }
 
@@ -307,13 +334,25 @@ impl Launch {
         &self.installation
     }
 
-    /// Stops all modules, the last first, and removes the node. What does not stop in its time is killed. Returns what there
-    /// is to say about it.
-    pub fn stop(self) -> Vec<String> {
-        let Self { node, mut children, tool, lock, _time, mut notes, .. } = self;
-        for child in children.iter_mut().rev() {
-            notes.extend(child.stop(&node));
+    /// Stops all modules, the last first, and removes the node. What does not stop in its time is killed; all is killed at
+    /// once when a second word to stop comes. Returns what there is to say about it.
+    pub fn stop(mut self) -> Vec<String> {
+        let mut ending = Ending::begin(&mut self.children, self.bell.words(), Instant::now());
+        loop {
+            let now = Instant::now();
+            for child in &mut self.children {
+                self.notes.extend(child.step(&self.node, now));
+            }
+            let note = ending.step(&mut self.children, &self.node, self.bell.words(), now);
+            self.note(note);
+            if ending.is_over(&self.children) {
+                break;
+            }
+            self.serve(true);
+            self.sleep(0..self.children.len(), LOOK_ENDING);
         }
+        let Self { node, tool, counter, lock, _time, mut notes, .. } = self;
+        counter.close();
         tool.close();
         drop(lock);
         match node.remove_if_dead() {
@@ -359,25 +398,4 @@ fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeepe
         ConfiguredTime::Log => (TimeSource::Log, 1.0),
     };
     TimeKeeper::begin(node, source, realtime_ns(), pace)
-}
-
-/// A channel of events: SIGINT, SIGTERM and SIGHUP (a terminal was closed) say stop, SIGCHLD that a child may have ended.
-///
-/// # Errors
-/// [`LaunchError::Signals`].
-pub fn events() -> Result<Receiver<Event>, LaunchError> {
-    use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
-    let mut signals =
-        signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP, SIGCHLD]).map_err(LaunchError::Signals)?;
-    let (sender, receiver) = std::sync::mpsc::channel();
-    let forward = move || {
-        for signal in signals.forever() {
-            let event = if signal == SIGCHLD { Event::Child } else { Event::Stop };
-            if sender.send(event).is_err() {
-                break;
-            }
-        }
-    };
-    std::thread::Builder::new().name("signals".into()).spawn(forward).map_err(LaunchError::Signals)?;
-    Ok(receiver)
 }

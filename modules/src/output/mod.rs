@@ -1,13 +1,24 @@
 //! What modules say, on its way to the output collector (seed 002, 2.2.4).
 //!
+//! ```text
+//!  tracing event ─▶ layer: level? ─▶ allowance ─▶ way: queue ─▶ mailbox output.0.3 ─▶ builtin::output ─▶ ring, file, journal
+//!  panic ──────────────────────────────▲                                                     └─▶ subscribers, `rohrpost log`
+//! ```
+//!
 //! Every `tracing` event becomes a line. A line goes into a small queue of this process and from there, at once if nobody
-//! else is at it, into the collector's mailbox: a module never waits on its own words, and what finds no room is counted and
-//! said as soon as there is room again.
+//! else is at it, into the collector's mailbox: a module never waits on its own words. What is beyond its allowance is
+//! suppressed before it is even written; what finds no room is lost; both are counted, and said as soon as there is room.
 
+mod allowance;
+#[cfg(feature = "builtin")]
+mod format;
 mod layer;
+mod way;
 
-pub(crate) use layer::is_installed;
-pub use layer::{drain, install, lost, retry_at, set_level};
+#[cfg(feature = "builtin")]
+pub use format::Format;
+pub(crate) use way::is_installed;
+pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
 
 use crate::common::OutputLevel;
 use postcard_schema::Schema;
@@ -45,6 +56,8 @@ pub struct OutputLine {
     pub level: OutputLevel,
     /// Lines of this module that were lost before this one.
     pub lost: u32,
+    /// Lines of this module that were suppressed, if this is the line that tells of them; else 0.
+    pub suppressed: u32,
     /// What it says.
     pub text: String,
 }
@@ -64,6 +77,9 @@ impl OutputLine {
 }
 
 impl OutputLevel {
+    /// All levels, in the order of their numbers.
+    pub const ALL: [Self; 5] = [Self::Error, Self::Warn, Self::Info, Self::Debug, Self::Trace];
+
     /// One word.
     pub const fn name(self) -> &'static str {
         match self {

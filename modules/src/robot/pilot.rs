@@ -41,13 +41,18 @@ pub struct Settings {
     pub mounting: Pose,
 }
 
+impl Settings {
+    /// Speed where there is room, unless said otherwise.
+    pub const CRUISE_M_S: f64 = 0.5;
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
             seed: 1,
             radius_m: 0.25,
             margin_m: 0.08,
-            cruise_m_s: 0.5,
+            cruise_m_s: Self::CRUISE_M_S,
             turn_rate_max_rad_s: 1.2,
             braking_m_s2: 0.7,
             reaction_s: 0.25,
@@ -112,6 +117,11 @@ impl Pilot {
     pub fn new(settings: Settings) -> Self {
         let random = ChaCha8Rng::seed_from_u64(settings.seed);
         Self { settings, random, mode: Mode::Roam, preferred_side: 0.0, preferred_for_s: 0.0 }
+    }
+
+    /// Sets the speed where there is room, from the next scan on.
+    pub fn set_cruise(&mut self, speed_m_s: f64) {
+        self.settings.cruise_m_s = speed_m_s;
     }
 
     /// What to do after this scan. A scan with fewer than half of its readings is no sight: the robot stands.

@@ -218,6 +218,11 @@ impl Simulator {
         &self.world
     }
 
+    /// Sets the standard deviation of a reading, from the next scan on.
+    pub fn set_range_noise(&mut self, noise_m: f64) {
+        self.settings.scanner.range_noise_m = noise_m;
+    }
+
     /// Looks around from where it is now.
     pub fn scan(&mut self) -> LaserScan {
         let Scanner { beams, field_of_view_rad, range_max_m, range_noise_m, mounting } = self.settings.scanner;

@@ -8,8 +8,8 @@ use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
 use rohrpost_config::{Installation, NameTextError};
 use rohrpost_mailbox::{
-    CreateError, Interest, Label, Name, Options, Receiver, SendError, Shape, SystemClock, SystemTime, Type, Watch,
-    Watches, local,
+    CreateError, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime,
+    Type, Watch, Watches, local,
 };
 use std::cell::RefCell;
 use std::io;
@@ -54,6 +54,8 @@ pub struct Context {
     pub(crate) link: Caller,
     pub(crate) faces: Vec<Name>,
     pub(crate) newest: Vec<Newest>,
+    /// Counts what is published.
+    publications: Publications,
     pub(crate) subscriptions: Subscriptions,
     pub(crate) followings: Followings,
     pub(crate) clock: SystemClock,
@@ -74,12 +76,14 @@ impl Context {
         faces: Vec<Name>,
         clock: SystemClock,
     ) -> Self {
+        let publications = Publications::new(link.participant());
         Self {
             me,
             installation,
             link: Rc::new(RefCell::new(link)),
             faces,
             newest: Vec::new(),
+            publications,
             subscriptions: Subscriptions::default(),
             followings: Followings::default(),
             clock,
@@ -220,6 +224,8 @@ impl Context {
         newest.stamp_ns = stamp_ns;
         std::mem::swap(&mut newest.value, &mut self.scratch);
         let (newest, link, faces) = (&self.newest[at], &self.link, &self.faces);
+        let age = Duration::from_nanos(self.clock.now().ns.saturating_sub(stamp_ns));
+        self.publications.published(faces[face], Type::data(port.number), newest.value.len(), age);
         self.subscriptions.published(newest, |to| deliver(link, faces, newest, to));
         Ok(())
     }

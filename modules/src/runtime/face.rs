@@ -1,15 +1,15 @@
-//! One name under which a module's process is reached: its command mailbox, its interface, and what it has run.
+//! One name under which a module's process is reached: its command mailbox, and its interface.
 
-use crate::call::{Fault, Once};
+use super::server::Desk;
+use crate::call::Fault;
 use crate::description::Description;
 use crate::interface::{ServeFunction, Served};
-use rohrpost_mailbox::{Name, Receiver};
+use rohrpost_mailbox::{Name, NodeError, Receiver};
 
 /// One face. A module without further faces has this one.
 pub(crate) struct Face<M> {
     pub(crate) name: Name,
-    pub(crate) commands: Receiver,
-    pub(crate) once: Once,
+    pub(crate) desk: Desk,
     pub(crate) offer: Offer<M>,
 }
 
@@ -27,7 +27,12 @@ pub(crate) struct Offer<M> {
 }
 
 impl<M> Face<M> {
-    pub(crate) fn new(name: Name, class: &str, commands: Receiver, served: Option<Served<M>>, started_ns: u64) -> Self {
+    pub(crate) fn new(
+        name: Name,
+        class: &str,
+        commands: Receiver,
+        served: Option<Served<M>>,
+    ) -> Result<Self, NodeError> {
         let (serve, description) = match served {
             Some(Served { description, serve, .. }) => (Some(serve), description),
             None => (None, bare(class)),
@@ -37,8 +42,10 @@ impl<M> Face<M> {
         let data = description.data.iter().map(|item| item.number).collect();
         // Writing to a growing vector does not fail.
         let description = postcard::to_stdvec(&description).unwrap_or_default();
+        // For tools that must not ask: a question would be one more package.
+        commands.set_about(&description)?;
         let offer = Offer { idempotent, data, serve, hash, description };
-        Self { name, commands, once: Once::new(started_ns), offer }
+        Ok(Self { name, desk: Desk::new(commands), offer })
     }
 }
 

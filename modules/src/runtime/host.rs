@@ -1,9 +1,10 @@
 //! How a program that is no module takes part: tools, tests, launch itself.
 
 use crate::call::{CallError, Link, REPLIES_KEPT};
-use crate::common::{self, DescriptionPart, OutputLevel, Status};
+use crate::common::{self, Change, DescriptionPart, OutputLevel, ParameterPage, SetParameters, Status};
 use crate::description::Description;
 use crate::interface::append;
+use crate::parameter::{Parameter, Refusal};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
@@ -17,6 +18,9 @@ const DATA_SLOTS: u16 = 128;
 /// Longest description that is asked for, bytes.
 const DESCRIPTION_MAX: usize = 1 << 20;
 
+/// Times that parameters are read anew because they were set meanwhile.
+const READS_MAX: usize = 5;
+
 /// Why a tool cannot take part.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
@@ -26,15 +30,19 @@ pub enum ClientError {
     /// A mailbox.
     #[error(transparent)]
     Mailbox(#[from] CreateError),
-    /// All instances of class `tool` are in use.
-    #[error("all {0} tool instances of node `{1}` are in use; end some, or widen `tools` in the configuration")]
+    /// All instances of class `tool` that programs run by hand may take are in use.
+    #[error(
+        "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, or \
+         widen `tools` in the configuration"
+    )]
     Crowded(usize, String),
     /// The configuration has no such node.
     #[error("the configuration has no node `{0}`")]
     NoNode(String),
 }
 
-/// A tool's place on a node: a link and a data mailbox, under the first free instance of class `tool`.
+/// A tool's place on a node: a link and a data mailbox, under the first free instance of class `tool` but one: that is
+/// launch's.
 pub struct ToolLink {
     /// Sends and calls.
     pub link: Link,
@@ -44,6 +52,8 @@ pub struct ToolLink {
     /// Reads system time.
     pub clock: SystemClock,
     timeout: Duration,
+    /// Launch of this node.
+    launcher: Name,
 }
 
 impl ToolLink {
@@ -59,17 +69,39 @@ impl ToolLink {
     ) -> Result<Self, ClientError> {
         let config = installation.node(name).ok_or_else(|| ClientError::NoNode(name.into()))?;
         let participant = Participant::join(node, Name::NONE)?;
-        let large = Shape { slots: REPLIES_KEPT as u16, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };
-        for instance in config.tools.clone() {
-            let me = Name::new(installation.system.id, installation.classes.tool().0, instance, 0);
-            let replies = match participant.receiver(me.with_local(local::REPLIES), large) {
-                Err(CreateError::Owned(..)) => continue,
-                other => other?,
-            };
-            let link = Link::new(&participant, me, replies);
-            return Ok(Self { link, large, data: None, clock: SystemClock::open(node), timeout });
+        let tool = |instance| Name::new(installation.system.id, installation.classes.tool().0, instance, 0);
+        for instance in config.tools_by_hand() {
+            match Self::take(&participant, tool(instance), tool(config.launch_instance()), timeout) {
+                Err(CreateError::Owned(..)) => {}
+                taken => return Ok(taken?),
+            }
         }
-        Err(ClientError::Crowded(config.tools.clone().count(), name.into()))
+        Err(ClientError::Crowded(config.tools_by_hand().count(), name.into()))
+    }
+
+    /// Joins as the launch of a node: under the first instance, where tools look for it.
+    pub(crate) fn join_as_launch(
+        installation: &Installation,
+        node: &Arc<Node>,
+        name: &str,
+        timeout: Duration,
+    ) -> Result<Self, ClientError> {
+        let config = installation.node(name).ok_or_else(|| ClientError::NoNode(name.into()))?;
+        let participant = Participant::join(node, Name::NONE)?;
+        let me = Name::new(installation.system.id, installation.classes.tool().0, config.launch_instance(), 0);
+        Ok(Self::take(&participant, me, me, timeout)?)
+    }
+
+    fn take(participant: &Arc<Participant>, me: Name, launcher: Name, timeout: Duration) -> Result<Self, CreateError> {
+        let large = Shape { slots: REPLIES_KEPT as u16, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };
+        let replies = participant.receiver(me.with_local(local::REPLIES), large)?;
+        let link = Link::new(participant, me, replies);
+        Ok(Self { link, large, data: None, clock: SystemClock::open(participant.node()), timeout, launcher })
+    }
+
+    /// Where the launch of this node takes commands, if one runs.
+    pub fn launcher(&self) -> Name {
+        self.launcher
     }
 
     /// The mailbox that takes subscribed data; made when it is first asked for.
@@ -138,11 +170,11 @@ impl ToolLink {
         self.common(module, common::STATUS, &())
     }
 
-    /// Sets which output lines a module sends.
+    /// Sets which output lines a module sends, and tells which it sent before; none when nothing collects them.
     ///
     /// # Errors
     /// See [`CallError`].
-    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<(), CallError> {
+    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<Option<OutputLevel>, CallError> {
         self.common(module, common::OUTPUT_LEVEL, &(level,))
     }
 
@@ -152,6 +184,41 @@ impl ToolLink {
     /// See [`CallError`].
     pub fn describe(&mut self, module: Name) -> Result<Description, CallError> {
         describe(&mut self.link, module, self.timeout)
+    }
+
+    /// Asks a module for its parameters and their values; empty, if it has none.
+    ///
+    /// # Errors
+    /// See [`CallError`]. A module built before there were parameters says [`crate::call::Fault::Unknown`].
+    pub fn parameters(&mut self, module: Name) -> Result<Vec<Parameter>, CallError> {
+        let mut found = Vec::new();
+        let mut changes = None;
+        let mut reads = 0;
+        loop {
+            let from = found.len() as u16;
+            let page: ParameterPage = self.common(module, common::PARAMETERS, &(from,))?;
+            // Somebody set some in between: values of one moment belong together.
+            if changes.replace(page.changes).is_some_and(|before| before != page.changes) && reads < READS_MAX {
+                reads += 1;
+                found.clear();
+                changes = None;
+                continue;
+            }
+            let last = page.parameters.is_empty();
+            found.extend(page.parameters);
+            if found.len() >= usize::from(page.total) || last {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Sets parameters of a module, all of them or none; returns what they were and are.
+    ///
+    /// # Errors
+    /// See [`CallError`] and [`Refusal`].
+    pub fn set_parameters(&mut self, module: Name, wish: &SetParameters) -> Result<Vec<Change>, CallError<Refusal>> {
+        let set: Result<_, Refusal> = self.common(module, common::SET_PARAMETERS, wish).map_err(CallError::widen)?;
+        set.map_err(|refusal| CallError::Module(module, refusal))
     }
 
     /// Removes the tool's mailboxes.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!             ┌──────────────── one thread ────────────────┐
-//!  commands ─▶│ server: once? dispatch, reply              │─▶ replies
+//!  commands ─▶│ server: once? hosted: dispatch, reply      │─▶ replies
 //!  data     ─▶│ runner: received, tick, on, off            │─▶ data of subscriptions
 //!  replies  ─▶│ link: proxies' calls, renewals             │─▶ commands
 //!             └────────────────────────────────────────────┘
@@ -12,6 +12,8 @@ mod context;
 mod face;
 mod follow;
 mod host;
+mod hosted;
+mod parameters;
 mod runner;
 pub(crate) mod server;
 mod start;

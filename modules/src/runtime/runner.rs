@@ -2,7 +2,7 @@
 
 use super::context::{Context, Received};
 use super::face::Face;
-use super::server::Server;
+use super::hosted::Hosted;
 use super::start::{Start, StartError};
 use crate::call::Fault;
 use crate::common::{DataHead, Status};
@@ -37,7 +37,7 @@ pub fn run<M: Module>() -> ExitCode {
 pub fn exit(result: Result<(), StartError>) -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
     tracing::error!("{error}");
-    output::drain();
+    output::flush();
     if !output::is_installed() {
         output::print(&error);
     }
@@ -49,7 +49,11 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 /// # Errors
 /// See [`StartError`].
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
-    let mut running = start.join::<M>()?;
+    let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
+    let mut running = joined.unwrap_or_else(|panic| {
+        output::flush();
+        std::panic::resume_unwind(panic)
+    })?;
     let worked = catch_unwind(AssertUnwindSafe(|| {
         running.turn_on_if_wanted();
         running.go();
@@ -65,6 +69,8 @@ pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
 /// The module and the state it is in.
 pub(crate) struct Life<M> {
     pub(crate) module: M,
+    /// Times that parameters were set.
+    pub(crate) changes: u32,
     participant: Arc<Participant>,
     state: ModuleState,
     error: String,
@@ -73,8 +79,8 @@ pub(crate) struct Life<M> {
 
 impl<M: Module> Life<M> {
     pub(crate) fn new(module: M, participant: Arc<Participant>) -> Self {
-        let mut life =
-            Self { module, participant, state: ModuleState::Starting, error: String::new(), started: Instant::now() };
+        let (state, started) = (ModuleState::Starting, Instant::now());
+        let mut life = Self { module, changes: 0, participant, state, error: String::new(), started };
         life.enter(ModuleState::Off);
         life
     }
@@ -151,6 +157,8 @@ impl<M: Module> Life<M> {
             missed: context.subscriptions.missed(),
             lost: context.followings.lost,
             output_lost: output::lost(),
+            output_suppressed: output::suppressed(),
+            output_level: output::level(),
         }
     }
 }
@@ -181,10 +189,9 @@ impl<M: Module> Running<M> {
     }
 
     fn go(&mut self) {
-        let mut server = Server::new();
         let mut awake_since = Instant::now();
         while !self.stop.load(Ordering::Acquire) {
-            let mut busy = self.commands(&mut server);
+            let mut busy = self.commands();
             busy |= self.take_data();
             self.periodic();
             output::drain();
@@ -204,13 +211,15 @@ impl<M: Module> Running<M> {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told");
         self.life.panicked(text, &mut self.context);
-        output::drain();
+        output::flush();
     }
 
-    fn commands(&mut self, server: &mut Server) -> bool {
+    fn commands(&mut self) -> bool {
         let mut any = false;
         for (index, face) in self.faces.iter_mut().enumerate() {
-            any |= burst(|| server.handle(face, index, &mut self.life, &mut self.context));
+            let Face { desk, offer, .. } = face;
+            let mut hosted = Hosted { index, offer, life: &mut self.life, context: &mut self.context };
+            any |= burst(|| desk.handle(&mut hosted));
         }
         any
     }
@@ -279,7 +288,7 @@ impl<M: Module> Running<M> {
         let deadline = [tick, renewal, delivery, output].into_iter().flatten().min();
         let mut link = self.context.link.borrow_mut();
         let mut receivers = empty(std::mem::take(&mut self.receivers));
-        receivers.extend(self.faces.iter_mut().map(|face| &mut face.commands));
+        receivers.extend(self.faces.iter_mut().map(|face| &mut face.desk.commands));
         receivers.push(&mut self.data);
         receivers.extend(&mut self.context.own);
         receivers.push(link.replies());
@@ -301,14 +310,14 @@ impl<M: Module> Running<M> {
         self.context.followings.end(&mut self.context.link.borrow_mut());
         self.life.enter(ModuleState::Stopping);
         tracing::debug!("ends");
-        output::drain();
+        output::flush();
         self.life.participant.leave();
         if !self.by_hand {
             return;
         }
         // With it go its proxies, which hold the link.
         drop(self.life);
-        let commands = self.faces.into_iter().map(|face| face.commands);
+        let commands = self.faces.into_iter().map(|face| face.desk.commands);
         for mailbox in commands.chain([self.data]).chain(self.context.own) {
             mailbox.close();
         }

@@ -1,35 +1,37 @@
-//! Commands: decided on, run, answered.
+//! Commands: taken from a mailbox, decided on, run by whoever serves there, answered.
 
-use super::context::Context;
-use super::face::{Face, Offer};
-use super::runner::Life;
-use crate::call::{CallEnvelope, Fault, ReplyEnvelope, Request, Verdict};
-use crate::common::{self, DescriptionPart, OutputLevel, Subscribe};
+use crate::call::{CallEnvelope, Fault, Once, ReplyEnvelope, Request, Verdict};
+use crate::common::{self, DescriptionPart};
 use crate::interface::append;
-use crate::module::Module;
-use crate::output;
-use rohrpost_mailbox::{Head, Kind, Label, Options, SendError, Type, local, monotonic_ns};
+use rohrpost_mailbox::{Head, Kind, Label, Name, Options, Package, Receiver, SendError, Type, local, monotonic_ns};
 
-/// What commands of one module share besides the module itself.
-pub(crate) struct Server {
+/// Whoever runs the commands of a mailbox: a module under one of its names, or launch.
+pub(crate) trait Servant {
+    /// Whether a function may be run twice without harm.
+    fn is_idempotent(&self, number: u16) -> bool;
+    /// Runs a command; what it has to say is appended to the reply.
+    fn run(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault>;
+    /// Sends an answer.
+    fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError>;
+}
+
+/// A command mailbox, and what was run of what came there.
+pub(crate) struct Desk {
+    pub(crate) commands: Receiver,
+    once: Once,
     /// The result being written; kept, so that answering allocates nothing.
     reply: Vec<u8>,
 }
 
-impl Server {
-    pub(crate) fn new() -> Self {
-        Self { reply: Vec::with_capacity(1024) }
+impl Desk {
+    /// Whoever had this mailbox before has ended by now, and ran nothing after this.
+    pub(crate) fn new(commands: Receiver) -> Self {
+        Self { commands, once: Once::new(monotonic_ns()), reply: Vec::with_capacity(1024) }
     }
 
-    /// Handles the next command of a face; false when there is none.
-    pub(crate) fn handle<M: Module>(
-        &mut self,
-        face: &mut Face<M>,
-        index: usize,
-        life: &mut Life<M>,
-        context: &mut Context,
-    ) -> bool {
-        let Some(package) = face.commands.try_receive() else { return false };
+    /// Handles the next command; false when there is none.
+    pub(crate) fn handle(&mut self, servant: &mut impl Servant) -> bool {
+        let Some(package) = self.commands.try_receive() else { return false };
         let head = *package.head();
         let (Kind::Command(number), Ok((envelope, arguments))) =
             (head.kind.kind(), CallEnvelope::split(package.body()))
@@ -38,18 +40,8 @@ impl Server {
             return true;
         };
         let now_ns = monotonic_ns();
-        let waited_ns = now_ns.saturating_sub(package.published_ns());
-        let request = Request {
-            from: head.from,
-            incarnation: envelope.incarnation,
-            sequence: envelope.sequence,
-            valid_for_ns: u64::from(envelope.valid_for_us) * 1000,
-            age_ns: u64::from(envelope.age_us) * 1000 + waited_ns,
-            repeat: envelope.age_us > 0,
-            redelivered: head.options.has(Options::REDELIVERED),
-            idempotent: number < common::FIRST_OWN || face.offer.idempotent.contains(&number),
-        };
-        let (error, body): (bool, &[u8]) = match face.once.judge(&request, now_ns) {
+        let request = request(&package, &envelope, servant.is_idempotent(number), now_ns);
+        let (error, body): (bool, &[u8]) = match self.once.judge(&request, now_ns) {
             Verdict::Ignore => return true,
             Verdict::Again(error, body) => (error, body),
             Verdict::Refuse(fault) => {
@@ -58,20 +50,35 @@ impl Server {
             }
             Verdict::Run => {
                 self.reply.clear();
-                let call = Call { index, number, head, hash: envelope.interface, arguments };
-                let error = match call.run(&face.offer, life, context, &mut self.reply) {
+                let call = Call { number, head, hash: envelope.interface, arguments };
+                let error = match servant.run(&call, &mut self.reply) {
                     Ok(()) => false,
                     Err(fault) => {
                         fill(&mut self.reply, &fault);
                         true
                     }
                 };
-                face.once.done(&request, now_ns, error, &self.reply);
+                self.once.done(&request, now_ns, error, &self.reply);
                 (error, &self.reply)
             }
         };
-        answer(context, &head, number, &envelope, error, body);
+        answer(servant, &head, number, &envelope, error, body);
         true
+    }
+}
+
+fn request(package: &Package<'_>, envelope: &CallEnvelope, idempotent: bool, now_ns: u64) -> Request {
+    let head = package.head();
+    let waited_ns = now_ns.saturating_sub(package.published_ns());
+    Request {
+        from: head.from,
+        incarnation: envelope.incarnation,
+        sequence: envelope.sequence,
+        valid_for_ns: u64::from(envelope.valid_for_us) * 1000,
+        age_ns: u64::from(envelope.age_us) * 1000 + waited_ns,
+        repeat: envelope.age_us > 0,
+        redelivered: head.options.has(Options::REDELIVERED),
+        idempotent,
     }
 }
 
@@ -81,7 +88,7 @@ fn fill(reply: &mut Vec<u8>, fault: &Fault) {
     let _ = append(reply, fault);
 }
 
-fn answer(context: &Context, head: &Head, number: u16, envelope: &CallEnvelope, error: bool, body: &[u8]) {
+fn answer(servant: &mut impl Servant, head: &Head, number: u16, envelope: &CallEnvelope, error: bool, body: &[u8]) {
     if !head.from.is_mailbox() {
         return;
     }
@@ -93,12 +100,11 @@ fn answer(context: &Context, head: &Head, number: u16, envelope: &CallEnvelope, 
         priority: head.priority,
         options: if error { Options::ERROR } else { Options::default() },
     };
-    let mut link = context.link.borrow_mut();
-    let sent = match link.send(head.from, &label(error), &[&envelope, body]) {
+    let sent = match servant.send(head.from, &label(error), &[&envelope, body]) {
         Err(SendError::TooLarge { len, .. }) => {
             let mut fault = Vec::new();
             fill(&mut fault, &Fault::TooLarge(len as u32));
-            link.send(head.from, &label(true), &[&envelope, &fault])
+            servant.send(head.from, &label(true), &[&envelope, &fault])
         }
         sent => sent,
     };
@@ -109,88 +115,29 @@ fn answer(context: &Context, head: &Head, number: u16, envelope: &CallEnvelope, 
 }
 
 /// A command that is to be run.
-struct Call<'a> {
-    index: usize,
-    number: u16,
-    head: Head,
+pub(crate) struct Call<'a> {
+    pub(crate) number: u16,
+    pub(crate) head: Head,
+    /// Hash of the interface that the caller knows.
     hash: u32,
-    arguments: &'a [u8],
+    pub(crate) arguments: &'a [u8],
 }
 
 impl Call<'_> {
-    fn run<M: Module>(
-        &self,
-        offer: &Offer<M>,
-        life: &mut Life<M>,
-        context: &mut Context,
-        reply: &mut Vec<u8>,
-    ) -> Result<(), Fault> {
+    /// The caller knows the interface that is served here; common functions are of none.
+    pub(crate) fn require_interface(&self, own: u32) -> Result<(), Fault> {
         let of_interface =
             self.number >= common::FIRST_OWN || matches!(self.number, common::GET_DATA | common::SUBSCRIBE);
-        let server = if of_interface { offer.hash } else { common::HASH };
-        if self.hash != server {
-            return Err(Fault::InterfaceDiffers { server });
-        }
-        if self.number < common::FIRST_OWN {
-            return self.common(offer, life, context, reply);
-        }
-        life.require_on()?;
-        let serve = offer.serve.ok_or(Fault::Unknown(self.number))?;
-        serve(&mut life.module, self.number, self.arguments, reply)
+        let server = if of_interface { own } else { common::HASH };
+        if self.hash == server { Ok(()) } else { Err(Fault::InterfaceDiffers { server }) }
     }
 
-    fn common<M: Module>(
-        &self,
-        offer: &Offer<M>,
-        life: &mut Life<M>,
-        context: &mut Context,
-        reply: &mut Vec<u8>,
-    ) -> Result<(), Fault> {
-        match self.number {
-            common::ON => life.turn_on(context),
-            common::OFF => {
-                life.turn_off(context);
-                Ok(())
-            }
-            common::STATUS => write_result(reply, &life.status(context)),
-            common::GET_DATA => self.get_data(offer, context, reply),
-            common::SUBSCRIBE => {
-                let (wish,): (Subscribe,) = read_arguments(self.arguments)?;
-                offer.require_data(wish.number)?;
-                let to = self.head.from.with_local(local::DATA);
-                let now_ns = monotonic_ns();
-                let room = context.subscriptions.subscribe(self.index, to, self.head.priority, wish, now_ns);
-                if room { Ok(()) } else { Err(Fault::Busy) }
-            }
-            common::UNSUBSCRIBE => {
-                let (id,): (u16,) = read_arguments(self.arguments)?;
-                context.subscriptions.unsubscribe(self.head.from.with_local(local::DATA), id);
-                Ok(())
-            }
-            common::OUTPUT_LEVEL => {
-                let (level,): (OutputLevel,) = read_arguments(self.arguments)?;
-                output::set_level(level);
-                Ok(())
-            }
-            common::DESCRIBE => {
-                let (from,): (u32,) = read_arguments(self.arguments)?;
-                let rest = offer.description.get(from as usize..).unwrap_or_default();
-                let bytes = rest[..rest.len().min(common::DESCRIPTION_PART)].to_vec();
-                write_result(reply, &DescriptionPart { total: offer.description.len() as u32, bytes })
-            }
-            other => Err(Fault::Unknown(other)),
-        }
-    }
-
-    fn get_data<M>(&self, offer: &Offer<M>, context: &Context, reply: &mut Vec<u8>) -> Result<(), Fault> {
-        let (number,): (u16,) = read_arguments(self.arguments)?;
-        offer.require_data(number)?;
-        let is_it = |newest: &&crate::publish::Newest| (newest.face, newest.number) == (self.index, number);
-        let newest = context.newest.iter().find(is_it).ok_or(Fault::NothingYet)?;
-        // A tuple of the time and the value: in postcard just the one after the other.
-        write_result(reply, &newest.stamp_ns)?;
-        reply.extend_from_slice(&newest.value);
-        Ok(())
+    /// The part that was asked for of the bytes of a description.
+    pub(crate) fn describe(&self, description: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault> {
+        let (from,): (u32,) = read_arguments(self.arguments)?;
+        let rest = description.get(from as usize..).unwrap_or_default();
+        let bytes = rest[..rest.len().min(common::DESCRIPTION_PART)].to_vec();
+        write_result(reply, &DescriptionPart { total: description.len() as u32, bytes })
     }
 }
 

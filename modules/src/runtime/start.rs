@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::face::Face;
+use super::parameters;
 use super::runner::{Life, Running, served};
 use crate::call::Link;
 use crate::module::Module;
@@ -12,7 +13,7 @@ use rohrpost_config::{
 };
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, base_directory, local,
-    monotonic_ns, node_directory, sys,
+    node_directory, sys,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,6 +29,8 @@ pub(crate) mod environment {
     pub(crate) const MODULE: &str = "ROHRPOST_MODULE";
     pub(crate) const LAUNCHER: &str = "ROHRPOST_LAUNCHER";
     pub(crate) const RESTARTS: &str = "ROHRPOST_RESTARTS";
+    /// Set: it begins switched off, and launch switches it on when it is time.
+    pub(crate) const OFF: &str = "ROHRPOST_OFF";
 }
 
 /// Why a module did not start.
@@ -118,9 +121,7 @@ impl Start {
         let (mut config, mut module) = (variable(environment::CONFIG), variable(environment::MODULE));
         let launcher = variable(environment::LAUNCHER).and_then(|pid| pid.parse().ok());
         let restarts = variable(environment::RESTARTS).and_then(|count| count.parse().ok()).unwrap_or(0);
-        // Launch switches modules on when all are ready. Of one that it has started again others expect that it works, and
-        // what waits in its mailboxes comes before any word of launch's.
-        let mut off = launcher.is_some() && restarts == 0;
+        let mut off = std::env::var_os(environment::OFF).is_some();
         let mut arguments = arguments;
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or_else(|| StartError::Usage(format!("`{argument}` needs a value")));
@@ -164,9 +165,7 @@ impl Start {
                 return Err(StartError::Face(installation.classes.format(name), text, class));
             }
             let commands = participant.receiver(name.with_local(local::COMMANDS), shape(&module.mailboxes.commands))?;
-            // Whoever had this mailbox before has ended by now, and ran nothing after this.
-            let started_ns = monotonic_ns();
-            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)), started_ns));
+            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)))?);
         }
         let data = participant.receiver(self.name.with_local(local::DATA), shape(&module.mailboxes.data))?;
         let replies = participant.receiver(self.name.with_local(local::REPLIES), shape(&module.mailboxes.replies))?;
@@ -175,7 +174,9 @@ impl Start {
         let names = faces.iter().map(|face: &Face<M>| face.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock);
         let settings = installation.settings_as(module)?;
-        let made = M::new(settings, &mut context).map_err(|error| StartError::Module(text, error.to_string()))?;
+        let mut made =
+            M::new(settings, &mut context).map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
+        parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
         let spin = module.spin;

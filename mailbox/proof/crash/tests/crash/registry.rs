@@ -22,13 +22,21 @@ fn a_maker_of_a_node_dies() {
 fn a_joiner_dies() {
     each_step(
         "join",
-        3,
+        6,
         |_| (),
         |ground, (), _| {
             let participant = ground.join();
             assert_eq!(ground.node().participants().len(), 1);
             assert_eq!(ground.node().participants()[0].incarnation, participant.incarnation());
-            drop(participant);
+            // Whatever table the dead one left, this is a new one and whole.
+            assert!(ground.node().traffic().is_empty());
+            let receiver = ground.receiver();
+            ground.send(LOW, 0..1);
+            let mut sender = participant.sender(MAILBOX).unwrap();
+            send(&mut sender, LOW, 1).unwrap();
+            assert_eq!(ground.node().traffic().iter().map(|flow| flow.packages).sum::<u64>(), 1);
+            drop((sender, participant));
+            receiver.close();
             empty(ground);
         },
     );
@@ -61,6 +69,24 @@ fn a_maker_of_a_mailbox_dies() {
         |ground, (), _| {
             let found = adopt_and_drain(ground, 0);
             assert!(found.packages.is_empty());
+        },
+    );
+}
+
+#[test]
+fn a_receiver_dies_saying_what_its_mailbox_is_for() {
+    each_step(
+        "say what it is for",
+        1,
+        |_| (),
+        |ground, (), death| {
+            let said = ground.node().about(MAILBOX).unwrap();
+            assert_eq!(said, if death.is_some() { b"old" } else { b"new" });
+            let receiver = ground.receiver();
+            receiver.set_about(b"newest").unwrap();
+            assert_eq!(ground.node().about(MAILBOX).unwrap(), b"newest");
+            receiver.close();
+            empty(ground);
         },
     );
 }

@@ -127,6 +127,13 @@ fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             drop(receiver.try_receive());
             die_with(receiver);
         }
+        "say what it is for" => {
+            let receiver = ground.receiver();
+            receiver.set_about(b"old").unwrap();
+            arm();
+            receiver.set_about(b"new").unwrap();
+            die_with(receiver);
+        }
         "close" => {
             let receiver = ground.receiver();
             arm();

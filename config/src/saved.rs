@@ -1,0 +1,191 @@
+//! Values of parameters that were saved: they go before the settings of the same names.
+
+use crate::errors::{Errors, Problem};
+use crate::installation::Installation;
+use crate::module::Module;
+use crate::reader::{Item, Reader, Section, line_of, nearest};
+use crate::settings::SettingsError;
+use rohrpost_mailbox::Name;
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, ValueDeserializer};
+
+/// A file of saved values, a table for each module: `["pilot.0"]`, and below it `cruise-m-s = 0.4`. Types and ranges are
+/// the modules' to check.
+#[derive(Clone, Debug)]
+pub struct Saved {
+    /// The file.
+    pub path: PathBuf,
+    /// Its text; empty, if there is no such file yet.
+    text: String,
+    /// Modules that it has values of, and their keys in the file.
+    modules: Vec<(Name, String)>,
+}
+
+/// One value of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SavedValue<T> {
+    /// The parameter.
+    pub name: String,
+    /// Line in the file.
+    pub line: usize,
+    /// The value.
+    pub value: T,
+}
+
+impl Saved {
+    /// Reads a file for an installation. One that does not exist holds nothing: nothing was saved yet.
+    ///
+    /// # Errors
+    /// All that is wrong with it, by line.
+    pub fn load(path: &Path, installation: &Installation) -> Result<Self, Errors> {
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&text, path, installation),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Self::parse("", path, installation),
+            Err(error) => {
+                let message = format!("saved parameters cannot be read ({error}); make it readable, or remove it");
+                Err(Errors::new(path, vec![Problem { line: None, message }]))
+            }
+        }
+    }
+
+    /// Checks the text of a file; `path` is its name in messages.
+    ///
+    /// # Errors
+    /// All that is wrong with it, by line.
+    pub fn parse(text: &str, path: &Path, installation: &Installation) -> Result<Self, Errors> {
+        let reader = Reader::new(text);
+        let (document, syntax) = DeTable::parse_recoverable(text);
+        for error in &syntax {
+            reader.report_syntax(error);
+        }
+        let mut modules = Vec::new();
+        if syntax.is_empty() {
+            for item in Section::new(&reader, "", 1, document.get_ref()).entries() {
+                modules.extend(owner(&item, installation).map(|name| (name, item.key.clone())));
+            }
+        }
+        let problems = reader.into_problems();
+        if problems.is_empty() {
+            Ok(Self { path: path.to_owned(), text: text.to_owned(), modules })
+        } else {
+            Err(Errors::new(path, problems))
+        }
+    }
+
+    /// Modules that it has values of, in the order of their names.
+    pub fn modules(&self) -> impl Iterator<Item = Name> {
+        self.modules.iter().map(|(name, _)| *name)
+    }
+
+    /// The values of a module, in the order of the file.
+    ///
+    /// # Errors
+    /// A value that the type does not take.
+    pub fn values<T: DeserializeOwned>(
+        &self,
+        installation: &Installation,
+        module: Name,
+    ) -> Result<Vec<SavedValue<T>>, SettingsError> {
+        let Some(table) = self.table(module) else { return Ok(Vec::new()) };
+        let mut values = Vec::new();
+        for (key, value) in table.get_ref() {
+            let (line, place) = (line_of(&self.text, key.span().start), value.span());
+            let read = T::deserialize(ValueDeserializer::from(value.clone()));
+            let value = read.map_err(|error| {
+                let at = error.span().unwrap_or(place).start;
+                self.wrong(installation, module, at, error.message())
+            })?;
+            values.push((key.span().start, SavedValue { name: key.get_ref().to_string(), line, value }));
+        }
+        values.sort_by_key(|(at, _)| *at);
+        Ok(values.into_iter().map(|(_, value)| value).collect())
+    }
+
+    /// Refuses values of what is no parameter of the module.
+    ///
+    /// # Errors
+    /// The first of them, with its line.
+    pub fn check_names(
+        &self,
+        installation: &Installation,
+        module: &Module,
+        known: &[&str],
+    ) -> Result<(), SettingsError> {
+        let Some(table) = self.table(module.name) else { return Ok(()) };
+        match table.get_ref().keys().find(|key| !known.contains(&key.get_ref().as_ref())) {
+            None => Ok(()),
+            Some(key) => {
+                let right = match nearest(key.get_ref(), known.iter().copied()) {
+                    Some(name) => format!("did you mean `{name}`?"),
+                    None if known.is_empty() => "the module has none; drop this line".into(),
+                    None => {
+                        format!("there are {}; what is only read at the start belongs to `settings`", known.join(", "))
+                    }
+                };
+                let message = format!("`{}` is no parameter; {right}", key.get_ref());
+                Err(self.wrong(installation, module.name, key.span().start, &message))
+            }
+        }
+    }
+
+    /// The settings of a module with its saved values in place of those of the same names, and the place of these.
+    pub(crate) fn over<'a>(&'a self, module: Name, settings: &Spanned<DeValue<'a>>) -> Option<Spanned<DeValue<'a>>> {
+        let saved = self.table(module)?;
+        let mut merged = settings.get_ref().as_table().cloned().unwrap_or_default();
+        for (key, value) in saved.get_ref() {
+            // Taken out first: the key in a map keeps its own place in the other file.
+            merged.remove(key);
+            merged.insert(key.clone(), value.clone());
+        }
+        Some(Spanned::new(saved.span(), DeValue::Table(merged)))
+    }
+
+    pub(crate) fn wrong(&self, installation: &Installation, module: Name, at: usize, message: &str) -> SettingsError {
+        SettingsError {
+            path: self.path.clone(),
+            line: line_of(&self.text, at),
+            module: installation.classes.format(module),
+            message: message.into(),
+        }
+    }
+
+    /// The table of a module; the text is read again, since only it knows the places.
+    fn table(&self, module: Name) -> Option<Spanned<DeTable<'_>>> {
+        let (_, key) = self.modules.iter().find(|(name, _)| *name == module)?;
+        let document = DeTable::parse(&self.text).ok()?.into_inner();
+        let entry = document.get(key.as_str())?;
+        Some(Spanned::new(entry.span(), entry.get_ref().as_table()?.clone()))
+    }
+}
+
+/// The module whose values these are; none if something is wrong, which the reader knows then.
+fn owner(item: &Item<'_>, installation: &Installation) -> Option<Name> {
+    let text = item.key.as_str();
+    let own: Vec<String> = installation.modules.iter().map(|module| installation.classes.format(module.name)).collect();
+    let name = installation.classes.parse_module(text).ok();
+    let module = name.and_then(|name| Some((name, installation.module(name)?)));
+    let right = match module {
+        Some((name, module)) if module.name == name => None,
+        Some((_, module)) => Some(format!(
+            "it is a face; write [\"{}\"], the module's own name",
+            installation.classes.format(module.name)
+        )),
+        None => Some(match nearest(text, own.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean [\"{near}\"]?"),
+            None => format!("the modules are {}", own.join(", ")),
+        }),
+    };
+    if let Some(right) = right {
+        item.report(format!("`{text}` names no module; {right}"));
+        return None;
+    }
+    let values = item.section(&format!("[\"{text}\"]"))?;
+    for value in values.entries() {
+        if matches!(value.value.get_ref(), DeValue::Array(_) | DeValue::Table(_) | DeValue::Datetime(_)) {
+            value.report(format!("`{}`: a parameter is a number, a text, true or false", value.key));
+        }
+    }
+    name
+}

@@ -1,0 +1,207 @@
+//! What launch can be asked while it runs: how its modules are, and to stop, start and restart one.
+//!
+//! Launch takes the first instance of class `tool` on its node; this is the interface that it serves there.
+
+use crate::call::CallError;
+use crate::interface;
+use crate::interface::append;
+use crate::runtime::ToolLink;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Where launch stands with a module.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Phase {
+    /// Not started yet, or waiting to be started again.
+    Waiting,
+    /// Started, not ready.
+    Starting,
+    /// Ready, and not switched on yet.
+    Ready,
+    /// At work, or switched off by somebody.
+    Running,
+    /// Told to end.
+    Stopping,
+    /// Ended because somebody asked for it; it stays so until it is started.
+    Stopped,
+    /// Ended, and that was all right.
+    Ended,
+    /// Ended, and not to be started again.
+    Failed,
+}
+
+impl Phase {
+    /// One word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Waiting => "waiting",
+            Self::Starting => "starting",
+            Self::Ready => "ready",
+            Self::Running => "running",
+            Self::Stopping => "stopping",
+            Self::Stopped => "stopped",
+            Self::Ended => "ended",
+            Self::Failed => "failed",
+        }
+    }
+
+    /// Whether it does not run, and will not unless somebody asks for it.
+    pub const fn is_over(self) -> bool {
+        matches!(self, Self::Stopped | Self::Ended | Self::Failed)
+    }
+}
+
+/// What launch knows of a module.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct ChildState {
+    /// Its name, such as `pilot.0`.
+    pub module: String,
+    /// Where launch stands with it.
+    pub phase: Phase,
+    /// Its process, while there is one.
+    pub pid: Option<u32>,
+    /// Processes it has had, this one included.
+    pub lives: u32,
+    /// How often its restart policy has started it again.
+    pub restarts: u32,
+    /// When it will be started again, ms from now.
+    pub starts_in_ms: Option<u32>,
+    /// How it ended the last time, or why it failed; empty if it never ended. With what it printed, as far as it fits.
+    pub last_end: String,
+    /// The last line that it printed; empty if it printed none.
+    pub printed: String,
+}
+
+/// Some of the modules that launch watches over.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Children {
+    /// All there are.
+    pub total: u16,
+    /// From the one that was asked for on, as many as fit in a reply.
+    pub states: Vec<ChildState>,
+}
+
+/// Why launch did not do what it was asked. The text is the module's name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema, thiserror::Error)]
+pub enum ControlError {
+    /// Not one of its modules.
+    #[error(
+        "launch watches over no module `{0}` on this node: it is on another one, left out since its program is missing, \
+         or not in the configuration; `rohrpost list` shows which there are"
+    )]
+    NoModule(String),
+    /// It is to be started, and runs.
+    #[error("{0} runs already; `rohrpost restart {0}` would end it first")]
+    Running(String),
+    /// It is to be stopped, and was.
+    #[error("{0} is stopped already; `rohrpost start {0}` starts it")]
+    Stopped(String),
+    /// It is to be stopped, and has ended by itself.
+    #[error("{0} has ended already, and is not started again by itself; `rohrpost start {0}` starts it")]
+    Ended(String),
+    /// Launch stops all modules.
+    #[error("launch is ending; it stops {0} like all others")]
+    Ending(String),
+}
+
+/// Launch: starts the modules of its node, and watches over them.
+#[interface(class = "tool", crate = crate::macro_support)]
+pub trait Launcher {
+    /// How it stands with the modules, from this one on (0: the first of the configuration), as many as fit.
+    #[command(16, idempotent)]
+    fn children(&mut self, first: u16) -> Children;
+
+    /// Ends a module if it runs, and starts it; it is switched on again unless it was off. Not counted against its restart
+    /// policy. Answers at once: with the number of the process that is to come, counted from 1 (`lives`).
+    #[command(17)]
+    fn restart(&mut self, module: String) -> Result<u32, ControlError>;
+
+    /// Ends a module; it stays ended until it is started. Answers at once.
+    #[command(18)]
+    fn stop(&mut self, module: String) -> Result<(), ControlError>;
+
+    /// Starts a module that has ended, was stopped, or waits to be started again. Answers as `restart` does.
+    #[command(19)]
+    fn start(&mut self, module: String) -> Result<u32, ControlError>;
+}
+
+/// The functions' numbers.
+const CHILDREN: u16 = 16;
+const RESTART: u16 = 17;
+const STOP: u16 = 18;
+const START: u16 = 19;
+
+/// Launch, asked by a tool.
+impl ToolLink {
+    /// How it stands with all modules that launch watches over, in the order of the configuration.
+    ///
+    /// # Errors
+    /// See [`CallError`]; [`CallError::NotSent`] when no launch runs on this node.
+    pub fn children(&mut self) -> Result<Vec<ChildState>, CallError> {
+        let mut states = Vec::new();
+        loop {
+            let first = states.len() as u16;
+            let page: Children = self.ask_launch(CHILDREN, &(first,))?;
+            let more = !page.states.is_empty();
+            states.extend(page.states);
+            if !more || states.len() >= usize::from(page.total) {
+                return Ok(states);
+            }
+        }
+    }
+
+    /// Asks launch to restart a module (`pilot.0`); which of its processes that will be ([`ChildState::lives`]).
+    ///
+    /// # Errors
+    /// See [`CallError`] and [`ControlError`].
+    pub fn restart(&mut self, module: &str) -> Result<u32, CallError<ControlError>> {
+        self.order(RESTART, module)
+    }
+
+    /// Asks launch to stop a module.
+    ///
+    /// # Errors
+    /// See [`CallError`] and [`ControlError`].
+    pub fn stop(&mut self, module: &str) -> Result<(), CallError<ControlError>> {
+        self.order(STOP, module)
+    }
+
+    /// Asks launch to start a module; which of its processes that will be ([`ChildState::lives`]).
+    ///
+    /// # Errors
+    /// See [`CallError`] and [`ControlError`].
+    pub fn start(&mut self, module: &str) -> Result<u32, CallError<ControlError>> {
+        self.order(START, module)
+    }
+
+    fn order<T: serde::de::DeserializeOwned>(
+        &mut self,
+        function: u16,
+        module: &str,
+    ) -> Result<T, CallError<ControlError>> {
+        let result: Result<T, ControlError> = self.ask_launch(function, &(module,)).map_err(CallError::widen)?;
+        result.map_err(|error| CallError::Module(self.launcher(), error))
+    }
+
+    fn ask_launch<T: serde::de::DeserializeOwned>(
+        &mut self,
+        function: u16,
+        arguments: &impl Serialize,
+    ) -> Result<T, CallError> {
+        let write = |body: &mut Vec<u8>| append(body, arguments);
+        self.call(self.launcher(), function, LauncherInterface::hash(), write, |bytes| postcard::from_bytes(bytes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interface::Interface;
+
+    #[test]
+    fn a_tool_calls_the_functions_by_their_numbers() {
+        let functions = LauncherInterface::description().functions;
+        let numbers: Vec<(&str, u16)> = functions.iter().map(|f| (f.name.as_str(), f.number)).collect();
+        assert_eq!(numbers, [("children", CHILDREN), ("restart", RESTART), ("stop", STOP), ("start", START)]);
+    }
+}

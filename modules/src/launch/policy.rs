@@ -1,0 +1,93 @@
+//! Whether and when a module that has ended is started again. Knows no process; time comes as an argument.
+
+use rohrpost_config::{Restart, RestartPolicy};
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// Longest pause before a restart.
+const BACKOFF_MAX: Duration = Duration::from_secs(10);
+
+/// What follows an end.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Next {
+    /// Started again after this pause.
+    Again(Duration),
+    /// It stays ended.
+    Stay,
+    /// It would be started again, had it not ended too often already.
+    GivenUp,
+}
+
+/// A module's restart policy, and how often it was needed lately.
+pub(super) struct Policy {
+    restart: Restart,
+    /// When it was started again, the last times.
+    restarted: VecDeque<Instant>,
+    backoff: Duration,
+}
+
+impl Policy {
+    pub(super) fn new(restart: Restart) -> Self {
+        Self { restart, restarted: VecDeque::new(), backoff: restart.backoff }
+    }
+
+    pub(super) fn restart(&self) -> Restart {
+        self.restart
+    }
+
+    /// A process has ended by itself.
+    pub(super) fn ended(&mut self, success: bool, now: Instant) -> Next {
+        let again = match self.restart.policy {
+            RestartPolicy::Never => false,
+            RestartPolicy::OnFailure => !success,
+            RestartPolicy::Always => true,
+        };
+        if !again {
+            return Next::Stay;
+        }
+        self.restarted.push_back(now);
+        self.restarted.retain(|at| now - *at <= self.restart.within);
+        if self.restarted.len() > self.restart.at_most as usize {
+            return Next::GivenUp;
+        }
+        // Alone for a while, it begins with the short pause again.
+        if self.restarted.len() == 1 {
+            self.backoff = self.restart.backoff;
+        }
+        let pause = self.backoff;
+        self.backoff = (self.backoff * 2).min(BACKOFF_MAX);
+        Next::Again(pause)
+    }
+
+    /// A person has started it: what was before counts no more.
+    pub(super) fn begin_anew(&mut self) {
+        self.restarted.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_grow_until_it_is_given_up_and_a_person_begins_anew() {
+        let (ms, minute) = (Duration::from_millis, Duration::from_secs(60));
+        let restart = Restart { policy: RestartPolicy::OnFailure, backoff: ms(4000), at_most: 3, within: minute };
+        let (mut policy, start) = (Policy::new(restart), Instant::now());
+        for (at_s, success, next, why) in [
+            (0, true, Next::Stay, "it meant to end"),
+            (1, false, Next::Again(ms(4000)), "the first time"),
+            (2, false, Next::Again(ms(8000)), "twice as long"),
+            (3, false, Next::Again(ms(10_000)), "but never longer"),
+            (4, false, Next::GivenUp, "once too often"),
+            (70, false, Next::Again(ms(4000)), "long after, it counts anew"),
+        ] {
+            assert_eq!(policy.ended(success, start + Duration::from_secs(at_s)), next, "{why}");
+        }
+        for _ in 0..3 {
+            policy.ended(false, start + Duration::from_secs(71));
+        }
+        policy.begin_anew();
+        assert_eq!(policy.ended(false, start + Duration::from_secs(72)), Next::Again(ms(4000)));
+    }
+}

@@ -1,0 +1,148 @@
+//! Launch as those who send it commands see it.
+
+use super::child::{Child, Then};
+use super::control::{Children, ControlError, Launcher, LauncherInterface};
+use crate::call::{Fault, Link};
+use crate::common;
+use crate::description::Description;
+use crate::interface::{Interface, Serve};
+use crate::runtime::server::{Call, Desk, Servant};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{CreateError, Label, Name, Node, Receiver, SendError, Shape};
+use std::time::Instant;
+
+/// Commands taken in one go: a flood of them must not keep launch from its modules.
+const BURST: usize = 32;
+/// Bytes of states in one reply, so that it fits every reply mailbox.
+const PAGE_BYTES: usize = 3000;
+
+/// Launch's command mailbox, and what it tells of itself.
+pub(super) struct Counter {
+    desk: Desk,
+    description: Description,
+    /// Postcard of it.
+    bytes: Vec<u8>,
+}
+
+impl Counter {
+    pub(super) fn open(link: &Link) -> Result<Self, CreateError> {
+        let commands = link.participant().clone().receiver(link.me(), Shape::default())?;
+        let description = LauncherInterface::description();
+        // Writing to a growing vector does not fail.
+        let bytes = postcard::to_stdvec(&description).unwrap_or_default();
+        Ok(Self { desk: Desk::new(commands), description, bytes })
+    }
+
+    /// To wait on.
+    pub(super) fn commands(&mut self) -> &mut Receiver {
+        &mut self.desk.commands
+    }
+
+    /// Answers those who have asked.
+    pub(super) fn serve(&mut self, orders: Orders<'_>, link: &mut Link) {
+        let mut clerk = Clerk { orders, link, description: &self.description, bytes: &self.bytes };
+        for _ in 0..BURST {
+            if !self.desk.handle(&mut clerk) {
+                return;
+            }
+        }
+    }
+
+    pub(super) fn close(self) {
+        self.desk.commands.close();
+    }
+}
+
+/// What commands are about.
+pub(super) struct Orders<'a> {
+    pub(super) children: &'a mut [Child],
+    pub(super) installation: &'a Installation,
+    pub(super) node: &'a Node,
+    /// Launch stops all.
+    pub(super) ending: bool,
+}
+
+struct Clerk<'a> {
+    orders: Orders<'a>,
+    link: &'a mut Link,
+    description: &'a Description,
+    bytes: &'a [u8],
+}
+
+impl Servant for Clerk<'_> {
+    fn is_idempotent(&self, number: u16) -> bool {
+        number < common::FIRST_OWN || self.description.functions.iter().any(|f| f.number == number && f.idempotent)
+    }
+
+    fn run(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+        call.require_interface(LauncherInterface::hash())?;
+        match call.number {
+            common::DESCRIBE => call.describe(self.bytes, reply),
+            number if number < common::FIRST_OWN => Err(Fault::Unknown(number)),
+            number => LauncherInterface::serve(&mut self.orders, number, call.arguments, reply),
+        }
+    }
+
+    fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
+        self.link.send(to, label, parts)
+    }
+}
+
+impl Orders<'_> {
+    /// The module of this name, or with this face.
+    fn find(&mut self, module: &str) -> Result<&mut Child, ControlError> {
+        if self.ending {
+            return Err(ControlError::Ending(module.into()));
+        }
+        let name = self.installation.classes.parse_name(module).ok();
+        let name = name.and_then(|name| self.installation.module(name.module())).map(|module| module.name);
+        let child = self.children.iter_mut().find(|child| Some(child.name()) == name);
+        child.ok_or_else(|| ControlError::NoModule(module.into()))
+    }
+}
+
+impl Launcher for Orders<'_> {
+    fn children(&mut self, first: u16) -> Children {
+        let (now, mut bytes) = (Instant::now(), 0);
+        let mut states = Vec::new();
+        for child in self.children.iter().skip(first.into()) {
+            let state = child.state(now);
+            bytes += 40 + state.module.len() + state.last_end.len() + state.printed.len();
+            if bytes > PAGE_BYTES {
+                break;
+            }
+            states.push(state);
+        }
+        Children { total: self.children.len() as u16, states }
+    }
+
+    fn restart(&mut self, module: String) -> Result<u32, ControlError> {
+        let node = self.node;
+        let child = self.find(&module)?;
+        child.tell_to_end(Then::Start, node, Instant::now());
+        Ok(child.lives() + 1)
+    }
+
+    fn stop(&mut self, module: String) -> Result<(), ControlError> {
+        let node = self.node;
+        let child = self.find(&module)?;
+        match child.phase() {
+            super::Phase::Stopped => Err(ControlError::Stopped(child.text().into())),
+            phase if phase.is_over() => Err(ControlError::Ended(child.text().into())),
+            _ => {
+                child.tell_to_end(Then::Stay, node, Instant::now());
+                Ok(())
+            }
+        }
+    }
+
+    fn start(&mut self, module: String) -> Result<u32, ControlError> {
+        let node = self.node;
+        let child = self.find(&module)?;
+        if child.is_at_work() {
+            return Err(ControlError::Running(child.text().into()));
+        }
+        child.tell_to_end(Then::Start, node, Instant::now());
+        Ok(child.lives() + 1)
+    }
+}

@@ -1,0 +1,367 @@
+//! The way of a line out of this process: allowances, queues, and whoever finds the way free sends.
+
+use super::allowance::{Bucket, Excess, Told};
+use super::{CLASS, LINES, OutputLine, layer};
+use crate::common::{DataHead, OutputLevel};
+use crossbeam_queue::ArrayQueue;
+use rohrpost_config::{Installation, Level};
+use rohrpost_mailbox::{
+    Label, Name, Options, Participant, Priority, SendError, Sender, SystemClock, Type, monotonic_ns,
+};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, TryLockError};
+use std::time::{Duration, Instant};
+
+/// Lines that wait in this process while the collector is not there or has no room: panics, errors, others.
+const WAITING_MAX: [usize; 3] = [16, 64, 256];
+/// How often a collector that was not there is looked for again.
+const RETRY: Duration = Duration::from_millis(200);
+/// How soon one that had no room is tried again.
+const RETRY_FULL: Duration = Duration::from_millis(20);
+/// How long a process that ends gives its last lines to find the collector.
+const LAST_LINES: Duration = Duration::from_millis(500);
+/// How often it looks.
+const LAST_LOOK: Duration = Duration::from_millis(5);
+
+static OUTPUT: OnceLock<Output> = OnceLock::new();
+
+thread_local! {
+    /// Panics of this thread so far.
+    static PANICS: Cell<u32> = const { Cell::new(0) };
+}
+
+/// Each has an allowance and a queue of its own, so that no flood of one hides another. In the order of their importance.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Lane {
+    Panic,
+    Error,
+    Rest,
+}
+
+impl Lane {
+    const ALL: [Self; 3] = [Self::Panic, Self::Error, Self::Rest];
+
+    pub(super) fn of(level: OutputLevel) -> Self {
+        if level == OutputLevel::Error { Self::Error } else { Self::Rest }
+    }
+
+    /// What it carries, and how important it is to know that some of it is missing.
+    fn words(self) -> (&'static str, OutputLevel) {
+        match self {
+            Self::Panic => ("panics", OutputLevel::Error),
+            Self::Error => ("errors", OutputLevel::Error),
+            Self::Rest => ("lines", OutputLevel::Warn),
+        }
+    }
+}
+
+struct Waiting {
+    bucket: Bucket,
+    excess: Excess,
+    queue: ArrayQueue<OutputLine>,
+}
+
+/// The output of this process.
+pub(super) struct Output {
+    me: Name,
+    to: Name,
+    priority: Priority,
+    /// An [`OutputLevel`] as a number.
+    level: AtomicU8,
+    clock: SystemClock,
+    participant: Arc<Participant>,
+    lanes: [Waiting; 3],
+    rate: u32,
+    /// Lost since the last line that got through.
+    lost_now: AtomicU32,
+    lost: AtomicU64,
+    suppressed: AtomicU64,
+    way: Mutex<Way>,
+    /// Whether `way` holds a line back.
+    held: AtomicBool,
+    /// Also print lines from this level on.
+    print: OutputLevel,
+    /// Whether the configuration has a collector to wait for.
+    collected: bool,
+}
+
+struct Way {
+    sender: Option<Sender>,
+    retry_at: Option<Instant>,
+    /// The line that found no room; it goes before all that wait.
+    held: Option<OutputLine>,
+    bytes: Vec<u8>,
+    sequence: u32,
+}
+
+/// Makes this process's `tracing` events and panics lines of this module. The first caller in a process decides.
+pub fn install(participant: &Arc<Participant>, installation: &Installation, me: Name, launched: bool) {
+    let Some(class) = installation.classes.id(CLASS) else { return };
+    let (rate, burst) = (installation.output.rate, installation.output.burst);
+    let to = Name::new(me.system(), class.0, 0, LINES);
+    let way = Way { sender: None, retry_at: None, held: None, bytes: Vec::with_capacity(1024), sequence: 0 };
+    let output = Output {
+        me,
+        to,
+        priority: class.priority(),
+        level: AtomicU8::new(level_of(installation.output_level(me)) as u8),
+        clock: SystemClock::open(participant.node()),
+        participant: participant.clone(),
+        lanes: WAITING_MAX.map(|lines| Waiting {
+            bucket: Bucket::new(rate, burst),
+            excess: Excess::default(),
+            queue: ArrayQueue::new(lines),
+        }),
+        rate,
+        lost_now: AtomicU32::new(0),
+        lost: AtomicU64::new(0),
+        suppressed: AtomicU64::new(0),
+        way: Mutex::new(way),
+        held: AtomicBool::new(false),
+        // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard error.
+        print: if launched { OutputLevel::Error } else { OutputLevel::Trace },
+        collected: installation.module(to).is_some(),
+    };
+    if OUTPUT.set(output).is_ok() {
+        layer::listen();
+    }
+}
+
+fn level_of(level: Level) -> OutputLevel {
+    match level {
+        Level::Error => OutputLevel::Error,
+        Level::Warn => OutputLevel::Warn,
+        Level::Info => OutputLevel::Info,
+        Level::Debug => OutputLevel::Debug,
+        Level::Trace => OutputLevel::Trace,
+    }
+}
+
+fn level_from(number: u8) -> OutputLevel {
+    OutputLevel::ALL.into_iter().find(|level| *level as u8 == number).unwrap_or(OutputLevel::Trace)
+}
+
+pub(super) fn installed() -> Option<&'static Output> {
+    OUTPUT.get()
+}
+
+/// Whether events become lines, and are printed where that is wanted.
+pub(crate) fn is_installed() -> bool {
+    installed().is_some()
+}
+
+/// Sets which lines this process sends from now on; returns which it sent before, if it sends any.
+pub fn set_level(level: OutputLevel) -> Option<OutputLevel> {
+    installed().map(|output| level_from(output.level.swap(level as u8, Ordering::Relaxed)))
+}
+
+/// Which lines this process sends, if it sends any.
+pub fn level() -> Option<OutputLevel> {
+    installed().map(Output::level)
+}
+
+/// Lines lost so far.
+pub fn lost() -> u64 {
+    installed().map_or(0, |output| output.lost.load(Ordering::Relaxed))
+}
+
+/// Lines suppressed so far, since there were too many.
+pub fn suppressed() -> u64 {
+    installed().map_or(0, |output| output.suppressed.load(Ordering::Relaxed))
+}
+
+/// Sends the lines that wait, as far as there is room, and tells of suppressed ones when it is time.
+pub fn drain() {
+    if let Some(output) = installed() {
+        output.tell(|excess, now_ns| excess.tell(now_ns));
+        output.drain();
+    }
+}
+
+/// Sends the lines that wait. For a process that ends: it tells of all that was suppressed, and gives a collector that is not
+/// there or has no room a moment, at most half a second.
+pub fn flush() {
+    if let Some(output) = installed() {
+        output.tell(|excess, _| excess.tell_all());
+        output.flush();
+    }
+}
+
+/// When to call [`drain`] again, if lines wait or there is something to tell.
+pub fn retry_at() -> Option<Instant> {
+    let output = installed()?;
+    let now = Instant::now();
+    let retry = (!output.is_idle()).then(|| now + RETRY_FULL.max(output.patience()));
+    let now_ns = monotonic_ns();
+    let due_ns = output.lanes.iter().filter_map(|lane| lane.excess.due_ns()).min();
+    let due = due_ns.map(|due_ns| now + Duration::from_nanos(due_ns.saturating_sub(now_ns)));
+    [retry, due].into_iter().flatten().min()
+}
+
+impl Output {
+    pub(super) fn level(&self) -> OutputLevel {
+        level_from(self.level.load(Ordering::Relaxed))
+    }
+
+    /// Whether one more may be said now; else it is counted.
+    pub(super) fn allows(&self, lane: Lane) -> bool {
+        let (now_ns, own) = (monotonic_ns(), &self.lanes[lane as usize]);
+        if own.bucket.take(now_ns) {
+            return true;
+        }
+        self.suppressed.fetch_add(1, Ordering::Relaxed);
+        if own.excess.add(now_ns) {
+            // The module's loop has slept since before there was something to tell.
+            self.participant.ring();
+        }
+        false
+    }
+
+    /// Says a line that is allowed.
+    pub(super) fn say(&self, level: OutputLevel, text: String) {
+        self.tell(|excess, now_ns| excess.tell(now_ns));
+        self.push(Lane::of(level), level, 0, text);
+        self.drain();
+        if !self.is_idle() {
+            // Said by another thread, it would wait for whatever wakes the module's loop next.
+            self.participant.ring();
+        }
+    }
+
+    /// A panic is over when its module's loop has sent what waits, unless nothing comes after it.
+    pub(super) fn panicked(&self, text: String) {
+        if self.allows(Lane::Panic) {
+            self.push(Lane::Panic, OutputLevel::Error, 0, text);
+        }
+        self.drain();
+        let before = PANICS.try_with(|panics| panics.replace(panics.get() + 1)).unwrap_or(0);
+        if before > 0 || cfg!(panic = "abort") {
+            // A panic while another one unwinds aborts the process.
+            self.flush();
+        } else if !self.is_idle() {
+            self.participant.ring();
+        }
+    }
+
+    /// Puts a line into its queue.
+    fn push(&self, lane: Lane, level: OutputLevel, suppressed: u32, text: String) {
+        if level <= self.print {
+            super::print(&format_args!("{:5} {text}", level.name()));
+        }
+        let line = OutputLine { time_ns: self.clock.now().ns, module: self.me.raw(), level, lost: 0, suppressed, text };
+        if self.lanes[lane as usize].queue.push(line).is_err() {
+            self.lose_one();
+        }
+    }
+
+    /// Tells of what was suppressed, unless there is no room: then its time comes later.
+    fn tell(&self, told: impl Fn(&Excess, u64) -> Option<Told>) {
+        for lane in Lane::ALL {
+            let own = &self.lanes[lane as usize];
+            if own.excess.due_ns().is_none() || own.queue.is_full() {
+                continue;
+            }
+            if let Some(Told { lines, within }) = told(&own.excess, monotonic_ns()) {
+                let ((what, level), rate) = (lane.words(), self.rate);
+                let text = format!("… {lines} {what} were suppressed in {within:.1?}: more than {rate} a second");
+                self.push(lane, level, lines, text);
+            }
+        }
+    }
+
+    fn lose_one(&self) {
+        self.lost_now.fetch_add(1, Ordering::Relaxed);
+        self.lost.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn is_idle(&self) -> bool {
+        !self.held.load(Ordering::Relaxed) && self.lanes.iter().all(|lane| lane.queue.is_empty())
+    }
+
+    fn patience(&self) -> Duration {
+        match self.way.try_lock() {
+            Ok(way) => way.retry_at.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now())),
+            Err(_) => Duration::ZERO,
+        }
+    }
+
+    fn flush(&self) {
+        let until = Instant::now() + LAST_LINES;
+        self.drain();
+        while self.collected && !self.is_idle() && Instant::now() < until {
+            std::thread::sleep(LAST_LOOK);
+            self.drain();
+        }
+    }
+
+    /// Whoever finds the way taken leaves its line to the one who has it: nobody waits.
+    fn drain(&self) {
+        // Bounded: a thread that says more and more must not keep this one at it.
+        for _ in 0..WAITING_MAX.iter().sum() {
+            if self.is_idle() {
+                return;
+            }
+            let mut way = match self.way.try_lock() {
+                Ok(way) => way,
+                Err(TryLockError::Poisoned(way)) => way.into_inner(),
+                Err(TryLockError::WouldBlock) => return,
+            };
+            if !way.open(&self.participant, self.to) {
+                return;
+            }
+            let held = way.held.take();
+            if let Some(line) = held.or_else(|| self.lanes.iter().find_map(|lane| lane.queue.pop()))
+                && !self.send(&mut way, line)
+            {
+                return;
+            }
+            // Released, then looked at again: a line that came while it was held has nobody else.
+        }
+    }
+
+    /// False when nothing more goes through now.
+    fn send(&self, way: &mut Way, mut line: OutputLine) -> bool {
+        line.lost = self.lost_now.swap(0, Ordering::Relaxed);
+        let label =
+            Label { from: self.me, kind: Type::data(1), id: 0, priority: self.priority, options: Options::STAMPED };
+        way.bytes.clear();
+        // A line can be written: text and numbers.
+        let _ = crate::interface::append(&mut way.bytes, &line);
+        let head = DataHead { stamp_ns: line.time_ns, sequence: way.sequence, missed: line.lost };
+        let Some(sender) = &mut way.sender else { return false };
+        let sent = sender.send(&label, &[&head.to_bytes(), &way.bytes]);
+        self.held.store(false, Ordering::Relaxed);
+        let Err(error) = sent else {
+            way.sequence = way.sequence.wrapping_add(1);
+            return true;
+        };
+        self.lost_now.fetch_add(line.lost, Ordering::Relaxed);
+        if let SendError::TooLarge { .. } = error {
+            // It never will fit, and those behind it may.
+            self.lose_one();
+            return true;
+        }
+        let gone = matches!(error, SendError::NoMailbox(_));
+        if gone {
+            way.sender = None;
+        }
+        way.retry_at = Some(Instant::now() + if gone { RETRY } else { RETRY_FULL });
+        way.held = Some(OutputLine { lost: 0, ..line });
+        self.held.store(true, Ordering::Relaxed);
+        false
+    }
+}
+
+impl Way {
+    fn open(&mut self, participant: &Arc<Participant>, to: Name) -> bool {
+        if self.retry_at.is_some_and(|at| Instant::now() < at) {
+            return false;
+        }
+        if self.sender.is_none() {
+            self.sender = participant.sender(to).ok();
+            self.retry_at = self.sender.is_none().then(|| Instant::now() + RETRY);
+        }
+        self.sender.is_some()
+    }
+}

@@ -1,0 +1,136 @@
+//! Settings that may change while a module runs: declared once, in its settings struct, by [`crate::parameters`].
+//!
+//! ```text
+//! struct Settings ──#[parameters]──▶ ParameterSet ◀── Declared: name, text, unit, range
+//!                                        │
+//! configuration ──Declared::read─────────┤ the same check, and the same words, for all that come
+//! `param set`   ──runtime::parameters────┘
+//! ```
+//!
+//! A value travels as postcard of its type, and whoever has no such type reads it by the description that comes with it:
+//! [`Parameter`].
+
+mod declared;
+mod kinds;
+mod words;
+
+pub use declared::{Declared, put_parameter};
+pub use kinds::ParameterType;
+pub use words::{toml_text, value_text};
+
+use crate::value::{Value, WalkError, decode, describe_type};
+use postcard_schema::Schema;
+use postcard_schema::schema::owned::{OwnedDataModelType, OwnedNamedType};
+use serde::{Deserialize, Serialize};
+
+/// The parameters of a module and their present values. Written by [`crate::parameters`] for the settings struct.
+pub trait ParameterSet {
+    /// Their names, as the configuration has them.
+    fn names(&self) -> &'static [&'static str];
+
+    /// One of them with its present value; none past the last.
+    fn get(&self, index: usize) -> Option<Parameter>;
+
+    /// Whether this value (postcard) would do; returned as it would be stored.
+    ///
+    /// # Errors
+    /// [`Refusal::Type`] or [`Refusal::Range`].
+    fn accept(&self, index: usize, value: &[u8]) -> Result<Vec<u8>, Refusal>;
+
+    /// Stores a value that [`ParameterSet::accept`] or [`ParameterSet::get`] returned.
+    fn put(&mut self, index: usize, value: &[u8]);
+}
+
+/// A parameter as its module describes it, with its present value.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Its name, as the configuration has it.
+    pub name: String,
+    /// What it is for.
+    pub text: String,
+    /// Unit of its value; empty: none.
+    pub unit: String,
+    /// Its type.
+    pub ty: OwnedNamedType,
+    /// Least value, postcard.
+    pub least: Option<Vec<u8>>,
+    /// Greatest value, postcard.
+    pub most: Option<Vec<u8>>,
+    /// Present value, postcard.
+    pub value: Vec<u8>,
+}
+
+impl Parameter {
+    /// The present value.
+    ///
+    /// # Errors
+    /// When it is not of the type: then its module is not to be believed.
+    pub fn value(&self) -> Result<Value, WalkError> {
+        decode(&self.ty, &self.value)
+    }
+
+    /// What values it takes, in words, without the unit: `0..=1.5`, `at least 1`, `left|right`, `f64`.
+    pub fn range(&self) -> String {
+        let bound = |bytes: &Option<Vec<u8>>| {
+            let value = bytes.as_ref().and_then(|bytes| decode(&self.ty, bytes).ok());
+            value.map(|value| value_text(&value))
+        };
+        match (bound(&self.least), bound(&self.most), &self.ty.ty) {
+            (Some(least), Some(most), _) => format!("{least}..={most}"),
+            (Some(least), None, _) => format!("at least {least}"),
+            (None, Some(most), _) => format!("at most {most}"),
+            (None, None, OwnedDataModelType::Enum(variants)) => {
+                variants.iter().map(|variant| words::kebab(&variant.name)).collect::<Vec<_>>().join("|")
+            }
+            (None, None, _) => describe_type(&self.ty),
+        }
+    }
+
+    /// A text with this parameter's unit behind it.
+    pub fn with_unit(&self, text: &str) -> String {
+        if self.unit.is_empty() { text.into() } else { format!("{text} {}", self.unit) }
+    }
+}
+
+/// Why parameters keep their values.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, Schema, thiserror::Error)]
+pub enum Refusal {
+    /// The module has none.
+    #[error("the module has no parameters")]
+    NoParameters,
+    /// It has others.
+    #[error("there is no parameter `{name}`; there are {known}")]
+    Unknown {
+        /// As it was asked for.
+        name: String,
+        /// Those that there are.
+        known: String,
+    },
+    /// Which value is meant?
+    #[error("`{0}` is given twice")]
+    Twice(String),
+    /// A value of another type.
+    #[error("`{name}`: {text}")]
+    Type {
+        /// The parameter.
+        name: String,
+        /// What it is and what it should be.
+        text: String,
+    },
+    /// A value too small or too large.
+    #[error("`{name}` is {value}, which is out of its range {range}")]
+    Range {
+        /// The parameter.
+        name: String,
+        /// The value, with its unit.
+        value: String,
+        /// What it may be, with its unit.
+        range: String,
+    },
+    /// The module itself does not want it.
+    #[error("the module refuses: {0}")]
+    Module(String),
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+//! A module as those who send it commands see it, under one of its names.
+
+use super::context::Context;
+use super::face::Offer;
+use super::parameters;
+use super::runner::Life;
+use super::server::{Call, Servant, read_arguments, write_result};
+use crate::call::Fault;
+use crate::common::{self, OutputLevel, SetParameters, Subscribe};
+use crate::module::Module;
+use crate::output;
+use rohrpost_mailbox::{Label, Name, SendError, local, monotonic_ns};
+
+/// What is needed to run one command.
+pub(super) struct Hosted<'a, M> {
+    /// Which face.
+    pub(super) index: usize,
+    pub(super) offer: &'a Offer<M>,
+    pub(super) life: &'a mut Life<M>,
+    pub(super) context: &'a mut Context,
+}
+
+impl<M: Module> Servant for Hosted<'_, M> {
+    fn is_idempotent(&self, number: u16) -> bool {
+        number < common::FIRST_OWN || self.offer.idempotent.contains(&number)
+    }
+
+    fn run(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+        call.require_interface(self.offer.hash)?;
+        if call.number < common::FIRST_OWN {
+            return self.common(call, reply);
+        }
+        self.life.require_on()?;
+        let serve = self.offer.serve.ok_or(Fault::Unknown(call.number))?;
+        serve(&mut self.life.module, call.number, call.arguments, reply)
+    }
+
+    fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
+        self.context.link.borrow_mut().send(to, label, parts)
+    }
+}
+
+impl<M: Module> Hosted<'_, M> {
+    fn common(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+        match call.number {
+            common::ON => self.life.turn_on(self.context),
+            common::OFF => {
+                self.life.turn_off(self.context);
+                Ok(())
+            }
+            common::STATUS => write_result(reply, &self.life.status(self.context)),
+            common::GET_DATA => self.get_data(call, reply),
+            common::SUBSCRIBE => {
+                let (wish,): (Subscribe,) = read_arguments(call.arguments)?;
+                self.offer.require_data(wish.number)?;
+                let to = call.head.from.with_local(local::DATA);
+                let now_ns = monotonic_ns();
+                let subscriptions = &mut self.context.subscriptions;
+                let room = subscriptions.subscribe(self.index, to, call.head.priority, wish, now_ns);
+                if room { Ok(()) } else { Err(Fault::Busy) }
+            }
+            common::UNSUBSCRIBE => {
+                let (id,): (u16,) = read_arguments(call.arguments)?;
+                self.context.subscriptions.unsubscribe(call.head.from.with_local(local::DATA), id);
+                Ok(())
+            }
+            common::OUTPUT_LEVEL => {
+                let (level,): (OutputLevel,) = read_arguments(call.arguments)?;
+                write_result(reply, &output::set_level(level))
+            }
+            common::DESCRIBE => call.describe(&self.offer.description, reply),
+            common::PARAMETERS => {
+                let (from,): (u16,) = read_arguments(call.arguments)?;
+                write_result(reply, &parameters::page(&mut self.life.module, self.life.changes, from))
+            }
+            common::SET_PARAMETERS => {
+                let wish: SetParameters = read_arguments(call.arguments)?;
+                let by = self.context.installation.classes.format(call.head.from.module());
+                let set = parameters::set(&mut self.life.module, self.context, &wish, &by);
+                self.life.changes = self.life.changes.wrapping_add(u32::from(set.is_ok() && !wish.only_check));
+                write_result(reply, &set)
+            }
+            other => Err(Fault::Unknown(other)),
+        }
+    }
+
+    fn get_data(&self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+        let (number,): (u16,) = read_arguments(call.arguments)?;
+        self.offer.require_data(number)?;
+        let is_it = |newest: &&crate::publish::Newest| (newest.face, newest.number) == (self.index, number);
+        let newest = self.context.newest.iter().find(is_it).ok_or(Fault::NothingYet)?;
+        // A tuple of the time and the value: in postcard just the one after the other.
+        write_result(reply, &newest.stamp_ns)?;
+        reply.extend_from_slice(&newest.value);
+        Ok(())
+    }
+}

@@ -1,0 +1,128 @@
+//! What `check` says, for programs. Durations are in milliseconds, sizes in bytes.
+
+use rohrpost::Name;
+use rohrpost::config::{
+    Errors, Installation, MailboxSpec, MissingProgram, Module, Program, RestartPolicy, Scheduling, Start, TimeSource,
+};
+use serde_json::{Value, json};
+use std::time::Duration;
+
+/// A file with mistakes.
+pub(super) fn errors(errors: &Errors) -> Value {
+    let file = errors.path().display().to_string();
+    let problems = errors.problems().iter();
+    let problems: Vec<Value> =
+        problems.map(|problem| json!({ "file": file, "line": problem.line, "message": problem.message })).collect();
+    json!({ "file": file, "right": false, "errors": problems })
+}
+
+/// A file that is right, as `explain` tells it.
+pub(super) fn installation(installation: &Installation, only: Option<&str>, missing: &[MissingProgram]) -> Value {
+    let Installation { name, path, system, classes, output, .. } = installation;
+    let text = |name: Name| classes.format(name);
+    let class_entries = classes.iter().map(|entry| {
+        let scheduling = scheduling(installation.scheduling(entry.class));
+        json!({ "id": entry.class.0, "name": entry.name, "text": entry.text, "scheduling": scheduling })
+    });
+    let nodes = installation.nodes.iter().filter(|node| only.is_none_or(|name| name == node.name)).map(|node| {
+        let modules: Vec<Value> = installation.modules_on(&node.name).map(|it| module(installation, it)).collect();
+        json!({
+            "name": node.name, "address": node.address, "mode": format!("{:04o}", node.mode),
+            "tools": [node.tools.start(), node.tools.end()], "modules": modules,
+        })
+    });
+    let levels = output.levels.iter().map(|(module, level)| (text(*module), level.as_str().into()));
+    let show = installation.gui.show.iter();
+    let show = show.map(|show| json!({ "from": text(show.from), "data": show.data, "rate_hz": show.rate }));
+    let flows = installation.flows.iter().map(|flow| {
+        json!({
+            "from": text(flow.from), "to": text(flow.to), "size": flow.size, "period_ms": ms(flow.period),
+            "deadline_ms": ms(flow.deadline),
+        })
+    });
+    let notes = missing.iter().map(
+        |program| json!({ "module": text(program.module), "optional": program.optional, "message": program.message }),
+    );
+    json!({
+        "file": path.display().to_string(),
+        "right": true,
+        "installation": {
+            "name": name,
+            "system": { "id": system.id, "name": system.name },
+            "time": time(installation.time),
+            "digest": installation.digest().to_string(),
+            "classes": class_entries.collect::<Vec<_>>(),
+            "nodes": nodes.collect::<Vec<_>>(),
+            "output": {
+                "level": output.level.as_str(), "levels": levels.collect::<serde_json::Map<_, _>>(),
+                "ring": output.ring, "file": output.file,
+            },
+            "gui": show.collect::<Vec<_>>(),
+            "flows": flows.collect::<Vec<_>>(),
+        },
+        "missing_programs": notes.collect::<Vec<_>>(),
+    })
+}
+
+fn module(installation: &Installation, module: &Module) -> Value {
+    let text = |name: &Name| installation.classes.format(*name);
+    let calls = module.calls.iter().map(|to| {
+        let although = module.although.iter().find(|(name, _)| name == to).map(|(_, why)| why);
+        json!({ "to": text(to), "although": although })
+    });
+    let runs = match &module.program {
+        Program::Builtin(name) => json!({ "builtin": name }),
+        Program::Command(words) => json!({ "program": words }),
+    };
+    let policy = match module.restart.policy {
+        RestartPolicy::Never => "never",
+        RestartPolicy::OnFailure => "on-failure",
+        RestartPolicy::Always => "always",
+    };
+    let mailboxes = module.mailboxes.each().into_iter().map(|(key, spec)| (key.into(), mailbox(spec)));
+    json!({
+        "name": text(&module.name),
+        "line": module.line,
+        "priority": module.name.class().0,
+        "scheduling": scheduling(installation.scheduling(module.name.class())),
+        "faces": module.faces.iter().map(text).collect::<Vec<_>>(),
+        "runs": runs,
+        "optional": module.optional,
+        "on": module.start == Start::On,
+        "calls": calls.collect::<Vec<_>>(),
+        "settings": module.settings,
+        "restart": {
+            "policy": policy, "backoff_ms": ms(module.restart.backoff), "at_most": module.restart.at_most,
+            "within_ms": ms(module.restart.within),
+        },
+        "ready_within_ms": ms(module.ready_within),
+        "stop_within_ms": ms(module.stop_within),
+        "mailboxes": mailboxes.collect::<serde_json::Map<_, _>>(),
+    })
+}
+
+fn mailbox(spec: &MailboxSpec) -> Value {
+    json!({
+        "slots": spec.slots, "size": spec.size, "full": spec.full.name(), "max_age_ms": spec.max_age.map(ms),
+        "claims": spec.claims, "memory": spec.memory(),
+    })
+}
+
+fn scheduling(scheduling: Scheduling) -> Value {
+    match scheduling {
+        Scheduling::Fifo { priority } => json!({ "fifo": priority }),
+        Scheduling::Normal { nice } => json!({ "nice": nice }),
+    }
+}
+
+fn time(source: TimeSource) -> Value {
+    match source {
+        TimeSource::Local => json!({ "source": "local" }),
+        TimeSource::Simulation { speed } => json!({ "source": "simulation", "speed": speed }),
+        TimeSource::Log => json!({ "source": "log" }),
+    }
+}
+
+fn ms(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}

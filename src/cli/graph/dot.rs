@@ -1,0 +1,29 @@
+//! The graph for Graphviz.
+
+use super::{Carries, Graph};
+use std::fmt::Write;
+
+pub(super) fn write(graph: &Graph, all: bool) -> String {
+    let mut text = String::from("digraph rohrpost {\n");
+    let _ = writeln!(text, "    label = {:?}", format!("node {} of {}", graph.node, graph.installation));
+    text.push_str("    rankdir = LR\n    node [shape = box, style = rounded, fontname = \"sans-serif\"]\n");
+    text.push_str("    edge [fontname = \"sans-serif\", fontsize = 10]\n");
+    for module in &graph.modules {
+        let faces = module.faces.iter().map(|face| format!("\\n+ {face}"));
+        let dead = if module.state == "dead" { ", style = \"rounded,dashed\"" } else { "" };
+        let _ =
+            writeln!(text, "    {:?} [label = \"{}{}\"{dead}]", module.name, module.name, faces.collect::<String>());
+    }
+    for edge in graph.drawn(all) {
+        let style = match edge.carries {
+            Carries::Data => "",
+            Carries::Command | Carries::Common => ", style = bold, color = \"#b5432a\"",
+            Carries::Reply => ", style = dotted",
+            Carries::Output => ", color = gray",
+        };
+        let label = format!("{} {}", edge.what, edge.rate());
+        let _ = writeln!(text, "    {:?} -> {:?} [label = {label:?}{style}]", edge.from, edge.to);
+    }
+    text.push('}');
+    text
+}

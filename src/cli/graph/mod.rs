@@ -1,0 +1,287 @@
+//! `rohrpost graph`: who sends what to whom, how often, from the counters of those who send.
+
+mod dot;
+mod svg;
+
+use super::bw::bytes;
+use super::call::seconds;
+use super::ping::stopped;
+use super::table::table;
+use super::target::{Running, Target};
+use super::watch::Tracks;
+use super::{Failure, say};
+use rohrpost::Name;
+use rohrpost::description::Description;
+use rohrpost::mailbox::{FlowInfo, Kind, local};
+use rohrpost::survey::Survey;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost graph                             a table: who, to whom, what, how often
+  rohrpost graph --svg -o graph.svg          a drawing
+  rohrpost graph --dot | dot -Tpdf > graph.pdf
+Rates are of the time that it looks. A drawing leaves out replies and the calls that every module has (such as the
+renewing of subscriptions); --all draws them too. It reads counters in shared memory: nothing is sent.")]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    target: Target,
+    /// Look for so long.
+    #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
+    seconds: f64,
+    /// Print it for Graphviz.
+    #[arg(long, conflicts_with_all = ["svg", "json"])]
+    dot: bool,
+    /// Draw it.
+    #[arg(long, conflicts_with = "json")]
+    svg: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Everything: what was silent meanwhile, and in drawings replies and calls that every module has.
+    #[arg(long)]
+    all: bool,
+    /// Write it there.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Modules, and what goes from one to another.
+#[derive(Serialize)]
+struct Graph {
+    installation: String,
+    node: String,
+    seconds: f64,
+    modules: Vec<Module>,
+    edges: Vec<Edge>,
+}
+
+#[derive(Serialize)]
+struct Module {
+    name: String,
+    faces: Vec<String>,
+    state: String,
+    priority: u8,
+}
+
+/// What an edge carries.
+#[derive(Serialize, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[serde(rename_all = "lowercase")]
+enum Carries {
+    Data,
+    Command,
+    /// A command that every module understands.
+    Common,
+    Reply,
+    Output,
+}
+
+#[derive(Serialize)]
+struct Edge {
+    from: String,
+    to: String,
+    carries: Carries,
+    what: String,
+    packages: u64,
+    packages_per_s: f64,
+    bytes_per_s: f64,
+    refused: u64,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let running = arguments.target.find()?;
+    let graph = Graph::new(&running, seconds(arguments.seconds)?, arguments.all)?;
+    let text = if arguments.json {
+        serde_json::to_string(&graph)?
+    } else if arguments.dot {
+        dot::write(&graph, arguments.all)
+    } else if arguments.svg {
+        svg::write(&graph, arguments.all)
+    } else {
+        in_text(&graph)
+    };
+    match &arguments.output {
+        Some(file) => {
+            std::fs::write(file, text + "\n").map_err(|error| format!("{}: {error}", file.display()))?;
+        }
+        None => {
+            say(text);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Graph {
+    fn new(running: &Running, long: Duration, all: bool) -> Result<Self, Failure> {
+        // The window is as long as the look at it.
+        let mut tracks = Tracks::new(Duration::MAX);
+        let look = || running.node.traffic().into_iter().filter(|flow| flow.to != Name::NONE);
+        tracks.look(look());
+        stopped(&rohrpost::launch::events()?, long);
+        tracks.look(look());
+        let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
+        let mut names = Names { running, survey: &survey, descriptions: BTreeMap::new() };
+        let mut edges: Vec<Edge> = Vec::new();
+        for (flow, figures) in tracks.figures() {
+            if !all && figures.packages == 0 && figures.refused == 0 {
+                continue;
+            }
+            let (carries, what) = names.what(flow);
+            let edge = Edge {
+                from: names.process(flow.from),
+                to: names.process(flow.to),
+                carries,
+                what,
+                packages: figures.packages,
+                packages_per_s: figures.rate_hz.unwrap_or(figures.packages as f64 / long.as_secs_f64()),
+                bytes_per_s: figures.bytes_per_s().unwrap_or(figures.bytes as f64 / long.as_secs_f64()),
+                refused: figures.refused,
+            };
+            let same = |known: &&mut Edge| {
+                (&known.from, &known.to, known.carries, &known.what) == (&edge.from, &edge.to, edge.carries, &edge.what)
+            };
+            match edges.iter_mut().find(same) {
+                Some(known) => known.add(&edge),
+                None => edges.push(edge),
+            }
+        }
+        edges.sort_by(|a, b| (&a.from, &a.to, a.carries, &a.what).cmp(&(&b.from, &b.to, b.carries, &b.what)));
+        let classes = &running.installation.classes;
+        let mut modules: Vec<Module> = survey
+            .modules
+            .iter()
+            .map(|module| Module {
+                name: classes.format(module.name),
+                faces: module.faces.iter().map(|face| classes.format(*face)).collect(),
+                state: super::summary::state(module, None, &running.installation),
+                priority: module.name.class().0,
+            })
+            .collect();
+        // Tools send too, and are in no configuration.
+        for name in edges.iter().flat_map(|edge| [&edge.from, &edge.to]) {
+            if modules.iter().all(|module| module.name != *name) {
+                let priority = running.module(name).map_or(0, |module| module.class().0);
+                modules.push(Module { name: name.clone(), faces: Vec::new(), state: "tool".into(), priority });
+            }
+        }
+        let seconds = long.as_secs_f64();
+        let installation = running.installation.name.clone();
+        Ok(Self { installation, node: running.node_name.clone(), seconds, modules, edges })
+    }
+
+    /// The edges that a drawing shows.
+    fn drawn(&self, all: bool) -> impl Iterator<Item = &Edge> {
+        self.edges.iter().filter(move |edge| all || !matches!(edge.carries, Carries::Reply | Carries::Common))
+    }
+}
+
+impl Edge {
+    fn add(&mut self, other: &Self) {
+        self.packages += other.packages;
+        self.packages_per_s += other.packages_per_s;
+        self.bytes_per_s += other.bytes_per_s;
+        self.refused += other.refused;
+    }
+
+    fn rate(&self) -> String {
+        match self.packages_per_s {
+            rate if rate < 0.95 => format!("{rate:.2}/s"),
+            rate if rate < 9.5 => format!("{rate:.1}/s"),
+            rate => format!("{rate:.0}/s"),
+        }
+    }
+}
+
+/// What names and numbers mean.
+struct Names<'a> {
+    running: &'a Running,
+    survey: &'a Survey,
+    descriptions: BTreeMap<Name, Option<Description>>,
+}
+
+impl Names<'_> {
+    /// The module behind a name, which may be one of its faces.
+    fn process(&self, name: Name) -> String {
+        let name = self.survey.module(name).map_or(name.module(), |module| module.name);
+        self.running.text(name)
+    }
+
+    fn description(&mut self, module: Name) -> Option<&Description> {
+        let noted = || Description::noted(&self.running.node, module);
+        self.descriptions.entry(module).or_insert_with(noted).as_ref()
+    }
+
+    fn what(&mut self, flow: &FlowInfo) -> (Carries, String) {
+        let of = |number, name: Option<&String>| name.cloned().unwrap_or_else(|| format!("number {number}"));
+        let own_mailbox = !matches!(flow.to.local(), local::COMMANDS | local::REPLIES | local::DATA);
+        match flow.kind.kind() {
+            Kind::Command(number) if number < rohrpost::common::FIRST_OWN => (Carries::Common, common(number)),
+            Kind::Command(number) => {
+                let description = self.description(flow.to.module());
+                let function = description.and_then(|found| found.functions.iter().find(|f| f.number == number));
+                (Carries::Command, of(number, function.map(|function| &function.name)))
+            }
+            Kind::Reply(number) if number < rohrpost::common::FIRST_OWN => {
+                (Carries::Reply, format!("{} answered", common(number)))
+            }
+            Kind::Reply(number) => {
+                let description = self.description(flow.from.module());
+                let function = description.and_then(|found| found.functions.iter().find(|f| f.number == number));
+                (Carries::Reply, format!("{} answered", of(number, function.map(|function| &function.name))))
+            }
+            Kind::Data(_) if own_mailbox => (Carries::Output, "lines".into()),
+            Kind::Data(number) => {
+                let description = self.description(flow.from.module());
+                let item = description.and_then(|found| found.data.iter().find(|item| item.number == number));
+                (Carries::Data, of(number, item.map(|item| &item.name)))
+            }
+            Kind::None => (Carries::Common, "refused before it had a type".into()),
+        }
+    }
+}
+
+/// The functions that every module has.
+fn common(number: u16) -> String {
+    use rohrpost::common as c;
+    let name = match number {
+        c::ON => "on",
+        c::OFF => "off",
+        c::STATUS => "status",
+        c::GET_DATA => "get",
+        c::SUBSCRIBE => "subscribe",
+        c::UNSUBSCRIBE => "unsubscribe",
+        c::OUTPUT_LEVEL => "output-level",
+        c::DESCRIBE => "describe",
+        other => return format!("number {other}"),
+    };
+    name.into()
+}
+
+fn in_text(graph: &Graph) -> String {
+    if graph.edges.is_empty() {
+        return format!("nobody sent anything within {} s; --all shows who did before", graph.seconds);
+    }
+    let rows = graph.edges.iter().map(|edge| {
+        let kind = match edge.carries {
+            Carries::Data => "data",
+            Carries::Command | Carries::Common => "command",
+            Carries::Reply => "reply",
+            Carries::Output => "output",
+        };
+        [
+            edge.from.clone(),
+            edge.to.clone(),
+            kind.into(),
+            edge.what.clone(),
+            edge.packages.to_string(),
+            edge.rate(),
+            format!("{}/s", bytes(edge.bytes_per_s)),
+            edge.refused.to_string(),
+        ]
+    });
+    table(["from", "to", "kind", "what", ">packages", ">rate", ">bytes", ">refused"], rows).trim_end().to_owned()
+}

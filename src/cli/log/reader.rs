@@ -1,0 +1,90 @@
+//! Reads the collector's lines page by page, across its restarts.
+//!
+//! Asking for pages disturbs less than a subscription would: a quiet collector answers one short command five times a second, with
+//! the least urgent priority there is, instead of sending a package for each line; nothing has to be renewed; and a reader
+//! that is slow or stopped misses nothing that the collector still keeps, and sees what it missed.
+
+use super::super::Failure;
+use super::super::target::Running;
+use super::{LINES_FROM, told};
+use rohrpost::interfaces::{CollectorInterface, Page};
+use rohrpost::output::OutputLine;
+use rohrpost::{CallError, Name, ToolLink};
+
+pub(super) struct Reader<'a> {
+    running: &'a Running,
+    collector: Name,
+    /// Whether launch ran when this began; if so, the node ends with it.
+    launched: bool,
+    /// The collector's life that `next` counts in.
+    life: Option<u32>,
+    next: u64,
+    /// Whether it is being waited for.
+    waiting: bool,
+}
+
+/// What one look brought.
+pub(super) struct News {
+    pub(super) lines: Vec<OutputLine>,
+    /// Something to say before the lines.
+    pub(super) note: Option<String>,
+    /// Whether there is more to read at once.
+    pub(super) more: bool,
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn new(running: &'a Running, collector: Name) -> Self {
+        let launched = running.node.launcher().is_some();
+        Self { running, collector, launched, life: None, next: 0, waiting: false }
+    }
+
+    /// The next page. A follower waits for a collector that it has heard once.
+    pub(super) fn read(&mut self, tool: &mut ToolLink, follow: bool) -> Result<News, Failure> {
+        match self.page(tool) {
+            Ok(page) => Ok(self.take(page)),
+            Err(error) if follow && self.life.is_some() => self.missed(&error),
+            Err(error) => Err(told(self.running, self.collector, &error).into()),
+        }
+    }
+
+    fn page(&self, tool: &mut ToolLink) -> Result<Page, CallError> {
+        let from = self.next;
+        let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(from,));
+        let read = |bytes: &[u8]| rohrpost::macro_support::from_bytes::<Page>(bytes);
+        tool.call(self.collector, LINES_FROM, CollectorInterface::hash(), write, read)
+    }
+
+    fn take(&mut self, page: Page) -> News {
+        let name = self.running.text(self.collector);
+        let waited = std::mem::take(&mut self.waiting);
+        let known = self.life.replace(page.life);
+        if known.is_some_and(|life| life != page.life) {
+            // What this page has counts in the new life; it may begin in its middle.
+            self.next = 0;
+            let file = &self.running.installation.output.file;
+            let file = file.as_ref().map(|file| format!("; {} has them", file.display())).unwrap_or_default();
+            let note =
+                format!("{name} was started again; lines that it had taken since the last one above are gone{file}");
+            return News { lines: Vec::new(), note: Some(note), more: true };
+        }
+        let skipped = page.first.saturating_sub(self.next);
+        let note = match (skipped, known) {
+            (1.., Some(_)) => Some(format!("{skipped} lines are gone: {name} keeps fewer")),
+            _ if waited => Some(format!("{name} answers again")),
+            _ => None,
+        };
+        self.next = page.first + page.lines.len() as u64;
+        News { more: !page.lines.is_empty() && self.next < page.next, lines: page.lines, note }
+    }
+
+    /// Said once; after that it is waited for in silence.
+    fn missed(&mut self, error: &CallError) -> Result<News, Failure> {
+        if self.launched && self.running.node.launcher().is_none() {
+            let node = &self.running.node_name;
+            return Err(format!("launch has ended, and node `{node}` with it; nobody collects output any more").into());
+        }
+        let said = std::mem::replace(&mut self.waiting, true);
+        let why = || format!("{} Waiting for it.", told(self.running, self.collector, error));
+        Ok(News { lines: Vec::new(), note: (!said).then(why), more: false })
+    }
+}

@@ -1,0 +1,46 @@
+//! `param set`.
+
+use super::{Failure, Session, find, say};
+use rohrpost::Name;
+use rohrpost::common::{Change, SetParameters};
+use rohrpost::parameter::{Parameter, value_text};
+use rohrpost::value::{Value, decode, encode, parse_argument};
+use std::process::ExitCode;
+
+pub(super) fn run(session: &mut Session, name: &str, parameter: &str, value: &str) -> Result<ExitCode, Failure> {
+    let module = session.running.module(name)?;
+    let parameters = session.parameters(module)?;
+    let wanted = find(&parameters, name, parameter)?;
+    let value = parse_argument(&wanted.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;
+    let changes = set(session, module, &parameters, vec![(wanted.name.clone(), value)], false)?;
+    for change in &changes {
+        say(format_args!("{name} {}", told(change, wanted)?));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Sets all of these, or only asks whether they would do; the names are of `parameters`.
+pub(super) fn set(
+    session: &mut Session,
+    module: Name,
+    parameters: &[Parameter],
+    values: Vec<(String, Value)>,
+    only_check: bool,
+) -> Result<Vec<Change>, Failure> {
+    let mut wish = SetParameters { values: Vec::with_capacity(values.len()), only_check };
+    for (name, value) in values {
+        let parameter = find(parameters, &session.running.text(module), &name)?;
+        let bytes = encode(&parameter.ty, &value).map_err(|error| format!("`{name}`: {error}"))?;
+        wish.values.push((name, bytes));
+    }
+    let set = session.tool.set_parameters(module, &wish);
+    set.map_err(|error| session.refused(module, error))
+}
+
+/// `cruise-m-s: 0.6 -> 0.4 m/s`.
+pub(super) fn told(change: &Change, parameter: &Parameter) -> Result<String, Failure> {
+    let text = |bytes: &[u8]| decode(&parameter.ty, bytes).map(|value| value_text(&value));
+    let (old, new) = (text(&change.old)?, parameter.with_unit(&text(&change.new)?));
+    let name = &change.name;
+    Ok(if change.old == change.new { format!("{name}: {new} as before") } else { format!("{name}: {old} -> {new}") })
+}

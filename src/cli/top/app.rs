@@ -1,0 +1,246 @@
+//! What the person at the terminal has chosen, and what keys change about it. Pure: what has to be done comes back as an
+//! [`Action`].
+
+use super::columns::Column;
+use super::model::{Model, Row};
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use rohrpost::Name;
+use rohrpost::common::OutputLevel;
+use rohrpost::output::OutputLine;
+
+/// Lines that a page key moves by.
+const PAGE: usize = 10;
+
+/// What is shown, and how.
+pub(super) struct App {
+    pub(super) screen: Screen,
+    pub(super) prompt: Prompt,
+    /// None: in the order of the configuration.
+    pub(super) sort: Option<Column>,
+    /// Those that have room on the screen.
+    pub(super) columns: Vec<Column>,
+    pub(super) reversed: bool,
+    /// Only modules whose name holds this.
+    pub(super) filter: String,
+    pub(super) selected: Option<Name>,
+    /// First line of what is longer than the screen: details, help.
+    pub(super) scroll: usize,
+    pub(super) paused: bool,
+    pub(super) lines: LineFilter,
+    /// What the last key came to.
+    pub(super) message: Option<String>,
+}
+
+/// What fills the screen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Screen {
+    Table,
+    Details(Name),
+    Help,
+}
+
+/// What the last line asks for.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) enum Prompt {
+    None,
+    /// The filter is typed; it was this before.
+    Filter(String),
+    /// Restart it?
+    Restart(Name),
+}
+
+/// Which output lines are shown.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct LineFilter {
+    pub(super) level: OutputLevel,
+    /// Of this module alone.
+    pub(super) module: Option<Name>,
+}
+
+/// What a key asks for beyond the screen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Action {
+    Quit,
+    Switch(Name, bool),
+    Restart(Name),
+}
+
+impl App {
+    pub(super) fn new() -> Self {
+        Self {
+            screen: Screen::Table,
+            prompt: Prompt::None,
+            sort: None,
+            columns: vec![Column::Module],
+            reversed: false,
+            filter: String::new(),
+            selected: None,
+            scroll: 0,
+            paused: false,
+            lines: LineFilter { level: OutputLevel::Info, module: None },
+            message: None,
+        }
+    }
+
+    /// The modules that are shown, in their order.
+    pub(super) fn rows<'m>(&self, model: &'m Model) -> Vec<&'m Row> {
+        let holds = |row: &&Row| {
+            let names = std::iter::once(&row.line.module).chain(&row.line.faces);
+            self.filter.is_empty() || names.into_iter().any(|name| name.contains(&self.filter))
+        };
+        let mut rows: Vec<&Row> = model.modules.iter().filter(holds).collect();
+        if let Some(column) = self.sort {
+            // Stable: what is equal keeps the order of the configuration.
+            rows.sort_by(|a, b| column.compare(a, b));
+        }
+        if self.reversed {
+            rows.reverse();
+        }
+        rows
+    }
+
+    /// The selected module among these, or else the first.
+    pub(super) fn selected_at(&self, rows: &[&Row]) -> usize {
+        rows.iter().position(|row| Some(row.name) == self.selected).unwrap_or(0)
+    }
+
+    /// Takes a key.
+    pub(super) fn key(&mut self, key: KeyEvent, model: &Model) -> Option<Action> {
+        if key.modifiers.contains(KeyModifiers::CONTROL) {
+            return (key.code == KeyCode::Char('c')).then_some(Action::Quit);
+        }
+        match std::mem::replace(&mut self.prompt, Prompt::None) {
+            Prompt::Filter(before) => {
+                self.type_filter(key.code, before);
+                None
+            }
+            Prompt::Restart(name) => {
+                let yes = matches!(key.code, KeyCode::Char('y' | 'Y'));
+                self.message = (!yes).then(|| "not restarted".into());
+                yes.then_some(Action::Restart(name))
+            }
+            Prompt::None => {
+                self.message = None;
+                self.command(key.code, model)
+            }
+        }
+    }
+
+    fn type_filter(&mut self, key: KeyCode, before: String) {
+        match key {
+            KeyCode::Enter => return,
+            KeyCode::Esc => {
+                self.filter = before;
+                return;
+            }
+            KeyCode::Backspace => {
+                self.filter.pop();
+            }
+            KeyCode::Char(letter) => self.filter.push(letter),
+            _ => {}
+        }
+        self.prompt = Prompt::Filter(before);
+    }
+
+    fn command(&mut self, key: KeyCode, model: &Model) -> Option<Action> {
+        match (key, self.screen) {
+            (KeyCode::Char('q'), _) => return Some(Action::Quit),
+            (KeyCode::Char('?'), screen) => {
+                self.show(if screen == Screen::Help { Screen::Table } else { Screen::Help })
+            }
+            (KeyCode::Esc | KeyCode::Backspace | KeyCode::Left, Screen::Details(_) | Screen::Help) => {
+                self.show(Screen::Table);
+            }
+            // From the table, Esc leads back to all modules.
+            (KeyCode::Esc, Screen::Table) => self.filter.clear(),
+            (KeyCode::Char('p'), _) => self.paused = !self.paused,
+            (KeyCode::Char('l'), _) => {
+                let target = self.target(model);
+                self.lines.module = if self.lines.module == target { None } else { target };
+            }
+            (KeyCode::Char('L'), _) => self.lines.level = next_level(self.lines.level),
+            (KeyCode::Char('o'), _) => return self.target(model).map(|name| Action::Switch(name, true)),
+            (KeyCode::Char('f'), _) => return self.target(model).map(|name| Action::Switch(name, false)),
+            (KeyCode::Char('r'), _) => self.prompt = self.target(model).map_or(Prompt::None, Prompt::Restart),
+            (KeyCode::Enter | KeyCode::Right, Screen::Table) => {
+                let name = self.target(model)?;
+                self.show(Screen::Details(name));
+            }
+            (key, Screen::Table) => self.table_key(key, model),
+            (key, Screen::Details(_) | Screen::Help) => self.scroll_by(key),
+        }
+        None
+    }
+
+    fn table_key(&mut self, key: KeyCode, model: &Model) {
+        let rows = self.rows(model);
+        let (at, last) = (self.selected_at(&rows), rows.len().saturating_sub(1));
+        let to = match key {
+            KeyCode::Down | KeyCode::Char('j') => at + 1,
+            KeyCode::Up | KeyCode::Char('k') => at.saturating_sub(1),
+            KeyCode::PageDown => at + PAGE,
+            KeyCode::PageUp => at.saturating_sub(PAGE),
+            KeyCode::Home | KeyCode::Char('g') => 0,
+            KeyCode::End | KeyCode::Char('G') => last,
+            KeyCode::Char('s') => return self.sort_on(),
+            KeyCode::Char('S') => {
+                self.reversed = !self.reversed;
+                return;
+            }
+            KeyCode::Char('/') => {
+                self.prompt = Prompt::Filter(self.filter.clone());
+                return;
+            }
+            _ => return,
+        };
+        self.selected = rows.get(to.min(last)).map(|row| row.name);
+    }
+
+    fn scroll_by(&mut self, key: KeyCode) {
+        self.scroll = match key {
+            KeyCode::Down | KeyCode::Char('j') => self.scroll + 1,
+            KeyCode::Up | KeyCode::Char('k') => self.scroll.saturating_sub(1),
+            KeyCode::PageDown | KeyCode::Char(' ') => self.scroll + PAGE,
+            KeyCode::PageUp => self.scroll.saturating_sub(PAGE),
+            KeyCode::Home | KeyCode::Char('g') => 0,
+            _ => self.scroll,
+        };
+    }
+
+    fn show(&mut self, screen: Screen) {
+        (self.screen, self.scroll) = (screen, 0);
+    }
+
+    /// Sorts by the next column; after the last one in the order of the configuration again.
+    fn sort_on(&mut self) {
+        let at = self.sort.and_then(|column| self.columns.iter().position(|known| *known == column));
+        self.sort = self.columns.get(at.map_or(0, |at| at + 1)).copied();
+        self.reversed = false;
+    }
+
+    /// The module that keys are about.
+    fn target(&self, model: &Model) -> Option<Name> {
+        if let Screen::Details(name) = self.screen {
+            return Some(name);
+        }
+        let rows = self.rows(model);
+        rows.get(self.selected_at(&rows)).map(|row| row.name)
+    }
+}
+
+/// From the usual one to the more talkative, then from errors alone back to it.
+fn next_level(level: OutputLevel) -> OutputLevel {
+    match level {
+        OutputLevel::Info => OutputLevel::Debug,
+        OutputLevel::Debug => OutputLevel::Trace,
+        OutputLevel::Trace => OutputLevel::Error,
+        OutputLevel::Error => OutputLevel::Warn,
+        OutputLevel::Warn => OutputLevel::Info,
+    }
+}
+
+impl LineFilter {
+    pub(super) fn passes(&self, line: &OutputLine) -> bool {
+        line.level <= self.level && self.module.is_none_or(|module| module == line.module())
+    }
+}

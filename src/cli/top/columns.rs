@@ -1,0 +1,282 @@
+//! Columns of the table: what they say, by what they sort, and which go first when the terminal is narrow.
+
+use super::super::table::time;
+use super::model::Row;
+use std::cmp::Ordering;
+use std::time::Duration;
+
+/// A column.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Column {
+    Module,
+    State,
+    Class,
+    Priority,
+    Scheduling,
+    In,
+    Out,
+    Waiting,
+    Lost,
+    P50,
+    P99,
+    Restarts,
+    Cpu,
+    Memory,
+    Pid,
+    Why,
+}
+
+/// Room between columns.
+const GAP: u16 = 1;
+/// A name is not cut below this, nor is it given more than that.
+const NAME_MIN: u16 = 12;
+const NAME_MAX: u16 = 34;
+
+impl Column {
+    /// From left to right.
+    pub(super) const ALL: [Self; 16] = [
+        Self::Module,
+        Self::State,
+        Self::Class,
+        Self::Priority,
+        Self::Scheduling,
+        Self::In,
+        Self::Out,
+        Self::Waiting,
+        Self::Lost,
+        Self::P50,
+        Self::P99,
+        Self::Restarts,
+        Self::Cpu,
+        Self::Memory,
+        Self::Pid,
+        Self::Why,
+    ];
+
+    /// As they are given room, the first always.
+    const BY_IMPORTANCE: [Self; 16] = [
+        Self::Module,
+        Self::State,
+        Self::In,
+        Self::Lost,
+        Self::Waiting,
+        Self::Out,
+        Self::P99,
+        Self::Cpu,
+        Self::Restarts,
+        Self::Scheduling,
+        Self::Priority,
+        Self::Memory,
+        Self::P50,
+        Self::Why,
+        Self::Pid,
+        Self::Class,
+    ];
+
+    pub(super) const fn head(self) -> &'static str {
+        match self {
+            Self::Module => "module",
+            Self::State => "state",
+            Self::Class => "class",
+            Self::Priority => "prio",
+            Self::Scheduling => "sched",
+            Self::In => "in/s",
+            Self::Out => "out/s",
+            Self::Waiting => "wait",
+            Self::Lost => "lost",
+            Self::P50 => "p50",
+            Self::P99 => "p99",
+            Self::Restarts => "rst",
+            Self::Cpu => "cpu%",
+            Self::Memory => "memory",
+            Self::Pid => "pid",
+            Self::Why => "why",
+        }
+    }
+
+    /// What it means, for the help.
+    pub(super) const fn text(self) -> &'static str {
+        match self {
+            Self::Module => "name, and with + the number of its further names",
+            Self::State => "starting, off, on, error, stopping; dead: no process; left out: optional",
+            Self::Class => "class: who is of it, is as important",
+            Self::Priority => "class id = priority of its commands, 255 most urgent",
+            Self::Scheduling => "what the kernel says: fifo 1..99, or nice",
+            Self::In => "packages received a second",
+            Self::Out => "packages sent a second",
+            Self::Waiting => "packages that wait in its mailboxes now",
+            Self::Lost => "packages lost in its mailboxes so far",
+            Self::P50 => "half of the packages of the interval waited so long at most",
+            Self::P99 => "99 of 100 waited so long at most",
+            Self::Restarts => "times that launch has started it again",
+            Self::Cpu => "of one processor",
+            Self::Memory => "resident, mailboxes included",
+            Self::Pid => "process",
+            Self::Why => "why it is in error, or how packages were lost",
+        }
+    }
+
+    /// Columns that hold it. Fixed, so that nothing jumps as numbers change.
+    const fn width(self) -> u16 {
+        match self {
+            Self::Module => NAME_MIN,
+            Self::State => 8,
+            Self::Class | Self::Pid => 7,
+            Self::Priority | Self::Restarts => 4,
+            Self::Scheduling => 7,
+            Self::In | Self::Out | Self::Lost | Self::Cpu => 6,
+            Self::Waiting => 5,
+            Self::Memory => 6,
+            Self::P50 | Self::P99 => 7,
+            Self::Why => 16,
+        }
+    }
+
+    /// Numbers stand to the right.
+    pub(super) const fn is_number(self) -> bool {
+        !matches!(self, Self::Module | Self::State | Self::Class | Self::Scheduling | Self::Why)
+    }
+
+    /// What it says of a module.
+    pub(super) fn cell(self, row: &Row) -> String {
+        let number = |number: Option<f64>| number.map_or("-".into(), short);
+        let waited = |ns: Option<u64>| ns.map_or("-".into(), |ns| time(Duration::from_nanos(ns)));
+        match self {
+            Self::Module => row.line.module.clone(),
+            Self::State => row.line.state.clone(),
+            Self::Class => row.class.clone(),
+            Self::Priority => row.line.priority.to_string(),
+            Self::Scheduling => row.line.scheduling.clone(),
+            Self::In => number(row.line.received_per_s),
+            Self::Out => number(row.sent_per_s),
+            Self::Waiting => row.line.waiting.to_string(),
+            Self::Lost => short(row.line.lost as f64),
+            Self::P50 => waited(row.waited_p50_ns),
+            Self::P99 => waited(row.waited_p99_ns),
+            Self::Restarts => row.line.restarts.to_string(),
+            Self::Cpu => row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}")),
+            Self::Memory => row.memory_bytes.map_or("-".into(), memory),
+            Self::Pid => row.line.pid.map_or("-".into(), |pid| pid.to_string()),
+            Self::Why => why(row),
+        }
+    }
+
+    /// How two modules stand to each other in this column: what deserves a look comes first.
+    pub(super) fn compare(self, a: &Row, b: &Row) -> Ordering {
+        let number = |of: fn(&Row) -> Option<f64>| of(b).unwrap_or(-1.0).total_cmp(&of(a).unwrap_or(-1.0));
+        match self {
+            Self::State => severity(&a.line.state).cmp(&severity(&b.line.state)),
+            Self::Module | Self::Class | Self::Scheduling | Self::Why => self.cell(a).cmp(&self.cell(b)),
+            Self::Priority => b.line.priority.cmp(&a.line.priority),
+            Self::In => number(|row| row.line.received_per_s),
+            Self::Out => number(|row| row.sent_per_s),
+            Self::Waiting => b.line.waiting.cmp(&a.line.waiting),
+            Self::Lost => b.line.lost.cmp(&a.line.lost),
+            Self::P50 => number(|row| row.waited_p50_ns.map(|ns| ns as f64)),
+            Self::P99 => number(|row| row.waited_p99_ns.map(|ns| ns as f64)),
+            Self::Restarts => b.line.restarts.cmp(&a.line.restarts),
+            Self::Cpu => number(|row| row.cpu_percent),
+            Self::Memory => b.memory_bytes.cmp(&a.memory_bytes),
+            Self::Pid => a.line.pid.cmp(&b.line.pid),
+        }
+    }
+}
+
+/// What needs a person first.
+pub(super) fn severity(state: &str) -> usize {
+    let order = ["failed", "dead", "error", "stopping", "waiting", "starting", "off", "ended", "on", "left out"];
+    order.iter().position(|known| *known == state).unwrap_or(order.len())
+}
+
+/// Why it is in error; else how its packages were lost.
+fn why(row: &Row) -> String {
+    let losses = || row.losses.lost_by_cause.iter().map(|(cause, lost)| format!("{lost} {cause}")).collect::<Vec<_>>();
+    row.error.clone().unwrap_or_else(|| losses().join(", "))
+}
+
+/// A number in at most five characters.
+pub(super) fn short(number: f64) -> String {
+    match number {
+        n if n <= 0.0 => "0".into(),
+        n if n < 9.95 => format!("{n:.1}").replace(".0", ""),
+        n if n < 99_999.5 => format!("{n:.0}"),
+        n if n < 9_999_500.0 => format!("{:.0}k", n / 1e3),
+        n => format!("{:.0}M", n / 1e6),
+    }
+}
+
+/// Bytes in at most six characters.
+pub(super) fn memory(bytes: u64) -> String {
+    let mib = bytes as f64 / f64::from(1 << 20);
+    match mib {
+        mib if mib < 99.95 => format!("{mib:.1}M"),
+        mib if mib < 9_999.5 => format!("{mib:.0}M"),
+        mib => format!("{:.0}G", mib / 1024.0),
+    }
+}
+
+/// The columns that have room in so many, with their widths, from left to right. `names` is what the longest name needs.
+pub(super) fn fit(room: u16, names: u16) -> Vec<(Column, u16)> {
+    let names = names.clamp(NAME_MIN, NAME_MAX);
+    let mut chosen = Vec::new();
+    let mut used = 0;
+    for column in Column::BY_IMPORTANCE {
+        let width = column.width() + if chosen.is_empty() { 0 } else { GAP };
+        // The first that finds no room ends it: a less important one is not shown in the place of a more important one.
+        if used + width > room && !chosen.is_empty() {
+            break;
+        }
+        used += width;
+        chosen.push(column);
+    }
+    let spare = room.saturating_sub(used);
+    let for_names = spare.min(names - NAME_MIN);
+    let width = |column| match column {
+        Column::Module => (NAME_MIN + for_names).min(room),
+        Column::Why => column.width() + spare - for_names,
+        _ => column.width(),
+    };
+    Column::ALL.into_iter().filter(|column| chosen.contains(column)).map(|column| (column, width(column))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stay_short_at_every_size() {
+        for (number, text) in [
+            (-1.0, "0"),
+            (0.0, "0"),
+            (0.04, "0"),
+            (0.5, "0.5"),
+            (3.0, "3"),
+            (9.94, "9.9"),
+            (9.96, "10"),
+            (99_999.0, "99999"),
+            (100_000.0, "100k"),
+            (9_999_499.0, "9999k"),
+            (9_999_500.0, "10M"),
+            (9.9e9, "9900M"),
+        ] {
+            assert_eq!(short(number), text);
+        }
+        for (bytes, text) in [(0, "0.0M"), (12_345_678, "11.8M"), (512 << 20, "512M"), (64 << 30, "64G")] {
+            assert_eq!(memory(bytes), text);
+        }
+    }
+
+    #[test]
+    fn narrow_terminals_keep_what_matters() {
+        for room in 0..200 {
+            let columns = fit(room, 20);
+            let used: u16 = columns.iter().map(|(_, width)| width + GAP).sum::<u16>() - GAP;
+            assert!(used <= room.max(1), "{used} in {room}: {columns:?}");
+            let kept = columns.len();
+            let most_important = &Column::BY_IMPORTANCE[..kept];
+            assert!(columns.iter().all(|(column, _)| most_important.contains(column)), "{room}: {columns:?}");
+        }
+        assert_eq!(fit(21, 20).iter().map(|(c, _)| *c).collect::<Vec<_>>(), [Column::Module, Column::State]);
+        assert_eq!(fit(160, 20).len(), Column::ALL.len());
+    }
+}

@@ -1,0 +1,267 @@
+//! The loop at the terminal: looks, draws, takes keys, and looks after what was asked.
+
+use super::super::target::Running;
+use super::app::{Action, App, Screen};
+use super::calls::{Answer, Calls};
+use super::details;
+use super::draw::{OutputText, View, columns};
+use super::model::{Model, Sample};
+use super::output::Output;
+use super::palette::Palette;
+use super::{Failure, sample};
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyEventKind};
+use ratatui::crossterm::{cursor, execute};
+use rohrpost::Name;
+use rohrpost::launch::{Event as Told, events};
+use std::collections::HashMap;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Signals are looked after so often, and answers that are awaited.
+const LOOK: Duration = Duration::from_millis(100);
+const LOOK_WAITING: Duration = Duration::from_millis(10);
+
+/// Draws until it is told to end.
+pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Result<ExitCode, Failure> {
+    let told = events()?;
+    let mut live = Live::new(running, interval, palette)?;
+    let outcome = {
+        let mut screen = Opened::new()?;
+        live.watch(&mut screen.0, || matches!(told.try_recv(), Ok(Told::Stop)))
+    };
+    live.calls.map(Calls::close);
+    outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// The terminal while it is ours; given back as it was, whatever ends us. (Of a panic, `ratatui` says what it was after that.)
+struct Opened(DefaultTerminal);
+
+impl Opened {
+    fn new() -> Result<Self, Failure> {
+        ratatui::try_init().map(Self).map_err(|error| {
+            ratatui::restore();
+            format!("this terminal cannot be drawn on: {error}; say `top --once`").into()
+        })
+    }
+}
+
+impl Drop for Opened {
+    fn drop(&mut self) {
+        ratatui::restore();
+        let _ = execute!(std::io::stdout(), cursor::Show);
+    }
+}
+
+struct Live {
+    running: Running,
+    interval: Duration,
+    palette: Palette,
+    app: App,
+    /// The look that rates are counted from, and the newest.
+    earlier: Option<Sample>,
+    now: Sample,
+    model: Model,
+    /// Our place among those that call; none when there is no room for one more.
+    calls: Option<Calls>,
+    output: Output,
+    /// Why modules are in error, as they said.
+    errors: HashMap<Name, String>,
+}
+
+impl Live {
+    fn new(running: Running, interval: Duration, palette: Palette) -> Result<Self, Failure> {
+        let now = sample::take(&running, None)?;
+        let model = Model::new(&running.installation, &running.node_name, &now, None, &HashMap::new());
+        let output = Output::new(&running.installation);
+        let mut live = Self {
+            running,
+            interval,
+            palette,
+            app: App::new(),
+            earlier: None,
+            now,
+            model,
+            calls: None,
+            output,
+            errors: HashMap::new(),
+        };
+        live.join();
+        Ok(live)
+    }
+
+    /// Takes part as a tool, if there is room. Counters are shown without, too.
+    fn join(&mut self) {
+        match Calls::join(&self.running) {
+            Ok(calls) => self.calls = Some(calls),
+            Err(error) => self.output.silence = Some(error.to_string()),
+        }
+    }
+
+    fn watch(&mut self, terminal: &mut DefaultTerminal, stop: impl Fn() -> bool) -> Result<(), Failure> {
+        let mut next = Instant::now() + self.interval;
+        self.ask();
+        let mut changed = true;
+        while !stop() {
+            if std::mem::take(&mut changed) {
+                self.draw(terminal)?;
+            }
+            let look = if self.calls.as_ref().is_some_and(Calls::waits) { LOOK_WAITING } else { LOOK };
+            let wait = if self.app.paused { look } else { look.min(next.saturating_duration_since(Instant::now())) };
+            if event::poll(wait)? {
+                if self.event(event::read()?) {
+                    return Ok(());
+                }
+                changed = true;
+            }
+            if Instant::now() >= next && !self.app.paused {
+                next = Instant::now() + self.interval;
+                self.look();
+                changed = true;
+            }
+            changed |= self.answers();
+        }
+        Ok(())
+    }
+
+    /// Looks at the node anew; rates are counted from the look before.
+    fn look(&mut self) {
+        match sample::take(&self.running, Some(&self.now)) {
+            Ok(now) => self.earlier = Some(std::mem::replace(&mut self.now, now)),
+            Err(_) => self.now.launched = false,
+        }
+        if !self.now.launched {
+            self.find_again();
+        }
+        self.make_model();
+        self.ask();
+    }
+
+    /// Looks for what has just changed; rates are counted from where they were.
+    fn peek(&mut self) {
+        if let Ok(now) = sample::take(&self.running, self.earlier.as_ref()) {
+            self.now = now;
+        }
+        self.make_model();
+    }
+
+    fn make_model(&mut self) {
+        let Self { running, now, earlier, errors, .. } = self;
+        self.model = Model::new(&running.installation, &running.node_name, now, earlier.as_ref(), errors);
+        let in_error = |name: &Name| self.model.row(*name).is_some_and(|row| row.line.state == "error");
+        self.errors.retain(|name, _| in_error(name));
+    }
+
+    /// The node may have been launched again, and perhaps with another configuration.
+    fn find_again(&mut self) {
+        let Ok(running) = self.running.again() else { return };
+        let Ok(now) = sample::take(&running, None) else { return };
+        if !now.launched {
+            return;
+        }
+        self.calls.take().map(Calls::close);
+        (self.running, self.now, self.earlier) = (running, now, None);
+        self.output = Output::new(&self.running.installation);
+        self.join();
+    }
+
+    /// Asks for what is worth knowing at each look: new output lines, and why modules are in error.
+    fn ask(&mut self) {
+        let Some(calls) = &mut self.calls else { return };
+        let mut answers = Vec::new();
+        if let Some((collector, from)) = self.output.wants() {
+            answers.extend(calls.lines(&self.running, collector, from));
+        }
+        let in_error = self.model.modules.iter().filter(|row| row.line.state == "error" && row.error.is_none());
+        for row in in_error {
+            answers.extend(calls.why(&self.running, row.name));
+        }
+        answers.into_iter().for_each(|answer| self.answer(answer));
+    }
+
+    /// Takes the answers that have come; whether there were any.
+    fn answers(&mut self) -> bool {
+        let Some(calls) = &mut self.calls else { return false };
+        let answers = calls.poll(&self.running);
+        let some = !answers.is_empty();
+        answers.into_iter().for_each(|answer| self.answer(answer));
+        some
+    }
+
+    fn answer(&mut self, answer: Answer) {
+        match answer {
+            Answer::Switched(name, on, outcome) => {
+                let name = self.running.text(name);
+                let done = format!("{name} is {}", if on { "on" } else { "off" });
+                self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
+                self.peek();
+            }
+            Answer::Lines(page) => {
+                if self.output.take(page) {
+                    self.ask();
+                }
+            }
+            Answer::Why(name, error) => {
+                self.errors.insert(name, error);
+                self.make_model();
+            }
+        }
+    }
+
+    /// Takes what the terminal says; true when it is time to end.
+    fn event(&mut self, event: Event) -> bool {
+        let Event::Key(key) = event else { return false };
+        if key.kind == KeyEventKind::Release {
+            return false;
+        }
+        match self.app.key(key, &self.model) {
+            Some(Action::Quit) => return true,
+            Some(action) => self.act(action),
+            None => {}
+        }
+        false
+    }
+
+    fn act(&mut self, action: Action) {
+        if self.calls.is_none() {
+            self.join();
+        }
+        let Some(calls) = &mut self.calls else {
+            self.app.message = self.output.silence.clone();
+            return;
+        };
+        let mut answers = Vec::new();
+        match action {
+            Action::Quit => {}
+            Action::Switch(name, on) => {
+                let name_text = self.running.text(name);
+                self.app.message = Some(format!("switching {name_text} {} ...", if on { "on" } else { "off" }));
+                answers.extend(calls.switch(&self.running, name, on));
+            }
+            Action::Restart(_) => {}
+        }
+        answers.into_iter().for_each(|answer| self.answer(answer));
+    }
+
+    fn draw(&mut self, terminal: &mut DefaultTerminal) -> Result<(), Failure> {
+        let details = match self.app.screen {
+            Screen::Details(name) => {
+                let noted = |face| self.running.noted(face).ok();
+                details::page(&self.running.installation, &self.now, &self.model, name, noted)
+            }
+            Screen::Table | Screen::Help => Vec::new(),
+        };
+        self.app.columns = columns(&self.model, terminal.size()?.width).into_iter().map(|(column, _)| column).collect();
+        let output: Vec<OutputText> = self.output.shown(&self.running.installation, self.app.lines);
+        let view = View {
+            model: &self.model,
+            app: &self.app,
+            output: &output,
+            silence: self.output.silence.as_deref(),
+            details: &details,
+            palette: self.palette,
+        };
+        terminal.draw(|frame| view.draw(frame.area(), frame.buffer_mut()))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,78 @@
+//! `rohrpost top`: the modules of a node, live (seed 002, 5.3: the module monitor).
+//!
+//! ```text
+//! shared memory, /proc ──sample──▶ Sample ─┐
+//!                                  Sample ─┴─▶ Model ──┐
+//! keys ──▶ App ──▶ Action ──▶ Calls ──answers──▶ Live ─┴──▶ View ──▶ screen
+//! ```
+//!
+//! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` touch the world.
+
+mod app;
+mod calls;
+mod columns;
+mod details;
+mod draw;
+mod live;
+mod model;
+mod output;
+mod palette;
+mod process;
+mod sample;
+#[cfg(test)]
+mod tests;
+mod text;
+
+use super::target::Target;
+use super::{Failure, say};
+use model::Model;
+use std::collections::HashMap;
+use std::io::IsTerminal;
+use std::process::ExitCode;
+use std::time::Duration;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost top                  ? shows the keys, q ends it
+  rohrpost top --once           one plain table
+  rohrpost top --json           one object with everything, for programs
+Counters are read from shared memory: looking disturbs nobody.")]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    target: Target,
+    /// Look so often, seconds; rates are those of this time.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    interval: f64,
+    /// Print the table once, after one interval.
+    #[arg(long, conflicts_with = "json")]
+    once: bool,
+    /// Print one JSON object, after one interval.
+    #[arg(long)]
+    json: bool,
+    /// No colours; NO_COLOR in the environment says the same.
+    #[arg(long)]
+    no_color: bool,
+}
+
+/// Shorter intervals count too little to make a rate of; longer ones show nothing.
+const INTERVAL_S: std::ops::RangeInclusive<f64> = 0.1..=3600.0;
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if !INTERVAL_S.contains(&arguments.interval) {
+        return Err(format!("an interval of {} s; it takes 0.1 to 3600", arguments.interval).into());
+    }
+    let interval = Duration::from_secs_f64(arguments.interval);
+    let running = arguments.target.find()?;
+    if !arguments.once && !arguments.json {
+        if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
+            return Err("`top` draws on a terminal; into a file or pipe, say `top --once` or `top --json`".into());
+        }
+        return live::run(running, interval, palette::Palette::new(arguments.no_color));
+    }
+    let earlier = sample::take(&running, None)?;
+    std::thread::sleep(interval);
+    let now = sample::take(&running, Some(&earlier))?;
+    let model = Model::new(&running.installation, &running.node_name, &now, Some(&earlier), &HashMap::new());
+    say(if arguments.json { serde_json::to_string(&model)? } else { text::table(&model) });
+    Ok(ExitCode::SUCCESS)
+}

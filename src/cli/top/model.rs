@@ -1,0 +1,226 @@
+//! What `top` shows: two looks at a node, made into one table. Pure; also what `--json` prints.
+
+use super::super::list::{MailboxLine, mailbox_lines};
+use super::super::summary::ModuleLine;
+use super::process::Usage;
+use rohrpost::Name;
+use rohrpost::config::Installation;
+use rohrpost::mailbox::{FlowInfo, Loss};
+use rohrpost::survey::{ModuleSurvey, Survey};
+use serde::Serialize;
+use std::collections::{BTreeMap, HashMap};
+use std::time::Duration;
+
+/// A node at one moment, as far as it can be read without asking anybody.
+pub(super) struct Sample {
+    pub(super) survey: Survey,
+    /// What the table of `list` says, in the order of the survey's modules.
+    pub(super) lines: Vec<ModuleLine>,
+    /// By process id.
+    pub(super) usage: HashMap<u32, Usage>,
+    pub(super) time: TimeNow,
+    /// On the monotonic clock.
+    pub(super) at_ns: u64,
+    /// Whether a launch watches over the node.
+    pub(super) launched: bool,
+}
+
+/// System time as the node has it.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct TimeNow {
+    /// Nanoseconds since 1970.
+    pub(super) time_ns: u64,
+    /// Where it comes from.
+    pub(super) time_source: &'static str,
+    /// Seconds of it in one of this computer.
+    pub(super) time_pace: f64,
+}
+
+/// Everything that is shown.
+#[derive(Serialize)]
+pub(super) struct Model {
+    pub(super) installation: String,
+    pub(super) node: String,
+    #[serde(flatten)]
+    pub(super) time: TimeNow,
+    pub(super) launched: bool,
+    /// What rates and waiting times are measured over; none with the first look.
+    pub(super) interval_s: Option<f64>,
+    /// Number of modules by state.
+    pub(super) states: BTreeMap<String, usize>,
+    pub(super) received_per_s: Option<f64>,
+    pub(super) lost: u64,
+    #[serde(flatten)]
+    pub(super) losses: Losses,
+    pub(super) modules: Vec<Row>,
+    pub(super) mailboxes: Vec<MailboxLine>,
+}
+
+/// A module.
+#[derive(Clone, Serialize)]
+pub(super) struct Row {
+    #[serde(skip)]
+    pub(super) name: Name,
+    #[serde(flatten)]
+    pub(super) line: ModuleLine,
+    pub(super) class: String,
+    /// Why it is in error or failed.
+    pub(super) error: Option<String>,
+    #[serde(flatten)]
+    pub(super) losses: Losses,
+    /// Packages sent a second.
+    pub(super) sent_per_s: Option<f64>,
+    /// What the packages waited that it took in the interval; none when it took none.
+    pub(super) waited_p50_ns: Option<u64>,
+    pub(super) waited_p99_ns: Option<u64>,
+    /// Since its process joined the node.
+    pub(super) uptime_s: Option<f64>,
+    /// Share of one processor.
+    pub(super) cpu_percent: Option<f64>,
+    pub(super) memory_bytes: Option<u64>,
+    pub(super) sends_to: Vec<Peer>,
+    pub(super) receives_from: Vec<Peer>,
+}
+
+/// The other end of a way that packages took.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct Peer {
+    pub(super) module: String,
+    pub(super) packages: u64,
+    pub(super) per_s: Option<f64>,
+}
+
+/// Packages that were lost so far.
+#[derive(Clone, Default, Serialize)]
+pub(super) struct Losses {
+    pub(super) lost_by_cause: BTreeMap<&'static str, u64>,
+    pub(super) lost_per_s: Option<f64>,
+}
+
+impl Model {
+    /// What there is to show of `now`; with an earlier look also what is counted over time. `errors` are what modules said
+    /// when they were asked why.
+    pub(super) fn new(
+        installation: &Installation,
+        node: &str,
+        now: &Sample,
+        earlier: Option<&Sample>,
+        errors: &HashMap<Name, String>,
+    ) -> Self {
+        let interval = earlier.map(|earlier| now.survey.at.duration_since(earlier.survey.at));
+        let rows = now.survey.modules.iter().zip(&now.lines).map(|(module, line)| {
+            let before = earlier.and_then(|earlier| earlier.survey.module(module.name)).zip(interval);
+            let waited = before.map(|(before, _)| module.waited.since(&before.waited));
+            let quantile = |share| waited.as_ref()?.quantile(share).map(|waited| waited.as_nanos() as u64);
+            Row {
+                name: module.name,
+                line: line.clone(),
+                class: installation.classes.name(module.name.class()).unwrap_or("-").into(),
+                error: errors.get(&module.name).cloned(),
+                losses: Losses::new(&module.losses, before.map(|(before, interval)| (before.lost, interval))),
+                sent_per_s: before.and_then(|(before, interval)| sent_per_s(module, before, interval)),
+                waited_p50_ns: quantile(0.5),
+                waited_p99_ns: quantile(0.99),
+                uptime_s: module
+                    .process
+                    .as_ref()
+                    .map(|process| now.at_ns.saturating_sub(process.joined_ns) as f64 / 1e9),
+                cpu_percent: line.pid.zip(earlier).and_then(|(pid, earlier)| cpu_percent(pid, now, earlier)),
+                memory_bytes: line.pid.and_then(|pid| now.usage.get(&pid)).map(|usage| usage.memory_bytes),
+                sends_to: peers(installation, now, earlier, |flow| (flow.module == module.name).then_some(flow.to)),
+                receives_from: peers(installation, now, earlier, |flow| {
+                    let to = flow.to.module();
+                    (to == module.name || module.faces.contains(&to)).then_some(sender(flow))
+                }),
+            }
+        });
+        let modules: Vec<Row> = rows.collect();
+        let mut states = BTreeMap::new();
+        modules.iter().for_each(|row| *states.entry(row.line.state.clone()).or_default() += 1);
+        let received = |sample: &Sample| sample.survey.classes.iter().map(|class| class.received).sum();
+        let lost =
+            |sample: &Sample| Loss::ALL.map(|cause| sample.survey.classes.iter().map(|class| class.lost(cause)).sum());
+        let since = earlier.zip(interval);
+        Self {
+            installation: installation.name.clone(),
+            node: node.into(),
+            time: now.time,
+            launched: now.launched,
+            interval_s: interval.map(|interval| interval.as_secs_f64()),
+            states,
+            received_per_s: since.map(|(before, interval)| per_s(received(now), received(before), interval)),
+            lost: lost(now).iter().sum(),
+            losses: Losses::new(&lost(now), since.map(|(before, interval)| (lost(before).iter().sum(), interval))),
+            modules,
+            mailboxes: mailbox_lines(installation, &now.survey.mailboxes),
+        }
+    }
+
+    /// The module of this name.
+    pub(super) fn row(&self, name: Name) -> Option<&Row> {
+        self.modules.iter().find(|row| row.name == name)
+    }
+}
+
+impl Losses {
+    /// Of these counts, in the order of [`Loss::ALL`]; and how many they were so long before.
+    fn new(counts: &[u64; Loss::ALL.len()], before: Option<(u64, Duration)>) -> Self {
+        let lost = counts.iter().sum();
+        let causes = Loss::ALL.into_iter().map(|cause| (cause.name(), counts[cause as usize]));
+        Self {
+            lost_by_cause: causes.filter(|(_, lost)| *lost > 0).collect(),
+            lost_per_s: before.map(|(before, interval)| per_s(lost, before, interval)),
+        }
+    }
+}
+
+/// A process that began anew counts anew what it sends.
+fn sent_per_s(now: &ModuleSurvey, before: &ModuleSurvey, interval: Duration) -> Option<f64> {
+    let life = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.incarnation);
+    (now.process.is_some() && life(now) == life(before)).then(|| per_s(now.sent, before.sent, interval))
+}
+
+/// Who sends: the module, or the name that a tool's answers go to.
+fn sender(flow: &FlowInfo) -> Name {
+    if flow.module == Name::NONE { flow.from } else { flow.module }
+}
+
+/// The other ends of flows, as `end` finds them, the busiest first.
+fn peers(
+    installation: &Installation,
+    now: &Sample,
+    earlier: Option<&Sample>,
+    end: impl Fn(&FlowInfo) -> Option<Name>,
+) -> Vec<Peer> {
+    let since = earlier.map(|earlier| (earlier, now.survey.at.duration_since(earlier.survey.at)));
+    let mut peers: Vec<Peer> = Vec::new();
+    for flow in now.survey.flows.iter().filter(|flow| !flow.is_publication()) {
+        let Some(name) = end(flow).filter(|name| *name != Name::NONE) else { continue };
+        let per_s = since.map(|(earlier, interval)| {
+            let before = earlier.survey.flows.iter().find(|before| flow.is_same(before));
+            per_s(flow.packages, before.map_or(0, |before| before.packages), interval)
+        });
+        let module = installation.classes.format(name.module());
+        match peers.iter_mut().find(|peer| peer.module == module) {
+            Some(peer) => {
+                peer.packages += flow.packages;
+                peer.per_s = peer.per_s.zip(per_s).map(|(sum, more)| sum + more);
+            }
+            None => peers.push(Peer { module, packages: flow.packages, per_s }),
+        }
+    }
+    peers.sort_by(|a, b| b.packages.cmp(&a.packages));
+    peers
+}
+
+/// Mailboxes may go with their counters, so the later sum may be the smaller one.
+fn per_s(now: u64, before: u64, interval: Duration) -> f64 {
+    if interval.is_zero() { 0.0 } else { now.saturating_sub(before) as f64 / interval.as_secs_f64() }
+}
+
+/// Of one processor, in the time between two looks; none when the process is not the same any more.
+fn cpu_percent(pid: u32, now: &Sample, earlier: &Sample) -> Option<f64> {
+    let interval = now.survey.at.duration_since(earlier.survey.at).as_secs_f64();
+    let ran = now.usage.get(&pid)?.cpu.checked_sub(earlier.usage.get(&pid)?.cpu)?;
+    (interval > 0.0).then(|| ran.as_secs_f64() / interval * 100.0)
+}

@@ -1,0 +1,145 @@
+//! Texts of the screen: dates, long lines, the help.
+
+use super::super::table;
+use super::columns::{Column, severity, short};
+use super::model::Model;
+
+/// A moment as `2026-11-21 10:40:12` (UTC).
+pub(super) fn date(time_ns: u64) -> String {
+    let seconds = time_ns / 1_000_000_000;
+    let (year, month, day) = civil(seconds / 86_400);
+    let (hours, minutes, seconds) = (seconds / 3600 % 24, seconds / 60 % 60, seconds % 60);
+    format!("{year:04}-{month:02}-{day:02} {hours:02}:{minutes:02}:{seconds:02} UTC")
+}
+
+/// Year, month and day of a day counted from 1970, by Hinnant's `civil_from_days`: years begin in March, so that the leap day
+/// is a year's last.
+fn civil(days: u64) -> (u64, u64, u64) {
+    let days = days + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let (month, next) = if month < 10 { (month + 3, 0) } else { (month - 9, 1) };
+    (era * 400 + year + next, month, day)
+}
+
+/// A line in pieces of at most so many characters, broken at blanks where there are any; what follows the first is indented
+/// as the line itself is, and a little more.
+pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
+    // A module may say anything; on the screen a line is a line.
+    let text: String = text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
+    let indent = (text.chars().take_while(|letter| *letter == ' ').count() + 2).min(width / 3);
+    let mut pieces = Vec::new();
+    let mut rest: Vec<char> = text.trim_end().chars().collect();
+    let mut before = 0;
+    while rest.len() + before > width && width > before {
+        let room = width - before;
+        let blank = rest[..=room.min(rest.len() - 1)].iter().rposition(|letter| *letter == ' ');
+        // A blank in the indentation, or too far to the left, is none to break at.
+        let at = blank.filter(|at| *at > room / 2).unwrap_or(room);
+        let piece: String = rest.drain(..at).collect();
+        pieces.push(" ".repeat(before) + piece.trim_end());
+        let blanks = rest.iter().take_while(|letter| **letter == ' ').count();
+        rest.drain(..blanks);
+        before = indent;
+    }
+    if !rest.is_empty() || pieces.is_empty() {
+        pieces.push(" ".repeat(before) + &rest.into_iter().collect::<String>());
+    }
+    pieces
+}
+
+/// Everything as plain text, for `--once`.
+pub(super) fn table(model: &Model) -> String {
+    let heads = Column::ALL.map(|column| format!("{}{}", if column.is_number() { ">" } else { "" }, column.head()));
+    let rows = model.modules.iter().map(|row| Column::ALL.map(|column| column.cell(row)));
+    let table = table::table(heads.each_ref().map(String::as_str), rows);
+    format!("{}\n\n{}", head(model).join("\n"), table.trim_end())
+}
+
+/// The two lines above the table.
+pub(super) fn head(model: &Model) -> [String; 2] {
+    let mut first = vec![format!("{}.{}", model.installation, model.node), date(model.time.time_ns)];
+    let pace = if model.time.time_pace == 1.0 { String::new() } else { format!(" x {}", model.time.time_pace) };
+    first.push(format!("{}{pace}", model.time.time_source));
+    if !model.launched {
+        first.push("NOT LAUNCHED".into());
+    }
+    let mut states: Vec<(&String, &usize)> = model.states.iter().collect();
+    states.sort_by_key(|(state, _)| severity(state));
+    let states: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
+    let number = |number: Option<f64>| number.map_or("-".into(), short);
+    let mut second = vec![
+        format!("{} modules: {}", model.modules.len(), states.join(", ")),
+        format!("{} packages/s", number(model.received_per_s)),
+        format!("{} lost", model.lost),
+    ];
+    if model.lost > 0 {
+        second.push(format!("{} lost/s", number(model.losses.lost_per_s)));
+    }
+    [first.join("   "), second.join("   ")]
+}
+
+const KEYS: [(&str, &str); 12] = [
+    ("arrows, j k", "select a module; g and G the first and the last"),
+    ("Enter", "details of the module; Esc goes back"),
+    ("o", "switch it on"),
+    ("f", "switch it off: its safe state"),
+    ("r", "restart it, once you have said y"),
+    ("s", "sort by the next column, S the other way round"),
+    ("/", "only modules whose name holds what you type; Esc: all"),
+    ("l", "output of the selected module alone, or of all"),
+    ("L", "which output: info, debug, trace, error, warn and above"),
+    ("p", "pause: the screen stays as it is; p goes on"),
+    ("?", "this help"),
+    ("q, Ctrl-C", "end"),
+];
+
+const WHAT: &str = "  Rates and waiting times are those of the last interval. They are read from shared memory, which \
+    disturbs nobody. For its new lines the collector of output is asked once an interval.";
+
+/// All keys and all columns.
+pub(super) fn help() -> Vec<String> {
+    let mut lines = vec!["keys".into()];
+    lines.extend(KEYS.iter().map(|(key, text)| format!("  {key:<12} {text}")));
+    lines.extend(["".into(), "columns; narrow terminals have fewer".into()]);
+    lines.extend(Column::ALL.iter().map(|column| format!("  {:<12} {}", column.head(), column.text())));
+    lines.extend(["".into(), "what is shown".into(), WHAT.into()]);
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for (seconds, text) in [
+            (0, "1970-01-01 00:00:00 UTC"),
+            (951_782_400, "2000-02-29 00:00:00 UTC"),
+            (951_868_799, "2000-02-29 23:59:59 UTC"),
+            (951_868_800, "2000-03-01 00:00:00 UTC"),
+            (1_795_257_612, "2026-11-21 10:40:12 UTC"),
+            (4_107_542_400, "2100-03-01 00:00:00 UTC"),
+        ] {
+            assert_eq!(date(seconds * 1_000_000_000), text);
+        }
+    }
+
+    #[test]
+    fn long_lines_are_broken_at_blanks_and_nothing_is_lost() {
+        assert_eq!(wrap("one two three", 8), ["one two", "  three"]);
+        assert_eq!(wrap("  one two three", 10), ["  one two", "   three"]);
+        assert_eq!(wrap("abcdefghij", 4), ["abcd", " efg", " hij"]);
+        assert_eq!(wrap("", 4), [""]);
+        assert_eq!(wrap("a\u{1b}[31m\tb", 20), ["a [31m b"]);
+        for width in 0..30 {
+            for piece in wrap("  a rather long line with averyverylongwordinit and more", width) {
+                assert!(piece.chars().count() <= width.max(56), "{width}: {piece:?}");
+                assert!(width < 4 || piece.chars().count() <= width, "{width}: {piece:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! `rohrpost check`, as a person or a program reads it.
+
+use crate::harness::Place;
+
+/// Built-in modules with a mistake in each.
+const WRONG: &str = r#"installation = "wrong"
+[system]
+name = "robot"
+id = 1
+[classes]
+motor = { id = 200 }
+odometry = { id = 160 }
+laser = { id = 150 }
+pilot = { id = 140 }
+mapper = { id = 96 }
+tool = { id = 16 }
+[nodes.main]
+[[module]]
+name = "motor.0"
+builtin = "sim"
+faces = ["laser.0", "odometry.0", "mapper.1"]
+settings = { map = "building.map", beems = 181 }
+[[module]]
+name = "laser.1"
+builtin = "sim"
+settings = { map = "building.map", laser-rate-hz = 1000 }
+[[module]]
+name = "pilot.0"
+builtin = "pilot"
+calls = ["laser.0"]
+[module.settings]
+laser = "laser.0"
+motor = "motor.0"
+[[module]]
+name = "pilot.1"
+builtin = "pilot"
+calls = ["laser.0", "motor.0"]
+[module.settings]
+laser = "odometry.0"
+motor = "moter.0"
+[[module]]
+name = "mapper.0"
+builtin = "mapper"
+calls = ["laser.0", "odometry.0"]
+settings = { laser = "laser.7", odometry = "odometry.0", resolution-m = 5 }
+[[module]]
+name = "pilot.2"
+builtin = "pilot"
+settings = { motor = "motor.0" }
+[gui]
+show = [
+    { from = "laser.0", data = "scan" },
+    { from = "laser.0", data = "scam" },
+    { from = "mapper.0", data = "grid" },
+]
+"#;
+
+const SAID: [&str; 11] = [
+    "13: module `motor.0`: face `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, laser",
+    "17: module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
+     `odometry-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
+    "21: module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, which is out of its range 0.01..=100 Hz",
+    "28: module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`",
+    "34: module `pilot.1`: settings: `laser` is `odometry.0`, but must be of class `laser`, whose functions it calls",
+    "35: module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean `motor`?",
+    "40: module `mapper.0`: settings: `resolution-m` is 5; use 0.005 to 1",
+    "40: module `mapper.0`: settings: `laser` is `laser.7`, which no [[module]] defines; add one, or name another",
+    "44: module `pilot.2`: settings: missing field `laser`",
+    "48: [gui] show: `laser.0` has no data `scam`; did you mean `scan`?",
+    "49: [gui] show: `mapper.0` has no data `grid`; it has map, pose",
+];
+
+#[test]
+fn settings_of_builtin_modules_are_checked_before_anything_runs() {
+    let place = Place::new();
+    std::fs::write(place.path("wrong.toml"), WRONG).unwrap();
+    let expected: Vec<String> = SAID.iter().map(|line| format!("wrong.toml:{line}")).collect();
+    let told = place.say(&["check", "wrong.toml"]).fails();
+    assert_eq!(told.trim_end().lines().collect::<Vec<_>>(), expected);
+    // Launch says the same, and starts nothing.
+    assert_eq!(place.say(&["launch", "wrong.toml"]).fails(), told);
+    place.assert_empty();
+
+    let said = place.say(&["check", "wrong.toml", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&said.out).unwrap();
+    assert_eq!((said.code, &json["right"]), (Some(1), &false.into()));
+    let errors = json["errors"].as_array().unwrap();
+    let lines = errors.iter().map(|error| {
+        let (file, message) = (error["file"].as_str().unwrap(), error["message"].as_str().unwrap());
+        format!("{file}:{}: {message}", error["line"])
+    });
+    assert_eq!(lines.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn what_a_file_means_can_be_read_by_programs() {
+    let place = Place::new();
+    // Every key there is; its settings are none that the builtin mapper knows.
+    let full = include_str!("../../config/tests/full.toml").replace("builtin = \"mapper\"", "program = \"./mapper\"");
+    std::fs::write(place.path("full.toml"), full).unwrap();
+    let json = place.say(&["check", "full.toml", "--json"]).json();
+    assert_eq!((&json["right"], &json["installation"]["name"]), (&true.into(), &"two-computers".into()));
+    let base = &json["installation"]["nodes"][0];
+    assert_eq!((&base["name"], &base["mode"]), (&"base".into(), &"0770".into()));
+    let motor = &base["modules"][0];
+    assert_eq!((&motor["name"], &motor["scheduling"]["fifo"]), (&"motor.0".into(), &25.into()));
+    assert_eq!(motor["mailboxes"]["commands"]["max_age_ms"], 300.0);
+    assert_eq!(json["missing_programs"][0]["module"], "motor.0");
+    let json = place.say(&["check", "full.toml", "--json", "--node", "desk"]).json();
+    assert_eq!(json["installation"]["nodes"].as_array().unwrap().len(), 1, "one node only");
+    // Why a picture may wait is told to people and programs alike.
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo.toml");
+    let json = place.say(&["check", demo, "--json"]).json();
+    let modules = json["installation"]["nodes"][0]["modules"].as_array().unwrap();
+    let gui = modules.iter().find(|module| module["name"] == "gui.0").unwrap();
+    let calls = gui["calls"].as_array().unwrap();
+    let output = calls.iter().find(|call| call["to"] == "output.0").unwrap();
+    assert_eq!(output["although"], "a picture may wait");
+    assert!(place.say(&["check", demo]).ok().contains("output.0 is less important: a picture may wait"));
+}
+
+#[test]
+fn a_call_to_a_less_important_module_needs_a_reason() {
+    let place = Place::new();
+    let config = |call: &str| {
+        let module = crate::harness::probe("probe.0", "", &format!("calls = [{call}]"));
+        place.config(&[crate::harness::OUTPUT, &module]).to_str().unwrap().to_owned()
+    };
+    let told = place.say(&["check", &config("\"output.0\"")]).fails();
+    assert!(told.contains("`probe.0`, of priority 96, calls `output.0`, of priority 32"), "{told}");
+    let remedy = told.split('`').find(|part| part.starts_with("{ to")).unwrap().to_owned();
+    place.say(&["check", &config(&remedy)]).ok();
+}

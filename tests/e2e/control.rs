@@ -1,0 +1,196 @@
+//! A person restarts, stops and starts single modules of a node that runs.
+
+use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
+use nix::sys::signal::Signal;
+use rohrpost::CallError;
+use rohrpost::launch::{ChildState, ControlError, Phase};
+use std::time::{Duration, Instant};
+
+fn child(place: &crate::harness::Robot, module: &str) -> ChildState {
+    let mut tool = place.tool(PATIENCE);
+    let children = tool.children().unwrap();
+    tool.close();
+    children.into_iter().find(|child| child.module == module).unwrap()
+}
+
+#[test]
+fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
+    let place = Place::new();
+    let keys = "restart = { policy = \"on-failure\", at-most = 1, within = \"60 s\" }";
+    let (mut launch, robot) =
+        place.launched(&[OUTPUT, &probe("probe.0", "", keys), &probe("probe.1", "", "calls = [\"probe.0\"]")]);
+    let other = robot.pid("probe.1");
+    for _ in 0..3 {
+        let pid = robot.pid("probe.0");
+        let said = place.say(&["restart", "probe.0"]).ok();
+        assert!(said.contains("probe.0 runs and is on after "), "{said}");
+        assert!(said.contains(&format!("before it was process {pid}")), "{said}");
+        assert_ne!(robot.pid("probe.0"), pid);
+    }
+    assert_eq!(place.say(&["list", "--json"]).json()["modules"][1]["restarts"], 0, "its policy was not asked");
+    assert!(place.say(&["start", "probe.0"]).fails().contains("probe.0 runs already; `rohrpost restart probe.0`"));
+
+    let said = place.say(&["stop", "probe.0"]).ok();
+    assert!(said.contains("probe.0 is stopped (ended with 0 when told to)"), "{said}");
+    assert!(robot.process("probe.0").is_none());
+    assert!(place.say(&["call", "probe.0", "count", "1"]).fails().contains("not on this node"), "nobody waits for it");
+    assert!(place.say(&["stop", "probe.0"]).fails().contains("probe.0 is stopped already; `rohrpost start probe.0`"));
+    assert_eq!(child(&robot, "probe.0").phase, Phase::Stopped);
+
+    let said = place.say(&["start", "probe.0"]).ok();
+    assert!(said.contains("probe.0 runs and is on"), "{said}");
+    assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
+    // What a person did is not held against it: one restart by its policy is still to be had.
+    let pid = robot.pid("probe.0");
+    signal(pid, Signal::SIGKILL);
+    assert_eq!(robot.wait_restarted("probe.0", pid).restarts, 1);
+    assert_eq!(robot.pid("probe.1"), other);
+    let out = launch.stop();
+    assert_eq!(out.matches("probe.0 is started again, as asked").count(), 3, "{out}");
+    assert!(out.contains("probe.0 is stopped, as asked"), "{out}");
+    place.assert_empty();
+}
+
+#[test]
+fn a_restarted_module_is_on_if_it_was_on() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", ""), &probe("probe.1", "", "start = \"off\"")]);
+    place.say(&["call", "probe.0", "off"]).ok();
+    place.say(&["call", "probe.1", "on"]).ok();
+    for (module, state) in [("probe.0", "off"), ("probe.1", "on")] {
+        let said = place.say(&["restart", module]).ok();
+        assert!(said.contains(&format!("{module} runs and is {state}")), "{said}");
+        assert_eq!(robot.state(module), state);
+    }
+    for (module, state) in [("probe.0", "on"), ("probe.1", "off")] {
+        place.say(&["stop", module]).ok();
+        let said = place.say(&["start", module]).ok();
+        assert!(said.contains(&format!("{module} runs and is {state}")), "started anew, as configured: {said}");
+    }
+    launch.stop();
+}
+
+#[test]
+fn one_that_hangs_on_its_way_out_keeps_nobody_waiting_and_a_second_word_ends_it() {
+    let place = Place::new();
+    let (mut launch, robot) =
+        place.launched(&[&probe("probe.0", "", "stop-within = \"20 min\""), &probe("probe.1", "", "")]);
+    halt(robot.pid("probe.0"));
+    assert_eq!(place.say(&["restart", "probe.0", "--no-wait"]).ok(), "probe.0 is to be started\n");
+    assert_eq!(child(&robot, "probe.0").phase, Phase::Stopping);
+    let pid = robot.pid("probe.1");
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("probe.1", pid);
+    assert_eq!(child(&robot, "probe.0").phase, Phase::Stopping);
+    let late = place.say(&["stop", "probe.0", "--timeout", "0.2"]).fails();
+    assert!(late.contains("probe.0 is still stopping after 200ms"), "{late}");
+    // The first word stops what can be stopped in order; those that follow, moments later, make an end of the rest.
+    wait("launch ends", || {
+        launch.signal(Signal::SIGINT);
+        std::thread::sleep(Duration::from_millis(100));
+        launch.ended()
+    });
+    assert!(launch.end().success());
+    let out = launch.out();
+    assert!(out.contains("told to stop a second time; killed at once: probe.0"), "{out}");
+    place.assert_empty();
+}
+
+#[test]
+fn a_hung_module_is_killed_and_comes_back() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "stop-within = \"300 ms\"")]);
+    let pid = robot.pid("probe.0");
+    halt(pid);
+    let said = place.say(&["restart", "probe.0"]).ok();
+    assert!(said.contains("probe.0 runs and is on"), "{said}");
+    assert_ne!(robot.pid("probe.0"), pid);
+    let out = launch.stop();
+    assert!(out.contains("probe.0 did not stop within 300ms; killed"), "{out}");
+}
+
+#[test]
+fn hung_modules_wait_beside_each_other_at_the_end() {
+    let place = Place::new();
+    let (hung, within) = (6, Duration::from_millis(2000));
+    let probes: Vec<String> = (0..hung)
+        .map(|n| probe(&format!("probe.{n}"), "", &format!("stop-within = \"{} ms\"", within.as_millis())))
+        .collect();
+    let probes: Vec<&str> = probes.iter().map(String::as_str).collect();
+    let (mut launch, robot) = place.launched(&probes);
+    robot.pids().into_iter().for_each(halt);
+    let told = Instant::now();
+    let out = launch.stop();
+    assert!(told.elapsed() < within * (hung - 1), "one after the other: {:?}", told.elapsed());
+    assert_eq!(out.matches("did not stop within 2s; killed").count(), hung as usize, "{out}");
+    place.assert_empty();
+}
+
+#[test]
+fn one_that_failed_for_good_is_started_by_a_person_and_is_forgiven() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = \"never\"")]);
+    place.say(&["call", "probe.0", "leave", "3"]).ok();
+    launch.wait_for("probe.0 ended with 3");
+    let failed = child(&robot, "probe.0");
+    assert_eq!((failed.phase, failed.pid, failed.lives), (Phase::Failed, None, 1));
+    assert!(failed.last_end.starts_with("ended with 3"), "{failed:?}");
+    assert!(place.say(&["stop", "probe.0"]).fails().contains("has ended already"));
+    place.say(&["start", "probe.0"]).ok();
+    assert_eq!(child(&robot, "probe.0").lives, 2);
+    launch.stop();
+}
+
+#[test]
+fn a_module_that_does_not_come_back_is_told_with_its_own_words() {
+    let place = Place::new();
+    let ends = format!("exit-at-start = 3, wait-for = {:?}", place.path("end"));
+    let (mut launch, robot) =
+        place.launched(&[&probe("probe.0", &ends, "restart = \"never\""), &probe("probe.1", "", "")]);
+    std::fs::write(place.path("end"), "").unwrap();
+    let said = place.say(&["restart", "probe.0"]).fails();
+    assert!(said.contains("probe.0 does not run: ended with 3"), "{said}");
+    assert!(said.contains("a probe was asked to end with 3"), "{said}");
+    assert_eq!(robot.state("probe.1"), "on");
+    launch.signal(Signal::SIGINT);
+    assert_eq!(launch.end().code(), Some(1), "it failed for good");
+}
+
+#[test]
+fn orders_that_cannot_be_carried_out_say_why() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let told = place.say(&["restart", "probe.7"]).fails();
+    assert!(told.contains("no module `probe.7`"), "{told}");
+    let mut tool = robot.tool(PATIENCE);
+    for text in ["probe.7", "nonsense", "tool.0"] {
+        let refused = tool.restart(text);
+        assert!(
+            matches!(&refused, Err(CallError::Module(_, ControlError::NoModule(name))) if name == text),
+            "{refused:?}"
+        );
+    }
+    assert!(matches!(tool.start("probe.0"), Err(CallError::Module(_, ControlError::Running(_)))));
+    tool.close();
+    // Any tool can read what launch offers, and ask for it.
+    let listing = place.say(&["call", "tool.0"]).ok();
+    assert!(listing.contains("restart <module: text>"), "{listing}");
+    place.say(&["call", "tool.0", "stop", "probe.0"]).ok();
+    wait("probe.0 is stopped", || (child(&robot, "probe.0").phase == Phase::Stopped).then_some(()));
+    launch.stop();
+}
+
+#[test]
+fn without_a_launch_it_is_told_that_nobody_watches() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let config = place.path("test.toml");
+    launch.signal(Signal::SIGKILL);
+    launch.end();
+    wait("its module has ended", || robot.process("probe.0").is_none().then_some(()));
+    let told = place.say(&["restart", "probe.0", "--config", config.to_str().unwrap()]).fails();
+    assert!(told.contains("no launch watches over probe.0") && told.contains("rohrpost launch"), "{told}");
+    drop(robot);
+    place.say(&["clean"]).ok();
+    place.assert_empty();
+}
