@@ -79,7 +79,7 @@ fn a_set_value_is_what_the_module_works_with_and_is_told() {
         let log = place.say(&["log", "--module", "probe.0"]).ok();
         log.contains("label: ").then_some(log)
     });
-    assert!(log.contains("info  probe.0: far-m: 9 -> 16 m (by tool."), "{log}");
+    assert!(log.contains("probe.0: far-m: 9 -> 16 m (by tool."), "{log}");
     assert_eq!(log.matches("gain: ").count(), 2, "what stays the same is no change: {log}");
 }
 
