@@ -53,7 +53,7 @@
 
 pub use rohrpost_config as config;
 pub use rohrpost_mailbox as mailbox;
-pub use rohrpost_mailbox::{Class, Name, Priority, SystemTime};
+pub use rohrpost_mailbox::{Class, Interest, Name, Priority, Ready, SystemTime, Watch};
 pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;

@@ -190,7 +190,7 @@ pub(crate) fn class_of(text: &str) -> &str {
 }
 
 /// Whether a text can name a class or a node. A letter comes first, so that a number is never a name.
-pub(crate) fn is_word(text: &str) -> bool {
+pub fn is_word(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_lowercase())
         && text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
 }

@@ -112,7 +112,7 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let memory = modules.iter().map(|module| memory(module)).sum();
+        let memory = modules.iter().map(|module| module.memory()).sum();
         self.line("");
         self.line(format!("Node `{}`: {}, {} of mailboxes", node.name, count(modules.len(), "module"), about(memory)));
         self.line("");
@@ -237,7 +237,11 @@ fn starts(module: &Module) -> String {
         Start::Off => "off, until it is switched on",
     };
     let (ready, stop) = (duration_text(module.ready_within), duration_text(module.stop_within));
-    format!("{state}; must be ready within {ready}, has {stop} to stop")
+    let mut words = format!("{state}; must be ready within {ready}, has {stop} to stop");
+    if !module.spin.is_zero() {
+        let _ = write!(words, "; spins for {}", duration_text(module.spin));
+    }
+    words
 }
 
 fn restart(restart: &Restart) -> String {
@@ -265,12 +269,6 @@ fn mailbox(spec: &MailboxSpec) -> String {
         let _ = write!(words, "; {} claims a sender", spec.claims);
     }
     words
-}
-
-/// Bytes of a module's mailboxes; each face has a command mailbox like the module's.
-fn memory(module: &Module) -> u64 {
-    let [commands, replies, data] = module.mailboxes.each().map(|(_, spec)| spec.memory());
-    commands * (1 + module.faces.len() as u64) + replies + data
 }
 
 /// A size in at most four digits.

@@ -53,7 +53,7 @@ mod settings;
 mod time;
 mod units;
 
-pub use classes::{ClassEntry, ClassTable, NameTextError, TOOL};
+pub use classes::{ClassEntry, ClassTable, NameTextError, TOOL, is_word as is_class_name};
 pub use digest::Digest;
 pub use errors::{Errors, Problem};
 pub use explain::explain;
@@ -61,7 +61,7 @@ pub use flow::Flow;
 pub use gui::{Gui, Show};
 pub use installation::Installation;
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
-pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, Start};
+pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
 pub use node::{Node, System};
 pub use output::{Level, LineFormat, Output};
 pub use program::{MissingProgram, find_program};

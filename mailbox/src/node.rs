@@ -11,6 +11,7 @@
 //! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the file
 //! `node`: the kernel drops that lock with the process, whatever killed it.
 
+use crate::bell::Bell;
 use crate::doorbell;
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, Held};
@@ -80,6 +81,8 @@ pub(crate) struct Entry {
     /// Times that launch has started this module again.
     pub(crate) restarts: AtomicU32,
     pub(crate) joined_ns: AtomicU64,
+    /// Not 0: it sleeps in `poll`; ring it through its pipe too.
+    pub(crate) polling: AtomicU32,
 }
 
 /// The file `node`.
@@ -152,6 +155,7 @@ pub struct Node {
     path: PathBuf,
     /// Holds no lock, so that it can ask about all.
     file: File,
+    directory: File,
     mapping: Mapping,
 }
 
@@ -199,7 +203,11 @@ impl Node {
         if file.metadata().map_err(failed)?.len() < bytes as u64 {
             allocate(&file, bytes).map_err(failed)?;
         }
-        let node = Self { path: path.into(), mapping: Mapping::new(&file, bytes, true).map_err(failed)?, file };
+        // Not to be read, only to find pipes by.
+        let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
+        let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
+        let mapping = Mapping::new(&file, bytes, true).map_err(failed)?;
+        let node = Self { path: path.into(), mapping, file, directory };
         node.check_in()?;
         drop(lock);
         Ok(Arc::new(node))
@@ -228,6 +236,10 @@ impl Node {
         &self.path
     }
 
+    pub(crate) fn directory(&self) -> &File {
+        &self.directory
+    }
+
     pub(crate) fn page(&self) -> &NodePage {
         self.mapping.at(0)
     }
@@ -250,7 +262,8 @@ impl Node {
     /// whoever sees a process end (launch, above all) calls this.
     pub fn announce_death(&self) {
         self.page().deaths.fetch_add(1, Ordering::AcqRel);
-        self.page().entries.iter().filter(|e| e.pid.load(Ordering::Relaxed) != 0).for_each(|e| doorbell::ring(&e.bell));
+        let there = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
+        (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| doorbell::ring(self, index));
     }
 
     /// All participants alive, but for those that are joining or leaving just now.
@@ -335,6 +348,10 @@ pub struct ParticipantInfo {
 }
 
 impl Entry {
+    pub(crate) fn bell(&self) -> Bell<'_> {
+        Bell { rings: &self.bell, polling: &self.polling }
+    }
+
     fn read(&self) -> ParticipantInfo {
         ParticipantInfo {
             module: Name::from_raw(self.module.load(Ordering::Acquire)),

@@ -54,14 +54,24 @@ impl Segment {
     }
 
     /// Maps the mailbox of this name as it stands.
-    pub(crate) fn open(node: &Path, name: Name, writable: bool) -> Result<(Self, File), BadSegment> {
-        let path = path_of(node, name);
-        let file = if writable { open_shared(&path, false)? } else { open_to_read(&path)? };
-        Ok((Self::check(&file, name, writable)?, file))
+    pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
+        Self::check(&open_shared(&path_of(node, name), false)?, name)
+    }
+
+    /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.
+    pub(crate) fn look_at(node: &Path, name: Name) -> Result<(Self, File), BadSegment> {
+        let file = open_to_read(&path_of(node, name))?;
+        let shape = Self::identify(&file, name)?;
+        Ok((Self { mapping: Mapping::new(&file, shape.slots_offset(), false)?, name, shape }, file))
     }
 
     /// Maps a file and checks that it is this mailbox, whole.
-    pub(crate) fn check(file: &File, name: Name, writable: bool) -> Result<Self, BadSegment> {
+    pub(crate) fn check(file: &File, name: Name) -> Result<Self, BadSegment> {
+        let shape = Self::identify(file, name)?;
+        Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), true)?, name, shape })
+    }
+
+    fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
         if file.metadata()?.len() < size_of::<Page>() as u64 {
             return Err(BadSegment::Foreign);
         }
@@ -70,7 +80,7 @@ impl Segment {
         if found != name || file.metadata()?.len() < shape.segment_bytes() as u64 {
             return Err(BadSegment::Foreign);
         }
-        Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), writable)?, name, shape })
+        Ok(shape)
     }
 
     pub(crate) fn lock_in_memory(&self) -> bool {

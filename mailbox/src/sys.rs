@@ -2,7 +2,9 @@
 
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
+use nix::sys::statvfs::statvfs;
 use std::io;
+use std::path::Path;
 
 /// How a process is scheduled.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -76,6 +78,24 @@ pub fn lock_memory() -> io::Result<bool> {
     }
     mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE)?;
     Ok(true)
+}
+
+/// Room of a file system, bytes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Room {
+    /// All in all.
+    pub bytes: u64,
+    /// What this user may still take.
+    pub free: u64,
+}
+
+/// Room of the file system that a path is on.
+///
+/// # Errors
+/// When there is no such path.
+pub fn room(path: &Path) -> io::Result<Room> {
+    let told = statvfs(path)?;
+    Ok(Room { bytes: told.blocks() * told.fragment_size(), free: told.blocks_available() * told.fragment_size() })
 }
 
 fn check(result: i32) -> io::Result<()> {

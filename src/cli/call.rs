@@ -34,6 +34,15 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// Functions that every module has, besides those of its interface.
+pub(super) const COMMON: [(&str, &str); 5] = [
+    ("on", "Begins to work"),
+    ("off", "Goes to its safe state"),
+    ("status", "Says how it is"),
+    ("get", "Asks for its newest data of a kind"),
+    ("output-level", "Sets which lines it sends"),
+];
+
 /// A time that a user gave in seconds.
 pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())

@@ -4,15 +4,18 @@ mod bw;
 mod call;
 mod check;
 mod clean;
+mod completions;
 mod control;
 mod delay;
 mod demo;
+mod doctor;
 mod echo;
 mod graph;
 mod hz;
 mod launch;
 mod list;
 mod log;
+mod new;
 mod param;
 mod ping;
 mod run;
@@ -80,12 +83,19 @@ enum Command {
     Param(param::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
+    /// Look whether this computer lets a robot run in time.
+    Doctor(doctor::Arguments),
+    /// Begin a module of your own: a project that compiles, runs and has a test.
+    New(new::Arguments),
+    /// Print a script by which a shell completes commands, modules, functions and data.
+    Completions(completions::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
 }
 
 /// Runs the command that was typed.
 pub(crate) fn main() -> ExitCode {
+    completions::answer();
     let result = match Arguments::parse().command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),
@@ -107,6 +117,9 @@ pub(crate) fn main() -> ExitCode {
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {

@@ -29,6 +29,10 @@ pub(super) struct Running {
 }
 
 impl Target {
+    pub(super) fn new(config: Option<PathBuf>, node: Option<String>) -> Self {
+        Self { config, node }
+    }
+
     /// Finds the node that is meant.
     pub(super) fn find(&self) -> Result<Running, Failure> {
         let (config, node_name) = match &self.config {
@@ -86,15 +90,22 @@ impl Running {
         Ok(self.installation.classes.parse_name(text)?.module())
     }
 
+    /// The module or face that a user names, if it has mailboxes on this node.
+    pub(super) fn present(&self, text: &str) -> Result<Name, Failure> {
+        let module = self.module(text)?;
+        let here = self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module);
+        if here { Ok(module) } else { Err(self.absent(module)) }
+    }
+
+    fn absent(&self, module: Name) -> Failure {
+        let known = self.installation.module(module).is_some();
+        let next = if known { "is it launched? see `rohrpost list`" } else { "`rohrpost list` shows those that run" };
+        format!("{} has no mailboxes here; {next}", self.text(module)).into()
+    }
+
     /// What the module offers, as it noted beside its mailboxes: nobody is asked.
     pub(super) fn noted(&self, module: Name) -> Result<Description, Failure> {
-        let text = self.text(module);
-        Description::noted(&self.node, module).ok_or_else(|| {
-            let known = self.installation.module(module).is_some();
-            let next =
-                if known { "is it launched? see `rohrpost list`" } else { "`rohrpost list` shows those that run" };
-            format!("{text} has no mailboxes here; {next}").into()
-        })
+        Description::noted(&self.node, module).ok_or_else(|| self.absent(module))
     }
 
     /// An error about a module, with its name as users write it: the lower layers know numbers only.

@@ -7,12 +7,16 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod check;
+mod completions;
 mod control;
 mod crash;
 mod demo;
+mod doctor;
 mod harness;
 mod launch;
 mod mailboxes;
+mod measure;
+mod new;
 mod nodes;
 mod once;
 mod once_wrap;

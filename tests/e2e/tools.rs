@@ -115,7 +115,22 @@ fn a_mistaken_command_line_is_usage() {
         assert!(said.err.contains("--help") || said.err.contains("Usage"), "{arguments:?}: {said:?}");
     }
     assert!(place.say(&["--help"]).ok().contains("rohrpost demo"));
-    for command in ["check", "launch", "demo", "list", "status", "call", "echo", "log", "param", "clean", "run"] {
+    for command in [
+        "check",
+        "launch",
+        "demo",
+        "list",
+        "status",
+        "call",
+        "echo",
+        "log",
+        "param",
+        "clean",
+        "run",
+        "doctor",
+        "new",
+        "completions",
+    ] {
         let help = place.say(&[command, "--help"]).ok();
         assert!(help.contains("Example"), "{command} has no example:\n{help}");
     }

@@ -174,6 +174,28 @@ impl ToolLink {
         self.order(START, module)
     }
 
+    /// Begins to ask for the states of the modules from this one on, and returns at once; [`Link::poll_as`] has the
+    /// answer, a [`Children`].
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    ///
+    /// [`Link::poll_as`]: crate::call::Link::poll_as
+    pub fn begin_children(&mut self, first: u16) -> Result<u32, CallError> {
+        self.begin_asking(CHILDREN, &(first,))
+    }
+
+    /// Begins to have a module restarted, and returns at once; [`Link::poll_as`] has the answer, a `Result` of what
+    /// [`ToolLink::restart`] returns.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    ///
+    /// [`Link::poll_as`]: crate::call::Link::poll_as
+    pub fn begin_restart(&mut self, module: &str) -> Result<u32, CallError> {
+        self.begin_asking(RESTART, &(module,))
+    }
+
     fn order<T: serde::de::DeserializeOwned>(
         &mut self,
         function: u16,
@@ -188,8 +210,13 @@ impl ToolLink {
         function: u16,
         arguments: &impl Serialize,
     ) -> Result<T, CallError> {
+        let call = self.begin_asking(function, arguments)?;
+        self.link.wait(call, |bytes| postcard::from_bytes(bytes))
+    }
+
+    fn begin_asking(&mut self, function: u16, arguments: &impl Serialize) -> Result<u32, CallError> {
         let write = |body: &mut Vec<u8>| append(body, arguments);
-        self.call(self.launcher(), function, LauncherInterface::hash(), write, |bytes| postcard::from_bytes(bytes))
+        self.begin(self.launcher(), function, LauncherInterface::hash(), write)
     }
 }
 

@@ -98,7 +98,7 @@ impl<'a> Format<'a> {
 }
 
 /// Date and time, UTC.
-fn iso(time_ns: u64) -> String {
+pub fn iso(time_ns: u64) -> String {
     humantime::format_rfc3339_micros(UNIX_EPOCH + Duration::from_nanos(time_ns)).to_string()
 }
 

@@ -16,7 +16,7 @@ mod layer;
 mod way;
 
 #[cfg(feature = "builtin")]
-pub use format::Format;
+pub use format::{Format, iso};
 pub(crate) use way::is_installed;
 pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
 

@@ -264,8 +264,7 @@ impl Output {
             }
             if let Some(Told { lines, within }) = told(&own.excess, monotonic_ns()) {
                 let ((what, level), rate) = (lane.words(), self.rate);
-                let within = within.as_secs_f64();
-                let text = format!("… {lines} {what} were suppressed in {within:.1} s: more than {rate} a second");
+                let text = format!("… {lines} {what} were suppressed in {within:.1?}: more than {rate} a second");
                 self.push(lane, level, lines, text);
             }
         }

@@ -144,8 +144,22 @@ impl ToolLink {
         write: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
         read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
     ) -> Result<T, CallError> {
-        let call = self.link.begin(module, function, interface, self.timeout, write)?;
+        let call = self.begin(module, function, interface, write)?;
         self.link.wait(call, read)
+    }
+
+    /// Begins to call any function, and returns at once; [`Link::poll_as`] tells how it went.
+    ///
+    /// # Errors
+    /// See [`CallError`].
+    pub fn begin(
+        &mut self,
+        module: Name,
+        function: u16,
+        interface: u32,
+        write: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
+    ) -> Result<u32, CallError> {
+        self.link.begin(module, function, interface, self.timeout, write)
     }
 
     /// Switches a module on or off.
@@ -161,7 +175,7 @@ impl ToolLink {
     /// # Errors
     /// See [`CallError`].
     pub fn begin_switch(&mut self, module: Name, on: bool) -> Result<u32, CallError> {
-        self.link.begin(module, if on { common::ON } else { common::OFF }, common::HASH, self.timeout, |_| Ok(()))
+        self.begin(module, if on { common::ON } else { common::OFF }, common::HASH, |_| Ok(()))
     }
 
     /// Asks a module how it is.

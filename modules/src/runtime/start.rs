@@ -179,8 +179,9 @@ impl Start {
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
+        let spin = module.spin;
         let life = Life::new(made, participant);
-        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, receivers: Vec::new() })
+        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, spin, receivers: Vec::new() })
     }
 }
 

@@ -5,6 +5,7 @@ use super::super::target::Running;
 use rohrpost::CallError;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
+use rohrpost::launch::{ChildState, Children, ControlError};
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::{Name, ToolLink};
 use std::time::Duration;
@@ -24,6 +25,9 @@ enum Wants {
     Switch(bool),
     Lines,
     Why,
+    Restart(Name),
+    /// All modules of launch; those it has told of so far.
+    Children(Vec<ChildState>),
 }
 
 /// What came of a call.
@@ -31,6 +35,8 @@ pub(super) enum Answer {
     Switched(Name, bool, Result<(), String>),
     Lines(Result<Page, String>),
     Why(Name, String),
+    Restarted(Name, Result<(), String>),
+    Children(Vec<ChildState>),
 }
 
 /// Top's place among those that call.
@@ -62,13 +68,28 @@ impl Calls {
         }
         let write = |body: &mut Vec<u8>| append(body, &(from,));
         let function = super::super::log::LINES_FROM;
-        let begun = self.tool.link.begin(collector, function, CollectorInterface::hash(), PATIENCE, write);
+        let begun = self.tool.begin(collector, function, CollectorInterface::hash(), write);
         self.begun(running, collector, Wants::Lines, begun)
+    }
+
+    /// Has launch restart a module.
+    pub(super) fn restart(&mut self, running: &Running, module: Name) -> Option<Answer> {
+        let begun = self.tool.begin_restart(&running.text(module));
+        self.begun(running, self.tool.launcher(), Wants::Restart(module), begun)
+    }
+
+    /// Asks launch how it stands with the modules that do not run.
+    pub(super) fn children(&mut self, running: &Running) -> Option<Answer> {
+        if self.under_way.iter().any(|call| matches!(call.wants, Wants::Children(_))) {
+            return None;
+        }
+        let begun = self.tool.begin_children(0);
+        self.begun(running, self.tool.launcher(), Wants::Children(Vec::new()), begun)
     }
 
     /// Asks a module in error why.
     pub(super) fn why(&mut self, running: &Running, module: Name) -> Option<Answer> {
-        let begun = self.tool.link.begin(module, common::STATUS, common::HASH, PATIENCE, |_| Ok(()));
+        let begun = self.tool.begin(module, common::STATUS, common::HASH, |_| Ok(()));
         self.begun(running, module, Wants::Why, begun)
     }
 
@@ -98,34 +119,54 @@ impl Calls {
                 continue;
             };
             answers.extend(match outcome {
-                Ok(bytes) => answer(running, call.to, call.wants, &bytes),
+                Ok(bytes) => self.answer(running, call.to, call.wants, &bytes),
                 Err(error) => failed(running, call.to, call.wants, &error),
             });
         }
         answers
     }
-}
 
-fn answer(running: &Running, to: Name, wants: Wants, bytes: &[u8]) -> Option<Answer> {
-    match wants {
-        Wants::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
-        Wants::Lines => match from_bytes::<Page>(bytes) {
-            Ok(page) => Some(Answer::Lines(Ok(page))),
-            Err(error) => failed(running, to, wants, &CallError::BadReply(to, error.to_string())),
-        },
-        Wants::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
+    fn answer(&mut self, running: &Running, to: Name, wants: Wants, bytes: &[u8]) -> Option<Answer> {
+        let unread = |error: &dyn std::fmt::Display| CallError::BadReply(to, error.to_string());
+        match wants {
+            Wants::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
+            Wants::Lines => match from_bytes::<Page>(bytes) {
+                Ok(page) => Some(Answer::Lines(Ok(page))),
+                Err(error) => failed(running, to, wants, &unread(&error)),
+            },
+            Wants::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
+            Wants::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
+                Ok(outcome) => Some(Answer::Restarted(module, outcome.map(|_| ()).map_err(|error| error.to_string()))),
+                Err(error) => failed(running, to, wants, &unread(&error)),
+            },
+            Wants::Children(mut known) => {
+                let page = from_bytes::<Children>(bytes).ok()?;
+                let last = page.states.is_empty() || known.len() + page.states.len() >= page.total.into();
+                known.extend(page.states);
+                if last {
+                    return Some(Answer::Children(known));
+                }
+                let begun = self.tool.begin_children(known.len() as u16);
+                self.begun(running, to, Wants::Children(known), begun)
+            }
+        }
     }
 }
 
-/// What a call that failed comes to. Why a module is in error is asked again the next time; that alone is not told.
+/// What a call that failed comes to. What is asked again at the next look is told only when it was asked by a key.
 fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Option<Answer> {
+    let who = match wants {
+        Wants::Restart(_) | Wants::Children(_) => "launch".into(),
+        _ => running.text(to),
+    };
     let told = match error {
-        CallError::Timeout(..) => format!("{}: no answer within {} s", running.text(to), PATIENCE.as_secs()),
-        error => running.told(to, error).to_string(),
+        CallError::Timeout(..) => format!("{who}: no answer within {} s", PATIENCE.as_secs()),
+        error => error.to_string().replace(&to.to_string(), &who),
     };
     match wants {
         Wants::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
         Wants::Lines => Some(Answer::Lines(Err(told))),
-        Wants::Why => None,
+        Wants::Restart(module) => Some(Answer::Restarted(module, Err(told))),
+        Wants::Why | Wants::Children(_) => None,
     }
 }

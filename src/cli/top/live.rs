@@ -1,6 +1,7 @@
 //! The loop at the terminal: looks, draws, takes keys, and looks after what was asked.
 
 use super::super::target::Running;
+use super::Failure;
 use super::app::{Action, App, Screen};
 use super::calls::{Answer, Calls};
 use super::details;
@@ -8,7 +9,7 @@ use super::draw::{OutputText, View, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
-use super::{Failure, sample};
+use super::sample::{self, Children, by_name};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use ratatui::crossterm::{cursor, execute};
@@ -16,6 +17,7 @@ use rohrpost::Name;
 use rohrpost::launch::{Event as Told, events};
 use std::collections::HashMap;
 use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 /// Signals are looked after so often, and answers that are awaited.
@@ -28,10 +30,26 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
     let mut live = Live::new(running, interval, palette)?;
     let outcome = {
         let mut screen = Opened::new()?;
-        live.watch(&mut screen.0, || matches!(told.try_recv(), Ok(Told::Stop)))
+        let typed = keyboard()?;
+        live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(Told::Stop)))
     };
     live.calls.map(Calls::close);
     outcome.map(|()| ExitCode::SUCCESS)
+}
+
+/// What the terminal says, from a thread of its own: reading from a terminal that was closed never returns (crossterm takes
+/// its end for an interruption), and must not keep us from ending.
+fn keyboard() -> Result<Receiver<Event>, Failure> {
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let read = move || {
+        while let Ok(event) = event::read() {
+            if sender.send(event).is_err() {
+                break;
+            }
+        }
+    };
+    std::thread::Builder::new().name("keyboard".into()).spawn(read)?;
+    Ok(receiver)
 }
 
 /// The terminal while it is ours; given back as it was, whatever ends us. (Of a panic, `ratatui` says what it was after that.)
@@ -67,11 +85,15 @@ struct Live {
     output: Output,
     /// Why modules are in error, as they said.
     errors: HashMap<Name, String>,
+    /// What launch said, if there was reason to ask.
+    children: Children,
+    /// The modules that did not run then.
+    absent: Vec<Name>,
 }
 
 impl Live {
     fn new(running: Running, interval: Duration, palette: Palette) -> Result<Self, Failure> {
-        let now = sample::take(&running, None)?;
+        let now = sample::take(&running, None, &Children::new())?;
         let model = Model::new(&running.installation, &running.node_name, &now, None, &HashMap::new());
         let output = Output::new(&running.installation);
         let mut live = Self {
@@ -85,6 +107,8 @@ impl Live {
             calls: None,
             output,
             errors: HashMap::new(),
+            children: Children::new(),
+            absent: Vec::new(),
         };
         live.join();
         Ok(live)
@@ -98,7 +122,12 @@ impl Live {
         }
     }
 
-    fn watch(&mut self, terminal: &mut DefaultTerminal, stop: impl Fn() -> bool) -> Result<(), Failure> {
+    fn watch(
+        &mut self,
+        terminal: &mut DefaultTerminal,
+        typed: &Receiver<Event>,
+        stop: impl Fn() -> bool,
+    ) -> Result<(), Failure> {
         let mut next = Instant::now() + self.interval;
         self.ask();
         let mut changed = true;
@@ -108,11 +137,11 @@ impl Live {
             }
             let look = if self.calls.as_ref().is_some_and(Calls::waits) { LOOK_WAITING } else { LOOK };
             let wait = if self.app.paused { look } else { look.min(next.saturating_duration_since(Instant::now())) };
-            if event::poll(wait)? {
-                if self.event(event::read()?) {
-                    return Ok(());
-                }
-                changed = true;
+            match typed.recv_timeout(wait) {
+                Ok(event) if self.event(&event) => return Ok(()),
+                Ok(_) => changed = true,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Err("the terminal says nothing more".into()),
             }
             if Instant::now() >= next && !self.app.paused {
                 next = Instant::now() + self.interval;
@@ -126,7 +155,7 @@ impl Live {
 
     /// Looks at the node anew; rates are counted from the look before.
     fn look(&mut self) {
-        match sample::take(&self.running, Some(&self.now)) {
+        match sample::take(&self.running, Some(&self.now), &self.children) {
             Ok(now) => self.earlier = Some(std::mem::replace(&mut self.now, now)),
             Err(_) => self.now.launched = false,
         }
@@ -139,28 +168,29 @@ impl Live {
 
     /// Looks for what has just changed; rates are counted from where they were.
     fn peek(&mut self) {
-        if let Ok(now) = sample::take(&self.running, self.earlier.as_ref()) {
+        if let Ok(now) = sample::take(&self.running, self.earlier.as_ref(), &self.children) {
             self.now = now;
         }
         self.make_model();
     }
 
     fn make_model(&mut self) {
-        let Self { running, now, earlier, errors, .. } = self;
-        self.model = Model::new(&running.installation, &running.node_name, now, earlier.as_ref(), errors);
-        let in_error = |name: &Name| self.model.row(*name).is_some_and(|row| row.line.state == "error");
-        self.errors.retain(|name, _| in_error(name));
+        let Self { running, now, earlier, errors, children, .. } = self;
+        let why = sample::why(now, errors, children);
+        self.model = Model::new(&running.installation, &running.node_name, now, earlier.as_ref(), &why);
     }
 
     /// The node may have been launched again, and perhaps with another configuration.
     fn find_again(&mut self) {
         let Ok(running) = self.running.again() else { return };
-        let Ok(now) = sample::take(&running, None) else { return };
+        let Ok(now) = sample::take(&running, None, &Children::new()) else { return };
         if !now.launched {
             return;
         }
         self.calls.take().map(Calls::close);
         (self.running, self.now, self.earlier) = (running, now, None);
+        self.children.clear();
+        self.absent.clear();
         self.output = Output::new(&self.running.installation);
         self.join();
     }
@@ -175,6 +205,13 @@ impl Live {
         let in_error = self.model.modules.iter().filter(|row| row.line.state == "error" && row.error.is_none());
         for row in in_error {
             answers.extend(calls.why(&self.running, row.name));
+        }
+        // Of those that do not run, launch knows why. What it said holds until others do not run, or while it still tries.
+        let absent: Vec<Name> = self.now.absent().collect();
+        let tries = |name| self.children.get(name).is_some_and(|child| !child.phase.is_over());
+        if absent != self.absent || absent.iter().any(tries) {
+            self.absent = absent;
+            answers.extend(calls.children(&self.running));
         }
         answers.into_iter().for_each(|answer| self.answer(answer));
     }
@@ -196,6 +233,15 @@ impl Live {
                 self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
                 self.peek();
             }
+            Answer::Restarted(name, outcome) => {
+                let done = format!("{} is told to end, and starts again", self.running.text(name));
+                self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
+                self.peek();
+            }
+            Answer::Children(children) => {
+                self.children = by_name(&self.running, children);
+                self.peek();
+            }
             Answer::Lines(page) => {
                 if self.output.take(page) {
                     self.ask();
@@ -209,8 +255,8 @@ impl Live {
     }
 
     /// Takes what the terminal says; true when it is time to end.
-    fn event(&mut self, event: Event) -> bool {
-        let Event::Key(key) = event else { return false };
+    fn event(&mut self, event: &Event) -> bool {
+        let Event::Key(key) = *event else { return false };
         if key.kind == KeyEventKind::Release {
             return false;
         }
@@ -238,7 +284,10 @@ impl Live {
                 self.app.message = Some(format!("switching {name_text} {} ...", if on { "on" } else { "off" }));
                 answers.extend(calls.switch(&self.running, name, on));
             }
-            Action::Restart(_) => {}
+            Action::Restart(name) => {
+                self.app.message = Some(format!("restarting {} ...", self.running.text(name)));
+                answers.extend(calls.restart(&self.running, name));
+            }
         }
         answers.into_iter().for_each(|answer| self.answer(answer));
     }

@@ -23,9 +23,11 @@ mod sample;
 mod tests;
 mod text;
 
-use super::target::Target;
+use super::target::{Running, Target};
 use super::{Failure, say};
 use model::Model;
+use rohrpost::Name;
+use sample::Children;
 use std::collections::HashMap;
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -69,10 +71,27 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         return live::run(running, interval, palette::Palette::new(arguments.no_color));
     }
-    let earlier = sample::take(&running, None)?;
-    std::thread::sleep(interval);
-    let now = sample::take(&running, Some(&earlier))?;
-    let model = Model::new(&running.installation, &running.node_name, &now, Some(&earlier), &HashMap::new());
+    let model = once(&running, interval)?;
     say(if arguments.json { serde_json::to_string(&model)? } else { text::table(&model) });
     Ok(ExitCode::SUCCESS)
+}
+
+/// What there is to show after one interval. Whoever is in error is asked why, and launch about those that do not run.
+fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
+    let earlier = sample::take(running, None, &Children::new())?;
+    std::thread::sleep(interval);
+    let mut now = sample::take(running, Some(&earlier), &Children::new())?;
+    let (mut said, mut children) = (HashMap::new(), Children::new());
+    let names: Vec<Name> = now.survey.modules.iter().map(|module| module.name).collect();
+    let ails = now.absent().next().is_some() || names.iter().any(|name| now.in_error(*name));
+    // What nobody answers stays unsaid; the counters are told all the same.
+    if ails && let Ok(mut tool) = running.join(calls::PATIENCE) {
+        children = tool.children().map(|children| sample::by_name(running, children)).unwrap_or_default();
+        now = sample::take(running, Some(&earlier), &children)?;
+        let status = |name| Some((name, tool.status(name).ok()?.error));
+        said = names.into_iter().filter(|name| now.in_error(*name)).filter_map(status).collect();
+        tool.close();
+    }
+    let why = sample::why(&now, &mut said, &children);
+    Ok(Model::new(&running.installation, &running.node_name, &now, Some(&earlier), &why))
 }

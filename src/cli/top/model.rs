@@ -5,7 +5,7 @@ use super::super::summary::ModuleLine;
 use super::process::Usage;
 use rohrpost::Name;
 use rohrpost::config::Installation;
-use rohrpost::mailbox::{FlowInfo, Loss};
+use rohrpost::mailbox::{FlowInfo, Loss, ModuleState};
 use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
@@ -23,6 +23,19 @@ pub(super) struct Sample {
     pub(super) at_ns: u64,
     /// Whether a launch watches over the node.
     pub(super) launched: bool,
+}
+
+impl Sample {
+    /// Whether the module runs and says that it is in error.
+    pub(super) fn in_error(&self, name: Name) -> bool {
+        let process = self.survey.module(name).and_then(|module| module.process.as_ref());
+        process.is_some_and(|process| process.state == Some(ModuleState::Error))
+    }
+
+    /// Modules that have no process.
+    pub(super) fn absent(&self) -> impl Iterator<Item = Name> {
+        self.survey.modules.iter().filter(|module| module.process.is_none()).map(|module| module.name)
+    }
 }
 
 /// System time as the node has it.

@@ -11,9 +11,17 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("displacing_keeps_the_order", 2),
     ("who_outranks_all_is_not_refused", 3),
     ("two_displace_two", 3),
+    ("the_newest_replaces_what_waits", 2),
+    ("the_newest_reuses_the_only_slot", 2),
+    ("the_newest_keeps_its_place", 2),
+    ("who_is_displaced_is_not_replaced_too", 2),
+    ("a_retired_mailbox_counts_the_replaced", 3),
     ("no_wake_up_is_lost", 3),
     ("no_wake_up_is_lost_between_two", 2),
     ("no_wake_up_is_lost_when_displaced", 2),
+    ("no_wake_up_is_lost_in_poll", 2),
+    ("no_wake_up_is_lost_in_poll_between_two", 1),
+    ("a_dead_ringer_takes_no_wake_up_along", 2),
     ("a_retired_mailbox_keeps_nothing", 3),
     ("a_retired_mailbox_keeps_nothing_of_the_dead", 2),
     ("a_retired_mailbox_counts_the_displaced", 3),
@@ -23,6 +31,9 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_sender_dies_without_its_hint", 2),
     ("a_sender_dies_after_its_hint", 2),
     ("a_displacer_dies", 2),
+    ("a_replacer_dies_before_the_old_one_goes", 2),
+    ("a_replacer_dies_when_the_old_one_is_gone", 2),
+    ("a_replacer_dies_in_the_only_slot", 2),
     ("a_package_without_hint_is_found_in_turn", 3),
     ("a_package_in_dead_hands_is_delivered_once_more", 2),
 ];
@@ -134,8 +145,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
                 "slots",
-                "        let word = Word::ready(priority, ticket);\n",
-                "        let word = Word::ready(priority, ticket);\n        self.hint(slot);\n",
+                "        let word = Word::ready(priority, claim.place.unwrap_or(ticket));\n",
+                "        let word = Word::ready(priority, claim.place.unwrap_or(ticket));\n        self.hint(slot);\n",
             ),
         ],
         caught_by: "everything_arrives_once_and_in_order",
@@ -291,6 +302,109 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "two_displace_two",
         says: WRONG,
     },
+    // ---- only the newest ----
+    // The receiver has it in hand: it is received and counted as replaced, and its slot is freed under it.
+    Broken {
+        name: "replace_without_compare",
+        edits: &[edit(
+            "slots",
+            "if self.change(old.slot, old.word, FREE) {",
+            "if { self.word(old.slot).swap(FREE.0, Ordering::AcqRel); true } {",
+        )],
+        caught_by: "the_newest_replaces_what_waits",
+        says: WRONG,
+    },
+    // The same in a full mailbox.
+    Broken {
+        name: "reuse_without_compare",
+        edits: &[edit(
+            "slots",
+            "let reused = self.change(old.slot, old.word, word);",
+            "let reused = { self.word(old.slot).swap(word.0, Ordering::AcqRel); true };",
+        )],
+        caught_by: "the_newest_reuses_the_only_slot",
+        says: WRONG,
+    },
+    // Received, and counted as replaced.
+    Broken {
+        name: "counted_though_it_was_received",
+        edits: &[edit(
+            "slots",
+            "self.change(claim.slot, marked, claim.word);",
+            "if true { return Some(Claim { word: marked, ..claim }); }",
+        )],
+        caught_by: "the_newest_replaces_what_waits",
+        says: WRONG,
+    },
+    // The older one waits still, and is received after the newer or before it, but beside it.
+    Broken {
+        name: "nothing_is_replaced",
+        edits: &[edit(
+            "slots",
+            "        let State::Filling { by, .. } = claim.word.state() else { return None };",
+            "        let State::Filling { by, .. } = claim.word.state() else { return None };\n        if true { return None; }",
+        )],
+        caught_by: "the_newest_keeps_its_place",
+        says: WRONG,
+    },
+    // In a hurry: published beside the older one, in the same place of the order, and which of them goes first is chance.
+    Broken {
+        name: "replaced_after_publishing",
+        edits: &[
+            edit(
+                "rig",
+                "if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {",
+                "let late = self.last;\n        if let Some(instead) = None {",
+            ),
+            edit("slots", "unwrap_or(ticket)", "unwrap_or(0)"),
+            edit(
+                "rig",
+                "                self.last = (self.full == Full::Latest).then_some(posted);",
+                "                if let Some(old) = late {\n                    if slots.take(old.slot, old.word).map(|old| slots.release(old)).is_some() {\n                        self.mailbox.count(Victim { priority: Priority(priority), replaced: true });\n                    }\n                }\n                self.last = (self.full == Full::Latest).then_some(posted);",
+            ),
+        ],
+        caught_by: "the_newest_replaces_what_waits",
+        says: "it goes back",
+    },
+    // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
+    Broken {
+        name: "the_newest_goes_to_the_end",
+        edits: &[edit("slots", "claim.place.unwrap_or(ticket)", "ticket")],
+        caught_by: "the_newest_keeps_its_place",
+        says: WRONG,
+    },
+    // The older one is gone, and who dies now has told nobody.
+    Broken {
+        name: "replaces_unmarked",
+        edits: &[edit(
+            "slots",
+            "let marked = Word::filling(by, Some(old.as_victim()));",
+            "let marked = Word::filling(by, None);",
+        )],
+        caught_by: "a_replacer_dies_when_the_old_one_is_gone",
+        says: "hidden",
+    },
+    Broken {
+        name: "reuses_unmarked",
+        edits: &[edit(
+            "slots",
+            "let word = Word::filling(by, Some(old.as_victim()));",
+            "let word = Word::filling(by, None);",
+        )],
+        caught_by: "a_replacer_dies_in_the_only_slot",
+        says: "hidden",
+    },
+    // The counters went on elsewhere between replacing and counting.
+    Broken {
+        name: "settles_no_replaced",
+        edits: &[edit(
+            "slots",
+            "lost(victim);\n                step!(\"settle: counted\");",
+            "if !victim.replaced { lost(victim); }\n                step!(\"settle: counted\");",
+        )],
+        caught_by: "a_retired_mailbox_counts_the_replaced",
+        says: "hidden",
+    },
     // ---- sleeping ----
     // Neither sees the other: the sender reads the old `sleeping`, the receiver the old hints.
     Broken {
@@ -313,8 +427,9 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "bell_read_after_the_last_look",
         edits: &[
-            edit("rig", "        let seen = self.mailbox.bell.load(Ordering::Acquire);\n", ""),
-            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(self.mailbox.bell.load(Ordering::Acquire));"),
+            edit("rig", "        let seen = bell.seen();\n", ""),
+            edit("rig", "bell.may_poll(seen)", "bell.may_poll(bell.seen())"),
+            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(bell.seen());"),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -339,6 +454,52 @@ pub(crate) const BROKEN: &[Broken] = &[
             "                    self.mailbox.ring();\n                    slots.awake();\n",
         )],
         caught_by: "no_wake_up_is_lost_between_two",
+        says: ENDLESS,
+    },
+    // ---- sleeping in poll ----
+    // Neither sees the other: the ringer reads the old `polling`, the sleeper the old rings.
+    Broken {
+        name: "no_fence_h",
+        edits: &[edit("bell", "Pairs with (I).\n        fence(Ordering::SeqCst);\n", "Pairs with (I).\n")],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    Broken {
+        name: "no_fence_i",
+        edits: &[edit("bell", "Pairs with (H).\n        fence(Ordering::SeqCst);\n", "Pairs with (H).\n")],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    // Rung between the two: the ringer writes nothing, and the sleeper sleeps.
+    Broken {
+        name: "polls_before_it_says_so",
+        edits: &[
+            edit(
+                "bell",
+                "        self.polling.store(1, Ordering::Relaxed);\n",
+                "        let quiet = self.rings.load(Ordering::Relaxed) == seen;\n        self.polling.store(1, Ordering::Relaxed);\n",
+            ),
+            edit("bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "quiet\n    }"),
+        ],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    // As for a futex, but there is no kernel that compares.
+    Broken {
+        name: "polls_without_comparing",
+        edits: &[edit("bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "true\n    }")],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    // To save the others the system call. Who dies now takes along what the others would have written.
+    Broken {
+        name: "the_first_ringer_clears_polling",
+        edits: &[edit(
+            "bell",
+            "step!(\"bell: rung\");\n        self.polling.load(Ordering::Relaxed) != 0",
+            "let polling = self.polling.swap(0, Ordering::Relaxed) != 0;\n        step!(\"bell: rung\");\n        polling",
+        )],
+        caught_by: "a_dead_ringer_takes_no_wake_up_along",
         says: ENDLESS,
     },
     // ---- giving up ----
@@ -453,16 +614,22 @@ pub(crate) struct Mirrored {
 
 pub(crate) const MIRRORED: &[Mirrored] = &[
     Mirrored {
-        file: "receiver",
+        file: "waiting",
         what: "models::Receiver::wait does the same, change both",
         lines: &[
-            "pub fn wait_any(",
-            "let seen = bell.load(Ordering::Acquire);",
+            "pub(crate) fn wait(",
+            "let seen = entry.bell().seen();",
             ".drowsy());",
-            ".may_have())",
-            "doorbell::sleep(bell, seen,",
+            "let idle = !found()",
+            "watches.sleep(entry.bell(), seen,",
+            "doorbell::sleep(&entry.bell, seen,",
             ".awake());",
         ],
+    },
+    Mirrored {
+        file: "watch",
+        what: "models::Receiver::wait does the same, change both",
+        lines: &["fn sleep(", "let quiet = bell.may_poll(seen);", "self.poll(if quiet", "bell.polled();"],
     },
     Mirrored {
         file: "receiver",
@@ -509,6 +676,6 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
     Mirrored {
         file: "doorbell",
         what: "models::Mailbox::ring does the same, change both",
-        lines: &["fn ring(", "bell.fetch_add(1, Ordering::Release);", "FUTEX_WAKE"],
+        lines: &["fn ring(", "let polling = bell.ring();", "FUTEX_WAKE", "if polling {", "write_to_pipe("],
     },
 ];

@@ -2,7 +2,7 @@
 //! that a load may read. This file is compiled beside the real slot core and beside each broken one.
 
 use crate::name::Priority;
-use crate::rig::{Mailbox, Sent, of_first, sorted};
+use crate::rig::{Mailbox, Receiver, Sender, Sent, of_first, sorted};
 use crate::slots::{Full, Published};
 use crate::step::{dies_at, reached};
 use crate::sync::Ordering;
@@ -52,11 +52,11 @@ pub(crate) fn publishing_gives_the_order() {
     let mailbox = Mailbox::new(2);
     let slots = mailbox.slots();
     let mut sender = mailbox.sender(1, Full::Reject);
-    let claims = [1, 2].map(|_| slots.claim(sender.by, &mut sender.cursor, Priority(10), Full::Reject).unwrap());
+    let claims = [1, 2].map(|_| slots.claim(sender.by, &mut sender.cursor, Priority(10), Full::Reject, None).unwrap());
     for (claim, body) in claims.into_iter().rev().zip([1, 2]) {
         // SAFETY: the claim is ours.
         mailbox.bodies[claim.slot].with_mut(|cell| unsafe { *cell = body });
-        assert_eq!(slots.publish(claim, Priority(10)), Published::Accepted { wake: false });
+        assert!(matches!(slots.publish(claim, Priority(10)), Published::Accepted { wake: false, .. }));
     }
     assert_eq!(mailbox.receiver().drain(), [1, 2]);
 }
@@ -140,6 +140,80 @@ pub(crate) fn two_displace_two() {
     assert!(mailbox.all_free());
 }
 
+// ---- only the newest ----
+
+/// One sender, one receiver: what is received never goes back and ends with the newest; the rest is counted as replaced.
+fn only_the_newest(slots: usize, packages: &'static [(u8, u8)]) {
+    let mailbox = Mailbox::new(slots);
+    let sender = mailbox.send_from(1, Full::Latest, packages);
+    let mut receiver = mailbox.receiver();
+    let mut received = receiver.take_times(2);
+    let accepted = sender.join().unwrap();
+    received.extend(receiver.drain());
+    assert!(received.is_sorted_by(|a, b| a < b), "it goes back: {received:?}");
+    assert_eq!(received.last(), accepted.last(), "the newest is received");
+    assert_eq!(received.len() + mailbox.replaced(), accepted.len(), "received or replaced, never both, never neither");
+    assert!(mailbox.all_free());
+}
+
+/// A free slot for the newer one while the older still waits.
+pub(crate) fn the_newest_replaces_what_waits() {
+    only_the_newest(2, &[(10, 1), (10, 2), (10, 3)]);
+}
+
+/// No other slot than that of the older one. While the receiver has it in hand there is none.
+pub(crate) fn the_newest_reuses_the_only_slot() {
+    only_the_newest(1, &[(10, 1), (10, 2), (10, 3)]);
+}
+
+/// The newer one stands where the older stood, before what others sent meanwhile; and a state that is sent without end
+/// keeps nobody out.
+pub(crate) fn the_newest_keeps_its_place() {
+    let mailbox = Mailbox::new(3);
+    let mut fast = mailbox.sender(1, Full::Latest);
+    assert_eq!(fast.send(10, 1), Sent::Accepted);
+    let other = mailbox.send_from(2, Full::Latest, &[(10, 10)]);
+    fast.send_all(&[(10, 2), (10, 3)]);
+    // The other one is refused if its search for a free slot meets the state wherever it moves to.
+    let expected = [vec![3], other.join().unwrap()].concat();
+    assert_eq!(mailbox.receiver().drain(), expected);
+    assert_eq!(mailbox.replaced(), 2);
+    assert!(mailbox.all_free());
+}
+
+/// A state is sent anew while somebody more important takes a slot: each is received or counted, once.
+pub(crate) fn who_is_displaced_is_not_replaced_too() {
+    let mailbox = Mailbox::new(1);
+    let state = mailbox.send_from(1, Full::Latest, &[(10, 1), (10, 2)]);
+    let high = mailbox.send_from(2, Full::Latest, &[(20, 20)]);
+    let accepted = state.join().unwrap().len() + high.join().unwrap().len();
+    let received = mailbox.receiver().drain();
+    assert_eq!(received.len() + mailbox.replaced() + mailbox.displaced().len(), accepted);
+    assert!(mailbox.all_free());
+}
+
+/// The owner gives the mailbox up while a newer package replaces the older: none of what was accepted is hidden.
+pub(crate) fn a_retired_mailbox_counts_the_replaced() {
+    let mailbox = Mailbox::new(2);
+    let mut first = mailbox.sender(1, Full::Latest);
+    first.send(10, 1);
+    let last = first.last;
+    let sender = mailbox.clone();
+    let sender = thread::spawn(move || Sender { last, ..sender.sender(1, Full::Latest) }.send_all(&[(10, 2)]));
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.retire();
+    owner.queue.rescan(&slots);
+    let found = owner.drain();
+    let mut settled = 0;
+    slots.settle(|_| settled += 1);
+    // By now: what a sender counts later, nobody sees.
+    let seen = found.len() + mailbox.replaced() + settled;
+    let accepted = 1 + sender.join().unwrap().len();
+    assert!(seen >= accepted, "hidden: {found:?} of {accepted}");
+    assert!(found.len() <= accepted);
+}
+
 // ---- sleeping ----
 
 /// A receiver that sleeps whenever there is nothing gets everything. No assertion: a lost wake-up never ends.
@@ -178,6 +252,34 @@ pub(crate) fn no_wake_up_is_lost_when_displaced() {
     while receiver.receive() == Some(10) {}
     low.join().unwrap();
     high.join().unwrap();
+}
+
+/// As the two before, by one who sleeps in `poll`, where the kernel compares nothing.
+pub(crate) fn no_wake_up_is_lost_in_poll() {
+    let mailbox = Mailbox::new(2);
+    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
+    assert_eq!([receiver.receive(), receiver.receive()], [Some(1), Some(2)]);
+    sender.join().unwrap();
+}
+
+pub(crate) fn no_wake_up_is_lost_in_poll_between_two() {
+    let mailbox = Mailbox::new(2);
+    let one = mailbox.send_from(1, Full::Reject, &[(10, 1)]);
+    let other = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
+    assert_eq!(sorted([receiver.receive(), receiver.receive()].into_iter().flatten().collect()), [1, 2]);
+    one.join().unwrap();
+    other.join().unwrap();
+}
+
+/// One who rang dies before it writes into the pipe: whoever rings after that wakes the sleeper all the same.
+pub(crate) fn a_dead_ringer_takes_no_wake_up_along() {
+    let mailbox = Mailbox::new(1);
+    let dead = mailbox.dies_sending(1, Full::Reject, "bell: rung", &[(10, 1)]);
+    let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
+    assert_eq!(receiver.receive(), Some(1));
+    dead.join().unwrap();
 }
 
 // ---- giving up ----
@@ -240,7 +342,7 @@ pub(crate) fn a_replaced_mailbox_hides_no_loss() {
     slots.retire();
     owner.queue.rescan(&slots);
     let mut seen = owner.drain();
-    slots.settle(|priority| seen.push(priority.0));
+    slots.settle(|victim| seen.push(victim.priority.0));
     seen.extend(mailbox.displaced());
     sender.join().unwrap();
     assert!(seen.contains(&10), "hidden");
@@ -252,7 +354,7 @@ pub(crate) fn a_replaced_mailbox_hides_no_loss() {
 /// a package, its slot is usable again, and the other one notices nothing.
 fn a_sender_dies(step: &'static str, arrives: bool) {
     let mailbox = Mailbox::new(2);
-    let dead = mailbox.dies_sending(1, step, &(10, 1));
+    let dead = mailbox.dies_sending(1, Full::Displace, step, &[(10, 1)]);
     let living = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
     let mut receiver = mailbox.receiver();
     receiver.search();
@@ -287,7 +389,7 @@ pub(crate) fn a_sender_dies_after_its_hint() {
 pub(crate) fn a_displacer_dies() {
     let mailbox = Mailbox::new(1);
     mailbox.sender(3, Full::Displace).send(10, 10);
-    let dead = mailbox.dies_sending(1, "displace: claimed", &(20, 20));
+    let dead = mailbox.dies_sending(1, Full::Displace, "displace: claimed", &[(20, 20)]);
     let living = mailbox.send_from(2, Full::Displace, &[(15, 15)]);
     let mut receiver = mailbox.receiver();
     let mut seen = receiver.take_times(1);
@@ -301,6 +403,39 @@ pub(crate) fn a_displacer_dies() {
     accepted.extend((!died && seen.contains(&20)).then_some(20));
     assert_eq!(sorted(seen), accepted);
     assert!(mailbox.all_free());
+}
+
+/// A sender dies on the way from the older package of a state to the newer. The older is received or counted, here or there, and
+/// the newer is received if it was published; both slots are usable again.
+fn a_replacer_dies(slots: usize, step: &'static str) {
+    let mailbox = Mailbox::new(slots);
+    let dead = mailbox.dies_sending(1, Full::Latest, step, &[(10, 1), (10, 2)]);
+    let mut receiver = mailbox.receiver();
+    let mut received = receiver.take_times(1);
+    receiver.search();
+    let died = dead.join().unwrap();
+    receiver.search();
+    received.extend(receiver.drain());
+    assert!(received.is_sorted_by(|a, b| a < b), "{received:?}");
+    // Not reached when the receiver was quicker: then nothing was replaced.
+    assert!(died || received.contains(&2));
+    let (first, replaced) = (received.contains(&1), mailbox.replaced());
+    assert!(first || replaced == 1, "hidden");
+    // Who dies between saying that it replaces and replacing is believed: then the older one is counted and received.
+    assert!(!(first && replaced > 0) || step == "replace: marked");
+    assert!(mailbox.all_free());
+}
+
+pub(crate) fn a_replacer_dies_before_the_old_one_goes() {
+    a_replacer_dies(2, "replace: marked");
+}
+
+pub(crate) fn a_replacer_dies_when_the_old_one_is_gone() {
+    a_replacer_dies(2, "replace: freed");
+}
+
+pub(crate) fn a_replacer_dies_in_the_only_slot() {
+    a_replacer_dies(1, "reuse: claimed");
 }
 
 /// Every slot is looked at without a hint after so many receives, deaths or not.

@@ -4,11 +4,12 @@
 //! written here again, small; `build.rs` fails when the lines that matter are no longer there in this order.
 
 use crate::name::Priority;
+use crate::bell::Bell;
 use crate::queue::Queue;
-use crate::slots::{Full, HINT_WORDS, Hot, NoSlot, Published, Slots};
+use crate::slots::{Full, HINT_WORDS, Hot, NoSlot, Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
-use crate::word::{Claimant, FREE, Word};
+use crate::word::{Claimant, FREE, Victim, Word};
 use loom::cell::UnsafeCell;
 use loom::thread::{self, JoinHandle};
 use std::sync::{Arc, Mutex};
@@ -18,13 +19,16 @@ pub(super) struct Mailbox {
     pub(super) hot: Hot,
     pub(super) words: Vec<AtomicU64>,
     pub(super) bodies: Vec<UnsafeCell<u8>>,
-    pub(super) bell: AtomicU32,
+    rings: AtomicU32,
+    polling: AtomicU32,
+    /// Bytes in the pipe. The kernel would order more than these plain accesses do.
+    pipe: AtomicU32,
     /// Not 0: the receiver has something else to do. Whoever says so rings.
     pub(super) other: AtomicU32,
     /// One bit for each dead participant.
     pub(super) dead: AtomicU32,
-    /// Priorities counted as displaced. Not loom's, so that counting adds no order to the model.
-    pub(super) displaced: Mutex<Vec<u8>>,
+    /// Counted as having lost their place. Not loom's, so that counting adds no order to the model.
+    victims: Mutex<Vec<Victim>>,
 }
 
 // SAFETY: the bodies are the only part that is not Sync by itself, and loom reports every race on them.
@@ -43,10 +47,12 @@ impl Mailbox {
             hot,
             words: (0..slots).map(|_| AtomicU64::new(FREE.0)).collect(),
             bodies: (0..slots).map(|_| UnsafeCell::new(0)).collect(),
-            bell: AtomicU32::new(0),
+            rings: AtomicU32::new(0),
+            polling: AtomicU32::new(0),
+            pipe: AtomicU32::new(0),
             other: AtomicU32::new(0),
             dead: AtomicU32::new(0),
-            displaced: Mutex::default(),
+            victims: Mutex::default(),
         })
     }
 
@@ -55,11 +61,11 @@ impl Mailbox {
     }
 
     pub(super) fn sender(&self, participant: u16, full: Full) -> Sender<'_> {
-        Sender { mailbox: self, by: Claimant { participant, incarnation: 1 }, cursor: 0, full }
+        Sender { mailbox: self, by: Claimant { participant, incarnation: 1 }, cursor: 0, full, last: None }
     }
 
     pub(super) fn receiver(&self) -> Receiver<'_> {
-        Receiver { mailbox: self, queue: Queue::new(self.words.len()) }
+        Receiver { mailbox: self, queue: Queue::new(self.words.len()), polls: false }
     }
 
     /// Sends these packages (priority, body) from a thread of its own; returns the bodies of the accepted ones.
@@ -68,20 +74,24 @@ impl Mailbox {
         thread::spawn(move || mailbox.sender(participant, full).send_all(packages))
     }
 
-    /// A sender that dies at this step of sending one package.
+    /// A sender that dies at this step of sending these packages.
     pub(super) fn dies_sending(
         self: &Arc<Self>,
         participant: u16,
+        full: Full,
         step: &'static str,
-        package: &'static (u8, u8),
+        packages: &'static [(u8, u8)],
     ) -> JoinHandle<bool> {
         let mailbox = self.clone();
         thread::spawn(move || {
             let died = dies_at(step, || {
-                mailbox.sender(participant, Full::Displace).send(package.0, package.1);
+                mailbox.sender(participant, full).send_all(packages);
             });
-            // The kernel releases the lock by which others see it alive.
+            // The kernel releases the lock by which others see it alive; whoever notices that rings.
             mailbox.dead.fetch_or(u32::from(died) << participant, Ordering::Release);
+            if died {
+                mailbox.ring();
+            }
             died
         })
     }
@@ -90,27 +100,47 @@ impl Mailbox {
         self.dead.load(Ordering::Acquire) >> by.participant & 1 != 0
     }
 
-    pub(super) fn count_displaced(&self, priority: Priority) {
-        self.displaced.lock().unwrap().push(priority.0);
+    pub(super) fn count(&self, victim: Victim) {
+        self.victims.lock().unwrap().push(victim);
     }
 
+    /// Priorities of those that gave way to more important ones.
     pub(super) fn displaced(&self) -> Vec<u8> {
-        self.displaced.lock().unwrap().clone()
+        self.victims.lock().unwrap().iter().filter(|victim| !victim.replaced).map(|victim| victim.priority.0).collect()
+    }
+
+    /// How many gave way to their sender's newer ones.
+    pub(super) fn replaced(&self) -> usize {
+        self.victims.lock().unwrap().iter().filter(|victim| victim.replaced).count()
     }
 
     pub(super) fn all_free(&self) -> bool {
         (0..self.words.len()).all(|slot| self.slots().load(slot) == FREE)
     }
 
+    fn bell(&self) -> Bell<'_> {
+        Bell { rings: &self.rings, polling: &self.polling }
+    }
+
     pub(super) fn ring(&self) {
-        self.bell.fetch_add(1, Ordering::Release);
+        if self.bell().ring() {
+            self.pipe.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// A futex that never returns early: who is not rung does not wake, and loom gives up on a program without end.
     pub(super) fn sleep(&self, seen: u32) {
-        while self.bell.load(Ordering::Relaxed) == seen {
+        while self.rings.load(Ordering::Relaxed) == seen {
             thread::yield_now();
         }
+    }
+
+    /// A `poll` that never returns early, unless it is told not to wait; then the pipe is emptied.
+    fn poll(&self, sleeps: bool) {
+        while sleeps && self.pipe.load(Ordering::Relaxed) == 0 {
+            thread::yield_now();
+        }
+        self.pipe.swap(0, Ordering::Relaxed);
     }
 }
 
@@ -127,12 +157,14 @@ pub(super) struct Sender<'a> {
     pub(super) by: Claimant,
     pub(super) cursor: usize,
     pub(super) full: Full,
+    /// The last package: all that one sender sends here is of one state.
+    pub(super) last: Option<Posted>,
 }
 
 impl Sender<'_> {
     pub(super) fn send(&mut self, priority: u8, body: u8) -> Sent {
         let slots = self.mailbox.slots();
-        let claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full) {
+        let mut claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full, self.last) {
             Ok(claim) => claim,
             Err(NoSlot::Full) => return Sent::Refused,
             Err(NoSlot::Retired) => return Sent::Retired,
@@ -140,9 +172,14 @@ impl Sender<'_> {
         let cell = &self.mailbox.bodies[claim.slot];
         // SAFETY: the claim is ours; if that were wrong, loom would tell.
         cell.with_mut(|cell| unsafe { *cell = body });
-        claim.displaced().into_iter().for_each(|priority| self.mailbox.count_displaced(priority));
+        claim.victim().into_iter().for_each(|victim| self.mailbox.count(victim));
+        if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {
+            claim = instead;
+            claim.victim().into_iter().for_each(|victim| self.mailbox.count(victim));
+        }
         match slots.publish(claim, Priority(priority)) {
-            Published::Accepted { wake } => {
+            Published::Accepted { posted, wake } => {
+                self.last = (self.full == Full::Latest).then_some(posted);
                 if wake {
                     self.mailbox.ring();
                 }
@@ -166,6 +203,8 @@ impl Sender<'_> {
 pub(super) struct Receiver<'a> {
     pub(super) mailbox: &'a Mailbox,
     pub(super) queue: Queue,
+    /// It watches descriptors too.
+    pub(super) polls: bool,
 }
 
 impl Receiver<'_> {
@@ -207,10 +246,17 @@ impl Receiver<'_> {
 
     pub(super) fn wait(&mut self) {
         let slots = self.mailbox.slots();
-        let seen = self.mailbox.bell.load(Ordering::Acquire);
+        let bell = self.mailbox.bell();
+        let seen = bell.seen();
         slots.drowsy();
         if self.mailbox.other.load(Ordering::Relaxed) == 0 && !self.queue.may_have_more(&slots) {
-            self.mailbox.sleep(seen);
+            if self.polls {
+                let quiet = bell.may_poll(seen);
+                self.mailbox.poll(quiet);
+                bell.polled();
+            } else {
+                self.mailbox.sleep(seen);
+            }
         }
         slots.awake();
     }
@@ -219,7 +265,7 @@ impl Receiver<'_> {
     pub(super) fn search(&mut self) -> usize {
         let slots = self.mailbox.slots();
         reached("search: before");
-        let freed = slots.reclaim(|by| self.mailbox.is_dead(by), |priority| self.mailbox.count_displaced(priority));
+        let freed = slots.reclaim(|by| self.mailbox.is_dead(by), |victim| self.mailbox.count(victim));
         self.queue.rescan(&slots);
         freed
     }

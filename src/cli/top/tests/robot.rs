@@ -114,11 +114,13 @@ impl Robot {
             module: self.name(module).raw(),
             level,
             lost: 0,
+            suppressed: 0,
             text: text.into(),
         };
         let mut page = output::Output::new(&self.installation);
-        page.take(Ok(rohrpost::interfaces::Page { first: u64::MAX, next: 4, lines: Vec::new() }));
+        page.take(Ok(rohrpost::interfaces::Page { life: 1, first: u64::MAX, next: 4, lines: Vec::new() }));
         page.take(Ok(rohrpost::interfaces::Page {
+            life: 1,
             first: 0,
             next: 4,
             lines: vec![

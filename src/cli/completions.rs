@@ -1,0 +1,188 @@
+//! `rohrpost completions`, and the answers to the shells that it was set up in.
+//!
+//! A shell runs this command anew at each press of the key, with the words so far. Names of modules and nodes come from the
+//! configuration that launch has noted, so nobody is asked. What a built-in module offers is known here as well; a program
+//! of one's own is asked for its description, once, as `rohrpost call NAME` does.
+
+use super::call::COMMON;
+use super::target::{Running, Target};
+use super::{Failure, say};
+use clap::builder::StyledStr;
+use clap::{Arg, Command, CommandFactory, ValueEnum};
+use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCandidate, PathCompleter};
+use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
+use rohrpost::common::OutputLevel;
+use rohrpost::config::{BUILTINS, Installation, Program};
+use rohrpost::description::Description;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// By this variable a shell tells that it asks, and which it is.
+const VARIABLE: &str = "ROHRPOST_COMPLETE";
+/// Nobody waits longer for a list that they did not call for.
+const PATIENCE: Duration = Duration::from_millis(300);
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  source <(rohrpost completions bash)        in ~/.bashrc
+  source <(rohrpost completions zsh)         in ~/.zshrc, after compinit
+  rohrpost completions fish | source         in ~/.config/fish/config.fish
+Names of modules, functions and data are those of the node that runs.")]
+pub(super) struct Arguments {
+    /// The shell.
+    shell: Shell,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Shell {
+    Bash,
+    Zsh,
+    Fish,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let shell: &dyn EnvCompleter = match arguments.shell {
+        Shell::Bash => &Bash,
+        Shell::Zsh => &Zsh,
+        Shell::Fish => &Fish,
+    };
+    // Found on PATH, it is found there after an update too; else it is this very file.
+    let called = std::env::args().next().unwrap_or_default();
+    let completer = if called.contains('/') { std::env::current_exe()?.display().to_string() } else { called };
+    let mut script = Vec::new();
+    shell.write_registration(VARIABLE, "rohrpost", "rohrpost", &completer, &mut script)?;
+    say(String::from_utf8_lossy(&script).trim_end());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Answers and ends, if a shell asks. To be called before anything else.
+pub(super) fn answer() {
+    CompleteEnv::with_factory(command).var(VARIABLE).complete();
+}
+
+/// The command line, with what each argument can be. Arguments mean the same wherever they have the same name.
+fn command() -> Command {
+    let mut command = super::Arguments::command();
+    let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
+    for name in names {
+        command = command.mut_subcommand(&name, |sub| sub.mut_args(|arg| completed(&name, arg)));
+    }
+    command
+}
+
+fn completed(command: &str, arg: Arg) -> Arg {
+    match (command, arg.get_id().as_str()) {
+        // A name that there is not yet.
+        ("new", _) => arg,
+        (_, "builtin") => from(arg, || BUILTINS.iter().map(CompletionCandidate::new).collect()),
+        (_, "name" | "names" | "module" | "modules") => from(arg, modules),
+        (_, "node") => from(arg, nodes),
+        (_, "function") => from(arg, functions),
+        (_, "data") => from(arg, data),
+        (_, "level") => from(arg, levels),
+        ("call", "arguments") => from(arg, call_arguments),
+        ("check" | "launch", "file") | (_, "config") => {
+            let toml =
+                PathCompleter::any().filter(|path| path.is_dir() || path.extension().is_some_and(|end| end == "toml"));
+            arg.add(ArgValueCompleter::new(toml))
+        }
+        _ => arg,
+    }
+}
+
+fn from(arg: Arg, candidates: fn() -> Vec<CompletionCandidate>) -> Arg {
+    arg.add(ArgValueCandidates::new(candidates))
+}
+
+/// The words so far, without this command's own name.
+fn words() -> Vec<String> {
+    let words = std::env::args().skip_while(|word| word != "--").skip(2);
+    words.collect()
+}
+
+/// The value of an option, if the words have it.
+fn option(words: &[String], name: &str) -> Option<String> {
+    let at = words.iter().position(|word| word == name)?;
+    words.get(at + 1).cloned()
+}
+
+fn target() -> Target {
+    let words = words();
+    Target::new(option(&words, "--config").map(PathBuf::from), option(&words, "--node"))
+}
+
+/// The configuration that is meant: the one named, or that of the one node that runs; and the node, if it is known.
+fn installation() -> Option<(Installation, Option<String>)> {
+    if let Ok(running) = target().find() {
+        return Some((running.installation, Some(running.node_name)));
+    }
+    let words = words();
+    let named = ["--config", "check", "launch"].iter().find_map(|before| option(&words, before))?;
+    Some((Installation::load(named.as_ref()).ok()?, None))
+}
+
+fn candidate(name: impl Into<std::ffi::OsString>, help: &str) -> CompletionCandidate {
+    CompletionCandidate::new(name).help(Some(StyledStr::from(help.to_owned())).filter(|_| !help.is_empty()))
+}
+
+fn modules() -> Vec<CompletionCandidate> {
+    let Some((installation, node)) = installation() else { return Vec::new() };
+    let modules = installation.modules.iter().filter(|module| node.as_ref().is_none_or(|node| module.node == *node));
+    let name = |name| {
+        let text = installation.classes.text(rohrpost::Name::class(name)).unwrap_or_default();
+        candidate(installation.classes.format(name), text)
+    };
+    modules.flat_map(|module| module.names()).map(name).collect()
+}
+
+fn nodes() -> Vec<CompletionCandidate> {
+    let Some((installation, _)) = installation() else { return Vec::new() };
+    installation.nodes.iter().map(|node| candidate(&node.name, "")).collect()
+}
+
+fn levels() -> Vec<CompletionCandidate> {
+    use OutputLevel::{Debug, Error, Info, Trace, Warn};
+    [Error, Warn, Info, Debug, Trace].iter().map(|level| candidate(level.name(), "")).collect()
+}
+
+fn functions() -> Vec<CompletionCandidate> {
+    let own = described().map(|description| description.functions).unwrap_or_default();
+    let own = own.iter().map(|function| candidate(&function.name, &function.text));
+    own.chain(COMMON.iter().map(|(name, text)| candidate(*name, text))).collect()
+}
+
+fn data() -> Vec<CompletionCandidate> {
+    let data = described().map(|description| description.data).unwrap_or_default();
+    data.iter().map(|item| candidate(&item.name, &item.text)).collect()
+}
+
+/// Arguments of functions that every module has; those of its own are numbers and words.
+fn call_arguments() -> Vec<CompletionCandidate> {
+    let words = words();
+    let is = |function| words.iter().any(|word| word == function);
+    match () {
+        () if is("get") => data(),
+        () if is("output-level") => levels(),
+        () => Vec::new(),
+    }
+}
+
+/// What the module says of itself that the words name.
+fn described() -> Option<Description> {
+    let running = target().find().ok()?;
+    let classes = &running.installation.classes;
+    let name = words().iter().find_map(|word| classes.parse_module(word).ok())?;
+    let module = running.installation.module(name)?;
+    match &module.program {
+        Program::Builtin(builtin) => rohrpost_modules::builtin::description(builtin, classes.name(name.class())?),
+        Program::Command(_) => asked(&running, name),
+    }
+}
+
+fn asked(running: &Running, module: rohrpost::Name) -> Option<Description> {
+    let mut tool = running.join(PATIENCE).ok()?;
+    let description = tool.describe(module).ok();
+    tool.close();
+    description
+}

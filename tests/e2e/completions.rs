@@ -1,0 +1,105 @@
+//! What a shell offers at a press of the tab key, by the scripts that `rohrpost completions` prints.
+
+use crate::harness::{OUTPUT, Place, probe};
+use std::process::Command;
+
+/// What bash offers for the last of these words.
+fn offered(place: &Place, words: &[&str]) -> Vec<String> {
+    let [before @ .., last] = words else { panic!("no words") };
+    let list = words.iter().map(|word| format!("'{word}'")).collect::<Vec<_>>().join(" ");
+    // What bash itself does at the key: it sets the words, and calls the function with command, word and the one before.
+    let script = format!(
+        "set -e; source <(\"$ROHRPOST\" completions bash); complete -p rohrpost >/dev/null
+         COMP_WORDS=({list}); COMP_CWORD={}; COMP_TYPE=9
+         _clap_complete_rohrpost rohrpost '{last}' '{}'
+         printf '%s\\n' \"${{COMPREPLY[@]}}\"",
+        words.len() - 1,
+        before.last().unwrap(),
+    );
+    let said = Command::new("bash")
+        .args(["--norc", "-c", &script])
+        .env("ROHRPOST", env!("CARGO_BIN_EXE_rohrpost"))
+        .env("ROHRPOST_DIR", place.memory())
+        .current_dir(place.path("."))
+        .output()
+        .unwrap();
+    assert!(said.status.success() && said.stderr.is_empty(), "{said:?}");
+    let said = String::from_utf8(said.stdout).unwrap();
+    // Options are offered everywhere.
+    said.lines()
+        .filter(|line| !line.is_empty() && line.starts_with('-') == last.starts_with('-'))
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn bash_offers_what_the_running_node_has() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let all = offered(&place, &["rohrpost", ""]);
+    for command in ["check", "launch", "call", "echo", "doctor", "completions"] {
+        assert!(all.iter().any(|offer| offer == command), "{command}: {all:?}");
+    }
+    assert_eq!(offered(&place, &["rohrpost", "com"]), ["completions"]);
+    assert_eq!(offered(&place, &["rohrpost", "completions", ""]), ["bash", "zsh", "fish"]);
+    assert_eq!(offered(&place, &["rohrpost", "call", "--js"]), ["--json"]);
+    // From the configuration.
+    let received = |name: &str| {
+        let mailbox = robot.node.look_at(robot.name(name)).unwrap();
+        mailbox.classes.iter().map(|class| class.received).sum::<u64>()
+    };
+    let before = (received("probe.0"), received("output.0"));
+    assert_eq!(offered(&place, &["rohrpost", "call", ""]), ["output.0", "probe.0"]);
+    assert_eq!(offered(&place, &["rohrpost", "status", "pro"]), ["probe.0"]);
+    assert_eq!(offered(&place, &["rohrpost", "log", "--module", "o"]), ["output.0"]);
+    assert_eq!(offered(&place, &["rohrpost", "log", "--level", "d"]), ["debug"]);
+    assert_eq!(offered(&place, &["rohrpost", "run", "m"]), ["mapper"]);
+    // What a built-in module offers.
+    assert_eq!(offered(&place, &["rohrpost", "call", "output.0", "li"]), ["lines_from"]);
+    assert_eq!(offered(&place, &["rohrpost", "echo", "output.0", ""]), ["line"]);
+    assert_eq!((received("probe.0"), received("output.0")), before, "nobody was sent anything for this");
+    // What one of our own offers only it knows.
+    let functions = offered(&place, &["rohrpost", "call", "probe.0", ""]);
+    assert!(["count", "tell", "on", "get"].iter().all(|name| functions.iter().any(|f| f == name)), "{functions:?}");
+    assert_eq!(offered(&place, &["rohrpost", "call", "probe.0", "cou"]), ["count", "count_again"]);
+    assert_eq!(offered(&place, &["rohrpost", "call", "probe.0", "get", "b"]), ["beat"]);
+    assert_eq!(offered(&place, &["rohrpost", "echo", "probe.0", ""]), ["beat", "silence"]);
+    launch.stop();
+    place.assert_empty();
+}
+
+#[test]
+fn without_a_node_the_named_configuration_is_asked() {
+    let place = Place::new();
+    place.config_of(
+        "arm",
+        "[nodes.base]\ntools = [0, 1]\n[nodes.desk]\ntools = [2, 3]\n",
+        &["[[module]]\nname = \"probe.7\"\nnode = \"desk\"\nprogram = \"nowhere\"\n"],
+    );
+    assert_eq!(offered(&place, &["rohrpost", "call", ""]), [""; 0], "nothing runs, and nothing is said of it");
+    assert_eq!(offered(&place, &["rohrpost", "call", "--config", "arm.toml", "pro"]), ["probe.7"]);
+    assert_eq!(offered(&place, &["rohrpost", "check", "arm.toml", "--node", ""]), ["base", "desk"]);
+    assert_eq!(offered(&place, &["rohrpost", "check", "ar"]), ["arm.toml"]);
+    // A configuration that is wrong is no reason to disturb the one who types.
+    std::fs::write(place.path("wrong.toml"), "nonsense").unwrap();
+    assert_eq!(offered(&place, &["rohrpost", "call", "--config", "wrong.toml", ""]), [""; 0]);
+    assert_eq!(offered(&place, &["rohrpost", "new", "pro"]), [""; 0], "a name that there is not yet");
+}
+
+#[test]
+fn every_shell_can_read_its_script() {
+    let place = Place::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = place.say(&["completions", shell]).ok();
+        assert!(script.contains("ROHRPOST_COMPLETE"), "{script}");
+        let file = place.path(shell);
+        std::fs::write(&file, script).unwrap();
+        // Only those that are here can be asked.
+        if let Ok(said) = Command::new(shell).arg("-n").arg(&file).output() {
+            assert!(said.status.success(), "{shell}: {said:?}");
+        }
+    }
+    let said = place.say(&["completions", "csh"]);
+    assert_eq!(said.code, Some(2));
+    assert!(said.err.contains("bash, zsh, fish"), "{}", said.err);
+}

@@ -1,0 +1,69 @@
+//! `rohrpost doctor` on the computer that the tests run on. What it says of others is tested beside its code.
+
+use crate::harness::{OUTPUT, Place, probe, wait};
+use nix::sys::signal::Signal;
+use serde_json::Value;
+
+/// Its findings; the exit code says whether one is bad.
+fn examine(place: &Place, arguments: &[&str]) -> Vec<Value> {
+    let said = place.say(&[&["doctor", "--json"], arguments].concat());
+    let json: Value = serde_json::from_str(&said.out).unwrap_or_else(|error| panic!("{error}: {said:?}"));
+    assert_eq!(said.code, Some(i32::from(json["state"] == "bad")), "{said:?}");
+    json["findings"].as_array().unwrap().clone()
+}
+
+fn find<'a>(findings: &'a [Value], what: &str) -> &'a Value {
+    findings.iter().find(|finding| finding["what"] == what).unwrap_or_else(|| panic!("no {what} in {findings:#?}"))
+}
+
+#[test]
+fn this_computer_is_examined() {
+    let place = Place::new();
+    let config = place.config(&[OUTPUT, &probe("probe.0", "", "")]);
+    let findings = examine(&place, &["--config", config.to_str().unwrap()]);
+    for finding in &findings {
+        assert!(!finding["is"].as_str().unwrap().is_empty() && !finding["why"].as_str().unwrap().is_empty());
+        assert_eq!(finding["state"] == "ok", finding["mend"].is_null(), "what is not well can be mended: {finding}");
+    }
+    assert_eq!(find(&findings, "kernel")["state"], "ok");
+    let real_time = find(&findings, "real time")["is"].as_str().unwrap();
+    assert!(real_time.ends_with("test.toml asks for none"), "{real_time}");
+    let memory = find(&findings, "shared memory")["is"].as_str().unwrap();
+    assert!(memory.contains("test.toml needs 8"), "two modules of 444 KiB: {memory}");
+    let directory = find(&findings, "node directory")["is"].as_str().unwrap();
+    assert!(directory.starts_with(place.memory().to_str().unwrap()), "{directory}");
+    // For people, with the same words.
+    let page = place.say(&["doctor"]).out;
+    assert!(page.contains(" warnings, ") && page.contains("ok    kernel"), "{page}");
+    place.assert_empty();
+}
+
+#[test]
+fn waking_up_is_measured() {
+    let place = Place::new();
+    let findings = examine(&place, &["--measure"]);
+    let is = find(&findings, "wake-up")["is"].as_str().unwrap();
+    assert!(is.contains("of 1000 under "), "{is}");
+}
+
+#[test]
+fn what_a_crash_left_is_found() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let findings = examine(&place, &[]);
+    assert_eq!(find(&findings, "node")["state"], "ok");
+    assert!(find(&findings, "node")["is"].as_str().unwrap().contains(&format!("launched by process {}", launch.pid())));
+    launch.signal(Signal::SIGKILL);
+    launch.end();
+    wait("its modules end", || robot.pids().is_empty().then_some(()));
+    drop(robot);
+    let findings = examine(&place, &[]);
+    assert_eq!(
+        (&find(&findings, "node")["state"], &find(&findings, "node")["mend"]),
+        (&"warn".into(), &"rohrpost clean".into())
+    );
+    let cleaned = place.say(&["clean", "--json"]).json();
+    assert_eq!(cleaned["nodes"][0]["removed"], true);
+    assert!(examine(&place, &[]).iter().all(|finding| finding["what"] != "node"));
+    place.assert_empty();
+}

@@ -1,0 +1,81 @@
+//! `rohrpost new`: what it makes is built, tested, launched and called, as its README says.
+
+use crate::harness::{Place, wait};
+use std::path::Path;
+use std::process::Command;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// Cargo in the new project, without the network. It builds into the folder and by the profile of this workspace, so that
+/// what was built for these tests is not built again.
+fn cargo(project: &Path, command: &str) -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    // The target folder is reached as `target`, so that robot.toml finds the program where it looks for it.
+    cargo.current_dir(project).env_remove("CARGO_TARGET_DIR").args([command, "--offline", "--quiet"]);
+    for setting in [
+        "profile.dev.opt-level=1",
+        "profile.dev.debug=\"line-tables-only\"",
+        "profile.dev.package.\"*\".opt-level=0",
+        "profile.dev.package.\"*\".debug=false",
+    ] {
+        cargo.args(["--config", setting]);
+    }
+    cargo
+}
+
+#[test]
+fn a_new_project_builds_runs_and_has_a_test_that_passes() {
+    let place = Place::new();
+    let made = place.say(&["new", "wind-vane"]).ok();
+    assert!(made.contains("cargo build && rohrpost launch robot.toml"), "{made}");
+    let project = place.path("wind-vane");
+    // The versions that are here already.
+    std::fs::copy(Path::new(ROOT).join("Cargo.lock"), project.join("Cargo.lock")).unwrap();
+    // target/debug/deps/e2e-…
+    let target = std::env::current_exe().unwrap().ancestors().nth(3).unwrap().to_owned();
+    std::os::unix::fs::symlink(&target, project.join("target")).unwrap();
+    let tested = cargo(&project, "test").env("ROHRPOST_DIR", place.memory()).output().unwrap();
+    assert!(tested.status.success(), "{tested:?}");
+    assert!(String::from_utf8_lossy(&tested.stdout).contains("1 passed"), "{tested:?}");
+    let built = cargo(&project, "build").output().unwrap();
+    assert!(built.status.success(), "{built:?}");
+
+    let config = project.join("robot.toml");
+    place.say(&["check", config.to_str().unwrap()]).ok();
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    wait("wind-vane.0 is on", || {
+        launch.assert_runs();
+        (robot.state("wind-vane.0") == "on").then_some(())
+    });
+    let offered = place.say(&["call", "wind-vane.0"]).ok();
+    assert!(offered.contains("restart <from: u64> -> u64") && offered.contains("How far it is."), "{offered}");
+    place.say(&["call", "wind-vane.0", "restart", "1000"]).ok();
+    let count = place.say(&["echo", "wind-vane.0", "count", "--count", "1", "--json"]).json();
+    assert!(count["value"].as_u64().unwrap() > 1000, "{count}");
+    assert!(place.say(&["log"]).ok().contains("counts 10 times a second"));
+    launch.stop();
+    place.assert_empty();
+    // What was built for a project in a folder that is gone is of no use to anybody.
+    let cleaned = cargo(&project, "clean").args(["--package", "wind-vane"]).output().unwrap();
+    assert!(cleaned.status.success(), "{cleaned:?}");
+}
+
+#[test]
+fn nothing_that_is_there_is_written_over() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("arm")).unwrap();
+    std::fs::write(place.path("arm/notes"), "mine").unwrap();
+    let told = place.say(&["new", "arm"]).fails();
+    assert!(told.contains("arm is not empty; name another folder with --path DIR"), "{told}");
+    assert_eq!(std::fs::read_dir(place.path("arm")).unwrap().count(), 1);
+    let told = place.say(&["new", "arm", "--path", "arm/notes"]).fails();
+    assert!(told.contains("arm/notes: Not a directory"), "{told}");
+    let told = place.say(&["new", "Arm"]).fails();
+    assert!(told.contains("a letter first: `arm`"), "{told}");
+    let told = place.say(&["new", "arm", "--path", "here", "--rohrpost", "arm"]).fails();
+    assert!(told.contains("arm holds no sources of Rohrpost; say where they are with --rohrpost DIR"), "{told}");
+    assert!(!place.path("here").exists());
+    place.say(&["new", "arm", "--path", "deep/er", "--rohrpost", ROOT]).ok();
+    assert!(place.path("deep/er/src/lib.rs").exists());
+}
