@@ -14,6 +14,7 @@ use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
 use rohrpost::common::OutputLevel;
 use rohrpost::config::{BUILTINS, Installation, Program};
 use rohrpost::description::Description;
+use rohrpost::{Name, ToolLink};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -63,10 +64,14 @@ pub(super) fn answer() {
 
 /// The command line, with what each argument can be. Arguments mean the same wherever they have the same name.
 fn command() -> Command {
-    let mut command = super::Arguments::command();
+    with_candidates(super::Arguments::command())
+}
+
+fn with_candidates(mut command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
     for name in names {
-        command = command.mut_subcommand(&name, |sub| sub.mut_args(|arg| completed(&name, arg)));
+        let completed = |sub: Command| with_candidates(sub.mut_args(|arg| completed(&name, arg)));
+        command = command.mut_subcommand(&name, completed);
     }
     command
 }
@@ -81,8 +86,9 @@ fn completed(command: &str, arg: Arg) -> Arg {
         (_, "function") => from(arg, functions),
         (_, "data") => from(arg, data),
         (_, "level") => from(arg, levels),
+        (_, "parameter") => from(arg, parameters),
         ("call", "arguments") => from(arg, call_arguments),
-        ("check" | "launch", "file") | (_, "config") => {
+        ("check" | "launch" | "load", "file") | (_, "config") => {
             let toml =
                 PathCompleter::any().filter(|path| path.is_dir() || path.extension().is_some_and(|end| end == "toml"));
             arg.add(ArgValueCompleter::new(toml))
@@ -130,7 +136,7 @@ fn modules() -> Vec<CompletionCandidate> {
     let Some((installation, node)) = installation() else { return Vec::new() };
     let modules = installation.modules.iter().filter(|module| node.as_ref().is_none_or(|node| module.node == *node));
     let name = |name| {
-        let text = installation.classes.text(rohrpost::Name::class(name)).unwrap_or_default();
+        let text = installation.classes.text(Name::class(name)).unwrap_or_default();
         candidate(installation.classes.format(name), text)
     };
     modules.flat_map(|module| module.names()).map(name).collect()
@@ -157,6 +163,14 @@ fn data() -> Vec<CompletionCandidate> {
     data.iter().map(|item| candidate(&item.name, &item.text)).collect()
 }
 
+fn parameters() -> Vec<CompletionCandidate> {
+    let found = target().find().ok().and_then(|running| {
+        let name = named(&running)?;
+        asked(&running, |tool| tool.parameters(name).ok())
+    });
+    found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.name, &parameter.text)).collect()
+}
+
 /// Arguments of functions that every module has; those of its own are numbers and words.
 fn call_arguments() -> Vec<CompletionCandidate> {
     let words = words();
@@ -172,17 +186,23 @@ fn call_arguments() -> Vec<CompletionCandidate> {
 fn described() -> Option<Description> {
     let running = target().find().ok()?;
     let classes = &running.installation.classes;
-    let name = words().iter().find_map(|word| classes.parse_module(word).ok())?;
+    let name = named(&running)?;
     let module = running.installation.module(name)?;
     match &module.program {
         Program::Builtin(builtin) => rohrpost_modules::builtin::description(builtin, classes.name(name.class())?),
-        Program::Command(_) => asked(&running, name),
+        Program::Command(_) => asked(&running, |tool| tool.describe(name).ok()),
     }
 }
 
-fn asked(running: &Running, module: rohrpost::Name) -> Option<Description> {
+/// The module that the words name.
+fn named(running: &Running) -> Option<Name> {
+    words().iter().find_map(|word| running.installation.classes.parse_module(word).ok())
+}
+
+/// What a module answers, if it does in time.
+fn asked<T>(running: &Running, ask: impl FnOnce(&mut ToolLink) -> Option<T>) -> Option<T> {
     let mut tool = running.join(PATIENCE).ok()?;
-    let description = tool.describe(module).ok();
+    let answer = ask(&mut tool);
     tool.close();
-    description
+    answer
 }
