@@ -4,7 +4,7 @@ use crate::harness::{OUTPUT, Place, probe};
 use std::process::Command;
 
 /// What bash offers for the last of these words.
-fn offered(place: &Place, words: &[&str]) -> Vec<String> {
+pub(crate) fn offered(place: &Place, words: &[&str]) -> Vec<String> {
     let [before @ .., last] = words else { panic!("no words") };
     let list = words.iter().map(|word| format!("'{word}'")).collect::<Vec<_>>().join(" ");
     // What bash itself does at the key: it sets the words, and calls the function with command, word and the one before.

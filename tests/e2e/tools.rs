@@ -137,6 +137,7 @@ fn a_mistaken_command_line_is_usage() {
         "call",
         "echo",
         "log",
+        "param",
         "clean",
         "run",
         "doctor",
