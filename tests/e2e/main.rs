@@ -27,5 +27,7 @@ mod readme;
 mod restart;
 mod screen;
 mod start;
+mod terminal;
 mod tools;
 mod tools_data;
+mod top;
