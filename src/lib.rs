@@ -53,14 +53,14 @@
 
 pub use rohrpost_config as config;
 pub use rohrpost_mailbox as mailbox;
-pub use rohrpost_mailbox::{Class, Name, Priority, SystemTime};
+pub use rohrpost_mailbox::{Class, Interest, Name, Priority, Ready, SystemTime, Watch};
 pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::macro_support::serde;
 pub use rohrpost_modules::runtime::{
     ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, describe,
-    find_running,
+    find_other_versions, find_running,
 };
 pub use rohrpost_modules::{
     Module, ModuleError, choice, common, data, description, interface, interfaces, launch, output, parameter,

@@ -196,8 +196,13 @@ impl Page<'_> {
         self.line("GUI");
         self.line("");
         for show in show {
-            let rate = show.rate.map_or("each that comes".into(), |rate| format!("at most {rate} a second"));
-            self.entry("shows", &format!("{} of {}, {rate}", show.data, self.name(show.from)));
+            let rate = match show.rate {
+                Some(rate) if rate > 0.0 => format!("at most {rate} a second"),
+                Some(_) => "each that comes".into(),
+                None => "as often as its view wants".into(),
+            };
+            let data = show.data.as_deref().unwrap_or("all that has a view");
+            self.entry("shows", &format!("{data} of {}, {rate}", self.name(show.from)));
         }
     }
 
@@ -237,7 +242,11 @@ fn starts(module: &Module) -> String {
         Start::Off => "off, until it is switched on",
     };
     let (ready, stop) = (duration_text(module.ready_within), duration_text(module.stop_within));
-    format!("{state}; must be ready within {ready}, has {stop} to stop")
+    let mut words = format!("{state}; must be ready within {ready}, has {stop} to stop");
+    if !module.spin.is_zero() {
+        let _ = write!(words, "; spins for {}", duration_text(module.spin));
+    }
+    words
 }
 
 fn restart(restart: &Restart) -> String {

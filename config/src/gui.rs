@@ -16,9 +16,9 @@ pub struct Gui {
 pub struct Show {
     /// Module that it comes from.
     pub from: Name,
-    /// Name of the data in the module's interface.
-    pub data: String,
-    /// Times a second at most; none: each one that comes.
+    /// Name of the data in the module's interface; none: all that the GUI knows how to draw.
+    pub data: Option<String>,
+    /// Times a second at most; 0: each one that comes; none: as the GUI thinks best.
     pub rate: Option<f64>,
     /// Line in the file.
     pub line: usize,
@@ -34,7 +34,8 @@ impl Gui {
             let Some(read) = Show::read(item, directory) else { continue };
             if let Some(first) = show.iter().find(|first| (first.from, &first.data) == (read.from, &read.data)) {
                 let from = directory.classes.format(read.from);
-                item.report(format!("`{}` of `{from}` is shown in line {} already; drop one", read.data, first.line));
+                let what = read.data.as_ref().map_or("everything".into(), |data| format!("`{data}`"));
+                item.report(format!("{what} of `{from}` is shown in line {} already; drop one", first.line));
             }
             show.push(read);
         }
@@ -54,9 +55,9 @@ impl Show {
             };
             known.inspect_err(missing).ok()
         });
-        let data = section.required("data", "data = \"scan\"").and_then(|item| item.text("scan"));
+        let data = section.get("data").and_then(|item| item.text("scan"));
         let rate = section.get("rate").and_then(|item| item.number(0.0..=1000.0, "10.0"));
         section.finish();
-        Some(Self { from: from?, data: data?.into(), rate: rate.filter(|rate| *rate > 0.0), line: item.line })
+        Some(Self { from: from?, data: data.map(Into::into), rate, line: item.line })
     }
 }

@@ -61,7 +61,7 @@ pub use flow::Flow;
 pub use gui::{Gui, Show};
 pub use installation::Installation;
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
-pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, Start};
+pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
 pub use node::{Node, System};
 pub use output::{Level, LineFormat, Output};
 pub use program::{MissingProgram, find_program};

@@ -5,6 +5,7 @@ use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes};
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
+use crate::units::duration_text;
 use rohrpost_mailbox::Name;
 use serde::Deserialize;
 use std::time::Duration;
@@ -20,6 +21,9 @@ pub enum Program {
     /// A program and its arguments.
     Command(Vec<String>),
 }
+
+/// Longest time that a module may look for packages awake before it sleeps: longer than that nobody is about to come.
+pub const SPIN_MAX: Duration = Duration::from_millis(1);
 
 /// Whether a module works after launch, or waits to be switched on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -93,6 +97,8 @@ pub struct Module {
     pub ready_within: Duration,
     /// Time from being told to end until it is killed.
     pub stop_within: Duration,
+    /// Time for which it looks for packages awake before it sleeps.
+    pub spin: Duration,
     /// Its mailboxes.
     pub mailboxes: Mailboxes,
     /// Line of its `[[module]]` in the file.
@@ -144,6 +150,7 @@ impl Context<'_> {
         let restart = section.get("restart").map(|item| Restart::read(&item, &what)).unwrap_or_default();
         let ready_within = section.get("ready-within").and_then(|item| item.duration_above_zero("10 s"));
         let stop_within = section.get("stop-within").and_then(|item| item.duration_above_zero("2 s"));
+        let spin = section.get("spin").and_then(|item| spin(&item)).unwrap_or_default();
         let boxes = section.section("mailbox", &format!("{what}, mailbox"));
         let (mailboxes, mailbox_lines) = Mailboxes::read(boxes, &what, section.line);
         let line = section.line;
@@ -161,6 +168,7 @@ impl Context<'_> {
             restart,
             ready_within: ready_within.unwrap_or(Duration::from_secs(10)),
             stop_within: stop_within.unwrap_or(Duration::from_secs(2)),
+            spin,
             mailboxes,
             line,
             index,
@@ -249,6 +257,18 @@ fn command(item: &Item<'_>) -> Option<Vec<String>> {
         item.report(format!("`program` is a list of texts, the program first; write `program = {example}`"));
     }
     words
+}
+
+fn spin(item: &Item<'_>) -> Option<Duration> {
+    let spin = item.duration("20 us")?;
+    if spin <= SPIN_MAX {
+        return Some(spin);
+    }
+    let (spin, most) = (duration_text(spin), duration_text(SPIN_MAX));
+    item.report(format!(
+        "`spin` is \"{spin}\"; write at most \"{most}\", such as `spin = \"20 us\"`: it keeps a processor busy all that time"
+    ));
+    None
 }
 
 fn settings(section: &Section<'_>) -> Option<toml::Table> {

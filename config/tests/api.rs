@@ -23,9 +23,10 @@ fn every_key_arrives() {
     assert_eq!(full.folder, Path::new("conf"));
     assert_eq!(full.scheduling(Class(159)), Scheduling::Normal { nice: 0 });
     assert_eq!(full.scheduling(Class(160)), Scheduling::Fifo { priority: 1 });
-    let base = Node { name: "base".into(), address: Some("10.0.0.1".into()), mode: 0o770, tools: 0..=15, line: 19 };
+    let base = Node { name: "base".into(), address: Some("10.0.0.1".into()), mode: 0o770, tools: 0..=15, line: 20 };
     assert_eq!(full.node("base"), Some(&base));
     assert_eq!(full.time, TimeSource::Local);
+    assert_eq!(full.parameters, Some(PathBuf::from("conf/tuned.toml")));
     let output = &full.output;
     assert_eq!((output.rate, output.burst, output.ring, output.journal), (50, 80, 500, true));
     assert_eq!(output.file, Some(PathBuf::from("conf/robot.log")));

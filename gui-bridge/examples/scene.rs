@@ -36,12 +36,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sink = match std::env::args().nth(1).as_deref() {
         Some("--window") => Sink::Window,
         Some(url) if url.starts_with("rerun") => Sink::Viewer(url.into()),
-        Some(path) => Sink::File(path.into()),
-        None => Sink::File("scene.rrd".into()),
+        Some(path) => Sink::file(path),
+        None => Sink::file("scene.rrd"),
     };
-    let live = !matches!(sink, Sink::File(_));
+    let live = !matches!(sink, Sink::File { .. });
     let start_ns = 1_750_000_000_000_000_000;
-    let mut scene = Scene::open("example", &sink, start_ns)?;
+    let mut scene = Scene::open("example", sink, 0.0, start_ns)?;
     let mut map = Map::default();
     for tick in 0..=SECONDS * HZ {
         if live {
@@ -49,13 +49,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         scene.set_time(start_ns + tick * 1_000_000_000 / HZ);
         let seconds = tick as f64 / HZ as f64;
-        drive(&mut scene, seconds)?;
+        drive(&mut scene, seconds);
         if tick % 4 == 0 {
             look(&mut scene, &mut map, seconds)?;
         }
         if tick % HZ == 0 {
-            flow(&mut scene, tick / HZ)?;
-            happen(&mut scene, tick / HZ)?;
+            flow(&mut scene, tick / HZ);
+            happen(&mut scene, tick / HZ);
+        }
+        if !live {
+            // Faster than it would happen, but all of it.
+            scene.settle(std::time::Duration::from_secs(10));
         }
     }
     scene.close()?;
@@ -94,9 +98,9 @@ fn pose(seconds: f64) -> Pose {
     Pose { x_m, y_m, heading_rad: along_y.atan2(along_x) }
 }
 
-fn drive(scene: &mut Scene, seconds: f64) -> Result<(), rohrpost_gui_bridge::DrawError> {
+fn drive(scene: &mut Scene, seconds: f64) {
     let truth = pose(seconds);
-    scene.pose("slam.0", &truth)?;
+    scene.pose("slam.0", &truth);
     let drift = seconds / SECONDS as f64;
     let start = pose(0.0);
     let (sin, cos) = (0.07 * drift).sin_cos();
@@ -106,7 +110,7 @@ fn drive(scene: &mut Scene, seconds: f64) -> Result<(), rohrpost_gui_bridge::Dra
         y_m: start.y_m + sin * x + cos * y,
         heading_rad: truth.heading_rad + 0.07 * drift,
     };
-    scene.odometry("motor.0", &Odometry { pose, twist: Twist::default() })
+    scene.odometry("motor.0", &Odometry { pose, twist: Twist::default() });
 }
 
 /// How far it is from `from` in direction `angle` to the next wall.
@@ -142,7 +146,7 @@ fn look(scene: &mut Scene, map: &mut Map, seconds: f64) -> Result<(), rohrpost_g
             .collect(),
         pose: None,
     };
-    scene.scan("laser.0", &scan, "slam.0", &Pose::default())?;
+    scene.scan("laser.0", &scan, "slam.0", &Pose::default());
     map.changed().iter().try_for_each(|tile| scene.grid("slam.0", tile))
 }
 
@@ -201,7 +205,7 @@ impl Map {
     }
 }
 
-fn flow(scene: &mut Scene, second: u64) -> Result<(), rohrpost_gui_bridge::DrawError> {
+fn flow(scene: &mut Scene, second: u64) {
     let wave = |period: f64| (second as f64 / period * TAU).sin();
     let burst = if (34..40).contains(&second) { 1.0 } else { 0.0 };
     for (class, rate, losses, p50, p99) in [
@@ -216,22 +220,22 @@ fn flow(scene: &mut Scene, second: u64) -> Result<(), rohrpost_gui_bridge::DrawE
             60.0 + 35.0 * burst,
         ),
     ] {
-        scene.traffic(class, rate, losses)?;
-        scene.latency(class, p50, p99)?;
+        scene.traffic(class, rate, losses);
+        scene.latency(class, p50, p99);
     }
     let battery = Value::Map(vec![
         ("volts".into(), Value::F(12.4 - second as f64 * 0.01 + 0.05 * wave(3.0))),
         ("maker".into(), Value::Text("Akku AG".into())),
     ]);
-    scene.generic("battery.0", "gauge", &battery)
+    scene.generic("battery.0", "gauge", &battery);
 }
 
-fn happen(scene: &mut Scene, second: u64) -> Result<(), rohrpost_gui_bridge::DrawError> {
+fn happen(scene: &mut Scene, second: u64) {
     let modules = ["motor.0", "laser.0", "slam.0", "pilot.0", "output.0"];
     for (index, module) in modules.into_iter().enumerate() {
         match second.checked_sub(index as u64) {
-            Some(0) => scene.module_state(module, "starting", "")?,
-            Some(2) => scene.module_state(module, "on", "")?,
+            Some(0) => scene.module_state(module, "starting", ""),
+            Some(2) => scene.module_state(module, "on", ""),
             _ => {}
         }
     }
@@ -246,6 +250,6 @@ fn happen(scene: &mut Scene, second: u64) -> Result<(), rohrpost_gui_bridge::Dra
         41 => scene.module_state("output.0", "on", "72 lines were dropped"),
         48 => scene.output_line("slam.0", Level::Info, "loop closed: 0.31 m, 4.0° off"),
         55 => scene.output_line("motor.0", Level::Warning, "left wheel: 41 °C"),
-        _ => Ok(()),
+        _ => {}
     }
 }

@@ -1,28 +1,29 @@
-//! The bridge as a module: subscribes to what configuration names, and draws it.
+//! The bridge as a module: hears what the configuration names, and draws it.
 //!
-//! What to draw is decided by the type that a module's description tells, not by its class: a scan is a scan whoever sends
-//! it. Types that are not known here are drawn by their description.
+//! Its one thread never waits for Rerun: it turns packages into rows of the scene, whose store takes them at once. So its
+//! mailboxes are empty soon, whatever a viewer does; and if they were not, it would be the bridge that misses something, and
+//! never a sender that waits.
 
-use crate::{Connection, DrawError, Level, Scene, Sink};
-use rohrpost::common::OutputLevel;
-use rohrpost::config::Show;
+use crate::store::DrawingCounts;
+use crate::subjects::Subjects;
+use crate::view::Views;
+use crate::{RATE_HZ, Scene, Sink, views};
 use rohrpost::interface::{Interface, Proxy};
 use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
 use rohrpost::mailbox::{ModuleState, Node};
-use rohrpost::output::OutputLine;
 use rohrpost::survey::Survey;
-use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose};
-use rohrpost::value::{Data, decode};
-use rohrpost::{Context, Module, ModuleError, Name, Rate, Received, Subscription};
+use rohrpost::{Context, Module, ModuleError, Name, Received};
 use serde::Deserialize;
+use std::marker::PhantomData;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// States and charts are drawn so often.
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
-/// A module whose description is wanted answers within this time, or is asked again at the next survey.
+/// The collector answers within this time, or its earlier lines are not drawn.
 const PATIENCE: Duration = Duration::from_millis(300);
+const MIB: u64 = 1024 * 1024;
 
 /// What the configuration says of the bridge.
 #[derive(Deserialize)]
@@ -30,83 +31,78 @@ const PATIENCE: Duration = Duration::from_millis(300);
 pub struct Settings {
     /// File to write, from the configuration file's folder.
     file: Option<PathBuf>,
-    /// `window` opens the Rerun viewer, if it is installed; else the address of one that runs (`rerun+http://…/proxy`).
+    /// When the file is this large, it becomes `NAME.old.rrd`, and a new one is begun.
+    #[serde(default = "file_max_mib")]
+    file_max_mib: u64,
+    /// `window` opens the Rerun viewer, if it is installed; else the address of one that runs or will run
+    /// (`rerun+http://…/proxy`).
     viewer: Option<String>,
+    /// No entity is drawn more often; 0 is no limit.
+    #[serde(default = "rate_hz")]
+    rate_hz: f64,
 }
 
-/// What to do with the values of one subscription.
-#[derive(Clone, Copy)]
-enum Kind {
-    Scan,
-    Odometry,
-    Pose,
-    Grid,
-    Line,
-    Unknown,
+fn file_max_mib() -> u64 {
+    512
 }
 
-/// One thing that is drawn.
-struct Drawn {
-    from: Name,
-    module: String,
-    data: String,
-    rate: Rate,
-    /// None until its module has described it.
-    way: Option<Way>,
-    /// Its module has said that it has no such data.
-    refused: bool,
+fn rate_hz() -> f64 {
+    RATE_HZ
 }
 
-struct Way {
-    subscription: Subscription<()>,
-    kind: Kind,
-    item: rohrpost::description::DataItem,
+/// Draws what happens.
+#[rohrpost::interface(class = "gui")]
+pub trait Drawing {
+    /// What became of all that was to be drawn since it was switched on.
+    #[command(16, idempotent)]
+    fn counts(&mut self) -> DrawingCounts;
 }
 
-/// Draws what a robot does.
-pub struct Bridge {
+/// Draws what a robot does, with a user's views `V` before its own.
+pub struct Bridge<V> {
     sink: Sink,
-    drawn: Vec<Drawn>,
+    rate_hz: f64,
+    subjects: Subjects,
     /// None while switched off.
     scene: Option<Scene>,
     node: Arc<Node>,
     node_name: String,
     last: Option<Survey>,
+    views: PhantomData<V>,
 }
 
-impl Module for Bridge {
+impl<V: Views> Module for Bridge<V> {
     type Settings = Settings;
-    type Interfaces = ();
+    type Interfaces = DrawingInterface;
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         let installation = context.installation();
-        let sink = match (&settings.viewer, &settings.file) {
+        let Settings { file, file_max_mib, viewer, rate_hz } = settings;
+        let sink = match (viewer, file) {
             (Some(viewer), _) if viewer == "window" => Sink::Window,
-            (Some(address), _) => Sink::Viewer(address.clone()),
-            (None, Some(file)) => Sink::File(installation.resolve(file)),
+            (Some(address), _) => Sink::Viewer(address),
+            (None, Some(file)) => {
+                Sink::File { path: installation.resolve(&file), bytes_max: file_max_mib.saturating_mul(MIB) }
+            }
             (None, None) => return Err(ModuleError::new("draw where? set `file` or `viewer` in its settings")),
         };
-        let text = |name| installation.classes.format(name);
-        let mut drawn: Vec<Drawn> = installation.gui.show.iter().map(|show| wanted(show, text(show.from))).collect();
-        // What modules say is always worth seeing.
-        if let Some(class) = installation.classes.id(CollectorInterface::CLASS) {
-            let from = Name::new(installation.system.id, class.0, 0, 0);
-            if installation.module(from).is_some() {
-                let (module, data) = (text(from), "line".to_owned());
-                drawn.push(Drawn { from, module, data, rate: Rate::Each, way: None, refused: false });
-            }
+        if !(0.0..=1000.0).contains(&rate_hz) {
+            return Err(ModuleError::new(format!("`rate-hz` is {rate_hz}; use 0 (no limit) to 1000")));
         }
         let me = installation.module(context.me()).ok_or_else(|| ModuleError::new("it is not in the configuration"))?;
         let node_name = me.node.clone();
         let node = context.link().borrow().participant().node().clone();
+        let subjects = Subjects::new(V::make(), context);
         context.set_period(SURVEY_PERIOD);
-        Ok(Self { sink, drawn, scene: None, node, node_name, last: None })
+        Ok(Self { sink, rate_hz, subjects, scene: None, node, node_name, last: None, views: PhantomData })
     }
 
     fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let now_ns = context.now().ns;
-        self.scene = Some(Scene::open(&context.installation().name, &self.sink, now_ns)?);
-        self.subscribe(context);
+        let scene = Scene::open(&context.installation().name, self.sink.clone(), self.rate_hz, now_ns)?;
+        self.scene.insert(scene).arrange(self.subjects.layout());
+        let survey = Survey::new(&self.node, context.installation(), &self.node_name)?;
+        self.find(context, &survey);
         Ok(())
     }
 
@@ -118,129 +114,56 @@ impl Module for Bridge {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        self.subscribe(context);
-        let now_ns = context.now().ns;
         let survey = Survey::new(&self.node, context.installation(), &self.node_name)?;
+        self.find(context, &survey);
+        self.subjects.repair(context);
+        let now_ns = context.now().ns;
         let Some(scene) = &mut self.scene else { return Ok(()) };
-        if scene.connection(Duration::ZERO) == Connection::Lost {
-            // Rerun never connects again by itself; a new start does.
-            return Err(ModuleError::new("the viewer has gone; switch this module off and on to connect again"));
+        if let Some(why) = scene.failure() {
+            return Err(ModuleError::new(why));
         }
         scene.set_time(now_ns);
-        states(scene, &survey, context)?;
+        states(scene, &survey, context);
         if let Some(last) = &self.last {
-            charts(scene, &survey, last, context)?;
+            charts(scene, &survey, last, context);
         }
         self.last = Some(survey);
         Ok(())
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        let Some(scene) = &mut self.scene else { return Ok(()) };
-        let is_it = |drawn: &&Drawn| drawn.way.as_ref().is_some_and(|way| data.is_of(&way.subscription));
-        let Some(drawn) = self.drawn.iter().find(is_it) else { return Ok(()) };
-        let carrier = self.drawn.iter().find(|d| matches!(&d.way, Some(Way { kind: Kind::Odometry, .. })));
-        scene.set_time(data.head.stamp_ns);
-        let drawer = Drawer { carrier: carrier.map_or("", |carrier| &carrier.module), context };
-        match drawer.draw(scene, drawn, data.value) {
-            Ok(()) => Ok(()),
-            Err(DrawError::Rerun(error)) => Err(error.into()),
-            Err(error) => {
-                tracing::warn!("{error}");
-                Ok(())
+        if let Some(scene) = &mut self.scene {
+            self.subjects.draw(scene, context, data);
+        }
+        Ok(())
+    }
+}
+
+impl<V: Views> Drawing for Bridge<V> {
+    fn counts(&mut self) -> DrawingCounts {
+        self.scene.as_ref().map(Scene::counts).unwrap_or_default()
+    }
+}
+
+impl<V> Bridge<V> {
+    /// Looks for what has begun to run since the last time.
+    fn find(&mut self, context: &mut Context, survey: &Survey) {
+        let collector = context.installation().classes.id(CollectorInterface::CLASS);
+        // One that starts or hangs would be waited for in vain.
+        let runs = |name: Name| {
+            let process = survey.module(name).and_then(|module| module.process.as_ref());
+            process.is_some_and(|process| matches!(process.state, Some(ModuleState::On | ModuleState::Off)))
+        };
+        let mut spoken = None;
+        let more = self.subjects.find(context, runs, |name| {
+            if Some(name.class()) == collector {
+                spoken = Some(name);
             }
-        }
-    }
-}
-
-fn wanted(show: &Show, module: String) -> Drawn {
-    Drawn {
-        from: show.from,
-        module,
-        data: show.data.clone(),
-        rate: Rate::hz(show.rate.unwrap_or(0.0)),
-        way: None,
-        refused: false,
-    }
-}
-
-/// What a value needs besides itself to be drawn.
-struct Drawer<'a> {
-    /// Whose pose carries scanners that do not know their own.
-    carrier: &'a str,
-    context: &'a Context,
-}
-
-impl Drawer<'_> {
-    fn draw(&self, scene: &mut Scene, drawn: &Drawn, bytes: &[u8]) -> Result<(), DrawError> {
-        let Some(way) = &drawn.way else { return Ok(()) };
-        let module = &drawn.module;
-        match way.kind {
-            Kind::Scan => read(drawn, bytes, |scan: LaserScan| {
-                scan.pose.iter().try_for_each(|pose| scene.pose(module, pose))?;
-                scene.scan(module, &scan, self.carrier, &Pose::default())
-            }),
-            Kind::Odometry => read(drawn, bytes, |odometry: Odometry| scene.odometry(module, &odometry)),
-            Kind::Pose => read(drawn, bytes, |pose: Pose| scene.pose(module, &pose)),
-            Kind::Grid => read(drawn, bytes, |grid: OccupancyGrid| scene.grid(module, &grid)),
-            Kind::Line => read(drawn, bytes, |line: OutputLine| {
-                scene.set_time(line.time_ns);
-                let module = self.context.installation().classes.format(line.module());
-                scene.output_line(&module, level(line.level), &line.text)
-            }),
-            Kind::Unknown => match decode(&way.item.ty, bytes) {
-                Ok(value) => scene.generic(module, &drawn.data, &value),
-                Err(error) => {
-                    tracing::warn!("{} of {module} is not what its description says: {error}", drawn.data);
-                    Ok(())
-                }
-            },
-        }
-    }
-}
-
-fn read<T: Data>(drawn: &Drawn, bytes: &[u8], draw: impl FnOnce(T) -> Result<(), DrawError>) -> Result<(), DrawError> {
-    match rohrpost::macro_support::from_bytes(bytes) {
-        Ok(value) => draw(value),
-        Err(error) => {
-            tracing::warn!("{} of {} cannot be read: {error}", drawn.data, drawn.module);
-            Ok(())
-        }
-    }
-}
-
-fn level(level: OutputLevel) -> Level {
-    match level {
-        OutputLevel::Error => Level::Error,
-        OutputLevel::Warn => Level::Warning,
-        OutputLevel::Info => Level::Info,
-        OutputLevel::Debug | OutputLevel::Trace => Level::Debug,
-    }
-}
-
-impl Bridge {
-    /// Asks for the descriptions that are missing, and subscribes to what they tell.
-    fn subscribe(&mut self, context: &mut Context) {
-        for drawn in self.drawn.iter_mut().filter(|drawn| drawn.way.is_none() && !drawn.refused) {
-            let description = match rohrpost::describe(&mut context.link().borrow_mut(), drawn.from, PATIENCE) {
-                Ok(description) => description,
-                Err(error) => {
-                    tracing::debug!("{} does not describe itself yet: {error}", drawn.module);
-                    continue;
-                }
-            };
-            let Some(item) = description.data_item(&drawn.data).cloned() else {
-                drawn.refused = true;
-                let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
-                let (module, data) = (&drawn.module, &drawn.data);
-                tracing::warn!("{module} has no data `{data}` to draw; it has: {}", names.join(", "));
-                continue;
-            };
-            if let (Kind::Line, Some(scene)) = (kind_of(&item), &mut self.scene) {
-                earlier_lines(scene, drawn.from, context);
-            }
-            let subscription = context.subscribe_untyped(drawn.from, item.number, description.hash(), drawn.rate);
-            drawn.way = Some(Way { subscription, kind: kind_of(&item), item });
+        });
+        let Some(scene) = self.scene.as_mut().filter(|_| more) else { return };
+        scene.arrange(self.subjects.layout());
+        if let Some(collector) = spoken {
+            earlier_lines(scene, collector, context);
         }
     }
 }
@@ -251,10 +174,7 @@ fn earlier_lines(scene: &mut Scene, collector: Name, context: &Context) {
     let mut next = 0;
     while let Ok(page) = proxy.lines_from(next) {
         for line in &page.lines {
-            scene.set_time(line.time_ns);
-            let module = context.installation().classes.format(line.module());
-            // What cannot be drawn is missing from a picture; nothing else depends on it.
-            let _ = scene.output_line(&module, level(line.level), &line.text);
+            views::draw_line(scene, context.installation(), line);
         }
         next = page.first + page.lines.len() as u64;
         if page.lines.is_empty() || next >= page.next {
@@ -263,41 +183,28 @@ fn earlier_lines(scene: &mut Scene, collector: Name, context: &Context) {
     }
 }
 
-fn kind_of(item: &rohrpost::description::DataItem) -> Kind {
-    let known = [
-        (LaserScan::schema(), Kind::Scan),
-        (Odometry::schema(), Kind::Odometry),
-        (Pose::schema(), Kind::Pose),
-        (OccupancyGrid::schema(), Kind::Grid),
-        (OutputLine::schema(), Kind::Line),
-    ];
-    known.into_iter().find(|(schema, _)| *schema == item.ty).map_or(Kind::Unknown, |(_, kind)| kind)
-}
-
-fn states(scene: &mut Scene, survey: &Survey, context: &Context) -> Result<(), DrawError> {
+fn states(scene: &mut Scene, survey: &Survey, context: &Context) {
     for module in &survey.modules {
         let name = context.installation().classes.format(module.name);
         let state = match &module.process {
             Some(process) => process.state.map_or("starting", ModuleState::name),
             None => "dead",
         };
-        scene.module_state(&name, state, "")?;
+        scene.module_state(&name, state, "");
     }
-    Ok(())
 }
 
-fn charts(scene: &mut Scene, survey: &Survey, last: &Survey, context: &Context) -> Result<(), DrawError> {
+fn charts(scene: &mut Scene, survey: &Survey, last: &Survey, context: &Context) {
     let seconds = survey.at.duration_since(last.at).as_secs_f64();
     for class in &survey.classes {
         let name = class.class.and_then(|id| context.installation().classes.name(id)).unwrap_or("others");
         let before = last.classes.iter().find(|earlier| earlier.class == class.class);
         let received = class.received - before.map_or(0, |before| before.received.min(class.received));
-        scene.traffic(name, received as f64 / seconds, class.lost_in_all())?;
+        scene.traffic(name, received as f64 / seconds, class.lost_in_all());
         let waited = before.map_or(class.latency.clone(), |before| class.latency.since(&before.latency));
         let us = |share| waited.quantile(share).map(|time| time.as_secs_f64() * 1e6);
         if let (Some(p50_us), Some(p99_us)) = (us(0.5), us(0.99)) {
-            scene.latency(name, p50_us, p99_us)?;
+            scene.latency(name, p50_us, p99_us);
         }
     }
-    Ok(())
 }

@@ -1,6 +1,6 @@
 //! Data of types that this crate does not know: numbers become curves, all else becomes text.
 
-use crate::scene::{DrawError, Scene};
+use crate::scene::Scene;
 use crate::states::cut;
 use rerun::{EntityPath, EntityPathPart, Scalars, TextLog};
 use rohrpost::value::Value;
@@ -33,22 +33,22 @@ pub(crate) struct Texts {
 
 impl Scene {
     /// Data that `module` gives under the name `data`, below the entity `data/MODULE/DATA`.
-    pub fn generic(&mut self, module: &str, data: &str, value: &Value) -> Result<(), DrawError> {
+    pub fn generic(&mut self, module: &str, data: &str, value: &Value) {
         let Flat { curves, text } = flatten(value);
         let below = |way: &[String]| {
             let parts = ["data", module, data].into_iter().chain(way.iter().map(String::as_str));
             EntityPath::new(parts.map(EntityPathPart::new).collect())
         };
         for (way, number) in curves {
-            self.log(below(&way), &Scalars::single(number))?;
+            self.log(below(&way), &Scalars::single(number));
         }
         let entity = below(&[]);
         let said = self.texts.last.entry(entity.clone()).or_default();
         if *said == text {
-            return Ok(());
+            return;
         }
         said.clone_from(&text);
-        self.log(entity, &TextLog::new(format!("{module} {data}\n{text}")))
+        self.log(entity, &TextLog::new(format!("{module} {data}\n{text}")));
     }
 }
 

@@ -1,35 +1,51 @@
 //! Draws a robot in Rerun: the world from above, what its modules are doing, what they say, and how packages flow.
 //!
 //! ```text
-//!   packages ──▶ Bridge (a module) ──▶ Scene ──▶ Rerun's batcher thread ──▶ Sink: a file or a viewer
-//!                                   world, states, charts, generic
+//!   packages ──▶ Bridge ──▶ View ──▶ Scene ──▶ Store ──▶ Feeder ──▶ Rerun ──▶ a file, or a Line to a viewer
+//!   (a module's thread, which waits for nobody)      │   (a thread of its own, watched and cut off by the Pen)
 //! ```
 //!
-//! A [`Scene`] knows nothing of mailboxes: who receives packages calls one of its methods for each. This is the only
-//! crate that knows Rerun.
+//! A [`View`] says what is drawn of modules of a class; [`run_with`] makes a bridge with views of one's own. A [`Scene`]
+//! knows nothing of mailboxes: who receives packages calls one of its methods for each. This is the only crate that knows
+//! Rerun.
 //!
-//! **Invariant:** a scene remembers a bounded amount however long it runs. What it has drawn lives with the sink.
-//!
-//! Rerun pushes back: when the sink stands still and [`sink::BYTES_IN_FLIGHT`] are waiting, every drawing method blocks.
-//! So a scene belongs in a process of its own, which subscribes to bounded mailboxes and may be killed at any time.
+//! **Invariants:** nothing that a viewer or a disk does makes the module's thread wait; and the bridge holds a bounded
+//! amount however long it runs: what the store holds, and one stream of Rerun's.
 #![forbid(unsafe_code)]
 
 mod blueprint;
 mod bridge;
 mod charts;
+mod feeder;
 pub mod generic;
+mod line;
 mod palette;
+mod pen;
 mod scene;
-pub mod sink;
+mod sink;
 mod states;
+mod store;
+mod subjects;
 mod trail;
+mod view;
+mod views;
 mod world;
 
-pub use bridge::Bridge;
-pub use scene::{CloseError, DrawError, Scene};
-pub use sink::{Connection, OpenError, Sink};
+pub use blueprint::{Layout, Tab};
+pub use bridge::{Bridge, Drawing, DrawingInterface, DrawingProxy};
+/// The version of Rerun that the bridge is made with: archetypes for [`Scene::log`], and blueprints for [`Tab::own`].
+pub use rerun;
+pub use scene::{DrawError, RATE_HZ, Scene, entity};
+pub use sink::{CloseError, OpenError, Sink};
 pub use states::Level;
+pub use store::{BYTES_MAX, DrawingCounts, ENTITIES_MAX, LINE_BYTES_MAX, LINES_MAX};
+pub use view::{Datum, View, Views};
 pub use world::{MAP_CELLS_MAX, TILES_MAX};
+
+/// Runs a bridge with views of one's own, which are asked before those that are built in: the whole of its `main`.
+pub fn run_with<V: Views>() -> std::process::ExitCode {
+    rohrpost::run::<Bridge<V>>()
+}
 
 #[cfg(test)]
 mod testing;

@@ -3,5 +3,5 @@
 #![forbid(unsafe_code)]
 
 fn main() -> std::process::ExitCode {
-    rohrpost::run::<rohrpost_gui_bridge::Bridge>()
+    rohrpost_gui_bridge::run_with::<()>()
 }

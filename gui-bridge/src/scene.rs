@@ -1,9 +1,15 @@
-//! A drawing in Rerun: opened once, told the time, then told what happens.
+//! A drawing in Rerun: opened once, told the time, then told what happens. Nothing here waits for Rerun.
 
-use crate::sink::{self, Connection, OpenError, Sink};
-use crate::{blueprint, charts::Charts, generic::Texts, states::States, world::World};
-use rerun::{ApplicationId, AsComponents, EntityPath, EntityPathPart, RecordingStream, TimeCell};
-use std::{marker::PhantomData, rc::Rc, time::Duration};
+use crate::pen::Pen;
+use crate::sink::{CloseError, OpenError, Sink};
+use crate::store::{DrawingCounts, Row, Store};
+use crate::{blueprint::Layout, charts::Charts, generic::Texts, states::States, world::World};
+use rerun::{ApplicationId, AsComponents, EntityPath, EntityPathPart, TimeCell, TimePoint};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// An entity is drawn at most so often a second, unless somebody says otherwise.
+pub const RATE_HZ: f64 = 20.0;
 
 /// The timeline of system time: nanoseconds since 1970, as all nodes of an installation agree on it.
 pub(crate) const SYSTEM_TIME: &str = "system_time";
@@ -31,42 +37,61 @@ pub enum DrawError {
     /// A map came in more tiles than a scene keeps.
     #[error("map of {0}: more than {max} tiles; send larger ones", max = crate::TILES_MAX)]
     Tiles(String),
-    /// Rerun could not take it: a bug in this crate.
-    #[error("Rerun refused a row: {0}")]
-    Rerun(#[from] rerun::RecordingStreamError),
+    /// What came is not what its description says.
+    #[error("{data} of {module} cannot be read: {cause}; its sender is at fault")]
+    Unreadable {
+        /// Who sent it.
+        module: String,
+        /// Which of its data.
+        data: String,
+        /// What is wrong with it.
+        cause: String,
+    },
 }
 
-/// Why the last of a drawing may be missing.
-#[derive(Debug, thiserror::Error)]
-pub enum CloseError {
-    /// The sink did not take all: the disk is full, or the viewer went away.
-    #[error("the end of the drawing did not arrive: {0}")]
-    Flush(#[from] rerun::sink::SinkFlushError),
-    /// Rerun could not take the layout: a bug in this crate.
-    #[error("Rerun refused the layout: {0}")]
-    Layout(#[from] rerun::RecordingStreamError),
+/// Where a scene's rows go: the store, or a test's list.
+pub(crate) trait Paper {
+    fn put(&self, entity: EntityPath, row: Row);
+    fn line(&self, entity: EntityPath, row: Row);
+    fn arrange(&self, layout: Layout);
+}
+
+impl Paper for Store {
+    fn put(&self, entity: EntityPath, row: Row) {
+        Store::put(self, entity, row);
+    }
+
+    fn line(&self, entity: EntityPath, row: Row) {
+        Store::line(self, entity, row);
+    }
+
+    fn arrange(&self, layout: Layout) {
+        Store::arrange(self, layout);
+    }
 }
 
 /// A drawing of one installation.
 ///
-/// It stays in the thread that opened it: Rerun keeps the present time of a stream for each thread.
+/// Drawing never waits: what comes faster than the sink takes it, or than an entity's rate, is replaced by what comes next.
 ///
 /// ```
-/// use rohrpost_gui_bridge::{Scene, Sink};
+/// use rohrpost_gui_bridge::{RATE_HZ, Scene, Sink};
 /// use rohrpost::types::Pose;
 ///
 /// let file = std::env::temp_dir().join(format!("scene-doc-{}.rrd", std::process::id()));
-/// let mut scene = Scene::open("lab", &Sink::File(file.clone()), 1_700_000_000_000_000_000)?;
+/// let mut scene = Scene::open("lab", Sink::file(&file), RATE_HZ, 1_700_000_000_000_000_000)?;
 /// scene.set_time(1_700_000_001_000_000_000);
-/// scene.pose("slam.0", &Pose { x_m: 1.0, ..Pose::default() })?;
+/// scene.pose("slam.0", &Pose { x_m: 1.0, ..Pose::default() });
 /// scene.close()?; // or drop it: then nobody hears that the disk is full
 /// # std::fs::remove_file(file)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Scene {
-    stream: RecordingStream,
+    paper: Arc<dyn Paper>,
+    /// None in tests.
+    drawing: Option<(Arc<Store>, Pen)>,
     start_ns: u64,
-    one_thread: PhantomData<Rc<()>>,
+    time: TimePoint,
     pub(crate) world: World,
     pub(crate) states: States,
     pub(crate) charts: Charts,
@@ -74,31 +99,38 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Opens a drawing of `installation` in `sink`; robot time 0 is `system_time_ns`.
-    pub fn open(installation: &str, sink: &Sink, system_time_ns: u64) -> Result<Self, OpenError> {
+    /// Opens a drawing of `installation` in `sink`; robot time 0 is `system_time_ns`. No entity is drawn more often than
+    /// `rate_hz`; 0 is no limit. A viewer need not be there yet.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or the address is none.
+    pub fn open(installation: &str, sink: Sink, rate_hz: f64, system_time_ns: u64) -> Result<Self, OpenError> {
         // Viewers keep a layout for each application: what somebody arranged for one installation stays with it.
         let application = ApplicationId::new_or_unknown(format!("rohrpost-{installation}"));
-        Self::over(sink::open(application, sink)?, system_time_ns)
+        let period = if rate_hz > 0.0 { Duration::try_from_secs_f64(1.0 / rate_hz).ok() } else { None };
+        let store = Arc::new(Store::new(period.unwrap_or_default()));
+        let pen = Pen::begin(sink, application, store.clone())?;
+        let mut scene = Self::over(store.clone(), system_time_ns);
+        scene.drawing = Some((store, pen));
+        Ok(scene)
     }
 
-    /// The same over a stream that is open.
-    pub(crate) fn over(stream: RecordingStream, system_time_ns: u64) -> Result<Self, OpenError> {
-        // When and in which order the bridge got to a package says nothing about the robot.
-        stream.set_log_time_enabled(false);
-        stream.set_log_tick_enabled(false);
-        blueprint::send(&stream)?;
+    /// The same over anything that takes rows.
+    pub(crate) fn over(paper: Arc<dyn Paper>, system_time_ns: u64) -> Self {
         let mut scene = Self {
-            stream,
+            paper,
+            drawing: None,
             start_ns: system_time_ns,
-            one_thread: PhantomData,
+            time: TimePoint::default(),
             world: World::default(),
             states: States::default(),
             charts: Charts::default(),
             texts: Texts::default(),
         };
         scene.set_time(system_time_ns);
-        scene.prepare_world()?;
-        Ok(scene)
+        scene.arrange(Layout::default());
+        scene.prepare_world();
+        scene
     }
 
     /// What is drawn from now on happens at this system time.
@@ -107,41 +139,74 @@ impl Scene {
         // i64::MIN is Rerun's "no time"; 292 years are enough on either side.
         let bounded = |ns: i128| ns.clamp(-i128::from(i64::MAX), i128::from(i64::MAX)) as i64;
         let system = TimeCell::from_timestamp_nanos_since_epoch(bounded(i128::from(system_time_ns)));
-        self.stream.set_time(SYSTEM_TIME, system);
-        self.stream.set_time(ROBOT_TIME, TimeCell::from_duration_nanos(bounded(since_start)));
+        self.time.insert_cell(SYSTEM_TIME, system);
+        self.time.insert_cell(ROBOT_TIME, TimeCell::from_duration_nanos(bounded(since_start)));
     }
 
-    /// How the scene stands with its sink. Waits `patience` at most; ask about once a second.
-    pub fn connection(&self, patience: Duration) -> Connection {
-        sink::connection(&self.stream, patience)
+    /// Why nothing is drawn any more, if so. A viewer that is away is no such reason: it is waited for.
+    pub fn failure(&self) -> Option<String> {
+        self.drawing.as_ref().and_then(|(_, pen)| pen.failure())
     }
 
-    /// Sends what waits, and waits until it has arrived; a viewer that was never there costs 5 s.
-    pub fn flush(&self, patience: Duration) -> Result<(), rerun::sink::SinkFlushError> {
-        self.stream.flush_with_timeout(patience)
+    /// What became of all that was drawn.
+    pub fn counts(&self) -> DrawingCounts {
+        self.drawing.as_ref().map(|(store, _)| store.counts()).unwrap_or_default()
     }
 
-    /// Writes all and closes the drawing; a file gets its footer.
+    /// Waits until Rerun has taken all that was drawn, at most so long; tells whether it has. For programs that draw what is
+    /// not happening now, and want all of it: a module never needs this.
+    pub fn settle(&self, patience: Duration) -> bool {
+        let Some((store, _)) = &self.drawing else { return true };
+        let deadline = Instant::now() + patience;
+        while !store.is_empty() {
+            if Instant::now() >= deadline {
+                return false;
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        true
+    }
+
+    /// How the viewer arranges it.
+    pub fn arrange(&mut self, layout: Layout) {
+        self.paper.arrange(layout);
+    }
+
+    /// Draws what waits, within some seconds, and closes the drawing; a file gets its footer.
     ///
-    /// It also gets the layout once more, at its end: a view takes its bounds from what is loaded when it first appears
-    /// and the views of the layout at the beginning may have seen but a part of it.
-    pub fn close(self) -> Result<(), CloseError> {
-        blueprint::send(&self.stream)?;
-        Ok(self.flush(Duration::from_secs(10))?)
+    /// # Errors
+    /// When the last of it did not arrive.
+    pub fn close(mut self) -> Result<(), CloseError> {
+        self.drawing.take().map_or(Ok(()), |(_, pen)| pen.close())
     }
 
-    /// Draws at the present time.
-    pub(crate) fn log(&self, entity: EntityPath, what: &dyn AsComponents) -> Result<(), DrawError> {
-        Ok(self.stream.log(entity, what)?)
+    /// Draws at the present time: any of Rerun's archetypes.
+    pub fn log(&mut self, entity: EntityPath, what: &dyn AsComponents) {
+        self.paper.put(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
     }
 
     /// Draws for all times.
-    pub(crate) fn log_static(&self, entity: EntityPath, what: &dyn AsComponents) -> Result<(), DrawError> {
-        Ok(self.stream.log_static(entity, what)?)
+    pub fn log_static(&mut self, entity: EntityPath, what: &dyn AsComponents) {
+        self.paper.put(entity, Row { time: None, components: what.as_serialized_batches() });
+    }
+
+    /// Draws what happens now and is no state: the next one does not replace it. For small things, such as lines of text: what
+    /// has more than [`crate::LINE_BYTES_MAX`] is dropped and counted.
+    pub fn log_event(&mut self, entity: EntityPath, what: &dyn AsComponents) {
+        self.paper.line(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        if let Some((_, pen)) = self.drawing.take() {
+            // Who wants to know closes it.
+            let _ = pen.close();
+        }
     }
 }
 
 /// An entity by its parts, which may hold any character.
-pub(crate) fn entity(parts: &[&str]) -> EntityPath {
+pub fn entity(parts: &[&str]) -> EntityPath {
     EntityPath::new(parts.iter().map(|part| EntityPathPart::new(*part)).collect())
 }

@@ -1,24 +1,37 @@
-//! Where a drawing goes, and how much of it may wait on the way.
+//! Where a drawing goes.
 
+use rerun::external::re_log_types::RecordingId;
+use rerun::external::re_uri;
 use rerun::log::ChunkBatcherConfig;
-use rerun::sink::{GrpcSink, GrpcSinkConnectionState, LogSink};
-use rerun::{ApplicationId, RecordingStream, RecordingStreamBuilder, SpawnOptions};
+use rerun::{ApplicationId, RecordingStream, RecordingStreamBuilder, SpawnError, SpawnOptions};
 use std::path::PathBuf;
-use std::sync::mpsc;
 use std::time::Duration;
 
-/// What may wait for a slow sink before drawing blocks.
-pub const BYTES_IN_FLIGHT: u64 = 16 * 1024 * 1024;
+/// What may wait inside of Rerun before drawing blocks.
+const BYTES_IN_FLIGHT: u64 = 8 * 1024 * 1024;
 
 /// Where a drawing goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sink {
-    /// A new `.rrd` file, to be opened with `rerun FILE`. Whole only after the scene was dropped.
-    File(PathBuf),
-    /// A viewer that runs already: `rerun+http://127.0.0.1:9876/proxy`.
+    /// A new `.rrd` file, to be opened with `rerun FILE`. Whole only after the scene was closed.
+    File {
+        /// Where it is.
+        path: PathBuf,
+        /// When it has this size, it becomes `NAME.old.rrd` in place of the one before, and a new one is begun with all that
+        /// is on the screen then.
+        bytes_max: u64,
+    },
+    /// A viewer that runs, or will run: `rerun+http://127.0.0.1:9876/proxy`.
     Viewer(String),
     /// A viewer started now, which outlives the scene; needs `rerun` in the `PATH`.
     Window,
+}
+
+impl Sink {
+    /// A file of any size.
+    pub fn file(path: impl Into<PathBuf>) -> Self {
+        Self::File { path: path.into(), bytes_max: u64::MAX }
+    }
 }
 
 /// Why a scene could not be opened.
@@ -29,130 +42,179 @@ pub enum OpenError {
     File {
         /// The file asked for.
         path: PathBuf,
-        /// What Rerun says.
-        cause: rerun::RecordingStreamError,
+        /// What the system says.
+        cause: std::io::Error,
     },
+    /// Rerun does not write to the file.
+    #[error("Rerun cannot write the drawing: {0}")]
+    Save(rerun::RecordingStreamError),
     /// The address is none.
     #[error("`{url}` is no viewer's address: {cause}; write rerun+http://HOST:9876/proxy")]
     Viewer {
         /// The address asked for.
         url: String,
-        /// What Rerun says.
-        cause: rerun::RecordingStreamError,
+        /// What is wrong with it.
+        cause: String,
     },
+    /// No viewer is installed.
+    #[error("no Rerun viewer is in PATH; install one with `pip install rerun-sdk==0.36.3`, or draw to a file")]
+    NoViewer,
     /// No viewer came up.
-    #[error("cannot start a viewer: {0}; install one with `pip install rerun-sdk==0.36.3`, or draw to a file")]
-    Window(rerun::RecordingStreamError),
-    /// Rerun refused the layout or the first rows.
-    #[error("Rerun refused the layout: {0}")]
-    Layout(#[from] rerun::RecordingStreamError),
-    /// Rerun refused what never changes.
+    #[error("the Rerun viewer does not start: {0}")]
+    Window(SpawnError),
+    /// The connection to the viewer.
+    #[error("cannot connect to the viewer: {0}")]
+    Connect(rerun::RecordingStreamError),
+    /// The system said no.
     #[error("cannot begin to draw: {0}")]
-    Draw(#[from] crate::DrawError),
+    System(#[from] std::io::Error),
 }
 
-/// How a scene stands with its sink.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Connection {
-    /// It writes to a file or to memory.
-    Local,
-    /// The viewer has not answered yet; Rerun keeps trying.
-    Connecting,
-    /// The viewer takes what is drawn.
-    Up,
-    /// The viewer went away. Rerun never connects again and drops all that is drawn: open a new scene.
-    Lost,
-    /// The sink's thread did not answer in time: it is stuck in a write, and drawing will block soon.
+/// Why the last of a drawing may be missing.
+#[derive(Debug, thiserror::Error)]
+pub enum CloseError {
+    /// The sink did not take all: the disk is full, or the viewer went away.
+    #[error("the end of the drawing did not arrive: {0}")]
+    Flush(#[from] rerun::sink::SinkFlushError),
+    /// Rerun could not take the layout: a bug in this crate.
+    #[error("Rerun refused the layout: {0}")]
+    Layout(#[from] rerun::RecordingStreamError),
+    /// It stands still.
+    #[error("the end of the drawing did not arrive: its sink stands still")]
     Stuck,
 }
 
-/// The batcher's settings. A file gets chunks of decent size; a viewer is shown changes within a blink.
-fn batching(sink: &Sink) -> ChunkBatcherConfig {
-    let flush_tick = match sink {
-        Sink::File(_) => Duration::from_millis(500),
-        Sink::Viewer(_) | Sink::Window => Duration::from_millis(40),
-    };
-    ChunkBatcherConfig { flush_tick, max_bytes_in_flight: BYTES_IN_FLIGHT, ..ChunkBatcherConfig::DEFAULT }
+/// Where a viewer listens.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Address {
+    /// As it was written.
+    pub(crate) url: String,
+    pub(crate) host: String,
+    pub(crate) port: u16,
 }
 
-/// A stream into `sink`, without a layout yet.
-pub(crate) fn open(application: ApplicationId, sink: &Sink) -> Result<RecordingStream, OpenError> {
-    let builder = RecordingStreamBuilder::new(application).batcher_config(batching(sink));
-    match sink {
-        Sink::File(path) => builder.save(path).map_err(|cause| OpenError::File { path: path.clone(), cause }),
-        Sink::Viewer(url) => {
-            builder.connect_grpc_opts(url).map_err(|cause| OpenError::Viewer { url: url.clone(), cause })
+impl Address {
+    pub(crate) fn parse(url: &str) -> Result<Self, OpenError> {
+        let wrong = |cause: String| OpenError::Viewer { url: url.into(), cause };
+        let parsed: re_uri::ProxyUri = url.parse().map_err(|error: re_uri::Error| wrong(error.to_string()))?;
+        let origin = parsed.origin;
+        if origin.scheme != re_uri::Scheme::RerunHttp {
+            return Err(wrong("a bridge speaks to viewers without encryption only".into()));
         }
-        Sink::Window => builder
-            .spawn_opts(&SpawnOptions {
-                memory_limit: "1GiB".into(),
-                server_memory_limit: "128MiB".into(),
-                wait_for_bind: true,
-                extra_args: vec!["--bind".into(), "127.0.0.1".into()],
-                ..SpawnOptions::default()
-            })
-            .map_err(OpenError::Window),
+        // An IPv6 address stands in brackets in a URL, but not where names are resolved.
+        let host = origin.host.to_string().trim_matches(['[', ']']).to_owned();
+        Ok(Self { url: url.into(), host, port: origin.port })
+    }
+
+    /// Where a viewer listens that was started without further words.
+    pub(crate) fn of_window() -> Self {
+        Self { url: "the window".into(), host: "127.0.0.1".into(), port: rerun::DEFAULT_SERVER_PORT }
     }
 }
 
-/// Asks the sink's thread how it stands, and waits `patience` for its answer.
-pub(crate) fn connection(stream: &RecordingStream, patience: Duration) -> Connection {
-    let (answer, answers) = mpsc::channel();
-    stream.inspect_sink(move |sink| {
-        // Nobody waits any more when the patience ran out; that is no fault.
-        let _ = answer.send(standing(sink));
-    });
-    answers.recv_timeout(patience).unwrap_or(Connection::Stuck)
+/// What one stream is made of.
+#[derive(Clone)]
+pub(crate) struct Canvas {
+    pub(crate) application: ApplicationId,
+    /// The same for all streams of a scene: a viewer that was away for a while goes on with the recording it has.
+    pub(crate) recording: RecordingId,
+    pub(crate) surface: Surface,
 }
 
-fn standing(sink: &dyn LogSink) -> Connection {
-    let sink: &dyn std::any::Any = sink;
-    match sink.downcast_ref::<GrpcSink>().map(GrpcSink::status) {
-        None => Connection::Local,
-        Some(GrpcSinkConnectionState::Connecting { .. }) => Connection::Connecting,
-        Some(GrpcSinkConnectionState::Connected) => Connection::Up,
-        Some(GrpcSinkConnectionState::Disconnected(_)) => Connection::Lost,
+/// Where one stream goes.
+#[derive(Clone)]
+pub(crate) enum Surface {
+    File(PathBuf),
+    /// The near end of a [`crate::line::Line`].
+    Line(String),
+}
+
+/// A stream without a layout yet.
+pub(crate) fn open(canvas: &Canvas) -> Result<RecordingStream, OpenError> {
+    // A chunk costs more than a kilobyte besides its rows. So a file gets large ones, and a crash of the bridge loses two
+    // seconds; a viewer is shown changes within a blink.
+    let flush_tick = Duration::from_millis(match canvas.surface {
+        Surface::File(_) => 2000,
+        Surface::Line(_) => 40,
+    });
+    let batching =
+        ChunkBatcherConfig { flush_tick, max_bytes_in_flight: BYTES_IN_FLIGHT, ..ChunkBatcherConfig::DEFAULT };
+    let builder = RecordingStreamBuilder::new(canvas.application.clone())
+        .recording_id(canvas.recording.clone())
+        .batcher_config(batching);
+    match &canvas.surface {
+        Surface::File(path) => builder.save(path).map_err(OpenError::Save),
+        Surface::Line(url) => builder.connect_grpc_opts(url.as_str()).map_err(OpenError::Connect),
+    }
+}
+
+/// Starts a viewer, unless one runs already.
+pub(crate) fn start_window() -> Result<(), OpenError> {
+    let options = SpawnOptions {
+        memory_limit: "1GiB".into(),
+        server_memory_limit: "128MiB".into(),
+        wait_for_bind: true,
+        extra_args: vec!["--bind".into(), "127.0.0.1".into()],
+        ..SpawnOptions::default()
+    };
+    match rerun::spawn(&options) {
+        Ok(_) => Ok(()),
+        Err(SpawnError::ExecutableNotFoundInPath { .. }) => Err(OpenError::NoViewer),
+        Err(error) => Err(OpenError::Window(error)),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Scene, testing::Drawing};
-    use std::time::Instant;
-
-    const PATIENCE: Duration = Duration::from_secs(5);
+    use crate::Scene;
 
     #[test]
     fn a_file_is_whole_when_its_scene_was_closed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.rrd");
-        let scene = Scene::open("lab", &Sink::File(path.clone()), 0).unwrap();
-        assert_eq!(scene.connection(PATIENCE), Connection::Local);
+        let mut scene = Scene::open("lab", Sink::file(&path), 0.0, 0).unwrap();
+        scene.traffic("laser", 1.0, 0);
         scene.close().unwrap();
         assert!(std::fs::read(path).unwrap().starts_with(b"RRF2"));
     }
 
     #[test]
-    fn a_scene_waits_for_a_viewer_without_blocking() {
-        assert_eq!(Drawing::new().scene.connection(PATIENCE), Connection::Local);
-        let start = Instant::now();
-        // Port 1 belongs to a service that nobody runs.
-        let sink = Sink::Viewer("rerun+http://127.0.0.1:1/proxy".into());
-        let mut scene = Scene::open("lab", &sink, 0).unwrap();
-        scene.traffic("laser", 1.0, 0).unwrap();
-        assert_eq!(scene.connection(PATIENCE), Connection::Connecting);
-        assert!(start.elapsed() < PATIENCE);
+    fn a_full_file_is_put_aside_and_the_next_begins_with_all_that_is_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.rrd");
+        let sink = Sink::File { path: path.clone(), bytes_max: 100_000 };
+        let mut scene = Scene::open("lab", sink, 0.0, 0).unwrap();
+        let old = folder.path().join("scene.old.rrd");
+        let start = std::time::Instant::now();
+        let mut second = 0;
+        while scene.counts().rebuilt < 2 {
+            assert!(start.elapsed() < Duration::from_secs(60), "{:?}", scene.counts());
+            second += 1;
+            scene.set_time(second * 1_000_000_000);
+            scene.output_line("laser.0", crate::Level::Info, &"x".repeat(4000));
+            scene.settle(Duration::from_secs(10));
+        }
+        scene.close().unwrap();
+        let size = |path: &PathBuf| std::fs::metadata(path).unwrap().len();
+        // It is looked at now and then, and what waits then is still written.
+        assert!(size(&old) >= 100_000, "{}", size(&old));
+        let text = std::fs::read(&path).unwrap();
+        assert!(text.starts_with(b"RRF2"));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no more than two");
     }
 
     #[test]
     fn sinks_that_cannot_be_say_why() {
         for (sink, why) in [
-            (Sink::File("/no/such/folder/scene.rrd".into()), "cannot write the drawing to /no/such/folder/scene.rrd: "),
+            (Sink::file("/no/such/folder/scene.rrd"), "cannot write the drawing to /no/such/folder/scene.rrd: "),
             (Sink::Viewer("localhost".into()), "`localhost` is no viewer's address: "),
+            (Sink::Viewer("rerun+https://x:1/proxy".into()), "`rerun+https://x:1/proxy` is no viewer's address: "),
         ] {
-            let failure = Scene::open("lab", &sink, 0).err().unwrap().to_string();
+            let failure = Scene::open("lab", sink, 0.0, 0).err().unwrap().to_string();
             assert!(failure.starts_with(why), "{failure}");
         }
+        let address = Address::parse("rerun+http://[::1]:9877/proxy").unwrap();
+        assert_eq!((address.host.as_str(), address.port), ("::1", 9877));
     }
 }

@@ -1,7 +1,8 @@
 //! What modules are doing, and what they say.
 
-use crate::scene::{DrawError, Scene, entity};
+use crate::scene::{Scene, entity};
 use rerun::{StateChange, StateConfiguration, TextDocument, TextLog, TextLogLevel};
+use rohrpost::common::OutputLevel;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -47,6 +48,17 @@ pub(crate) struct States {
     last: BTreeMap<String, String>,
 }
 
+impl From<OutputLevel> for Level {
+    fn from(level: OutputLevel) -> Self {
+        match level {
+            OutputLevel::Error => Self::Error,
+            OutputLevel::Warn => Self::Warning,
+            OutputLevel::Info => Self::Info,
+            OutputLevel::Debug | OutputLevel::Trace => Self::Debug,
+        }
+    }
+}
+
 impl States {
     /// All of them at one glance. The lanes alone do not give that: their view keeps the span of time that was there
     /// when it was opened, so that a live one shows the past only.
@@ -64,30 +76,31 @@ impl States {
 impl Scene {
     /// `module` is in this state: `starting`, `off`, `on`, `error` or `dead`. Said again it changes nothing, so it may
     /// come with every poll. `text` says why, and becomes a line of output; leave it empty if there is nothing to say.
-    pub fn module_state(&mut self, module: &str, state: &str, text: &str) -> Result<(), DrawError> {
+    pub fn module_state(&mut self, module: &str, state: &str, text: &str) {
         let lane = entity(&["modules", module]);
         match self.states.last.insert(module.into(), state.into()) {
-            Some(last) if last == state => return Ok(()),
+            Some(last) if last == state => return,
             Some(_) => {}
-            None => self.log_static(lane.clone(), &colours())?,
+            None => self.log_static(lane.clone(), &colours()),
         }
-        self.log(lane, &StateChange::single(state))?;
-        self.log(entity(&["modules now"]), &self.states.table())?;
+        self.log(lane, &StateChange::single(state));
+        let table = self.states.table();
+        self.log(entity(&["modules now"]), &table);
         if text.is_empty() {
-            return Ok(());
+            return;
         }
         let level = match state {
             "dead" => Level::Error,
             "error" => Level::Warning,
             _ => Level::Info,
         };
-        self.output_line(module, level, text)
+        self.output_line(module, level, text);
     }
 
     /// `module` says something.
-    pub fn output_line(&mut self, module: &str, level: Level, text: &str) -> Result<(), DrawError> {
+    pub fn output_line(&mut self, module: &str, level: Level, text: &str) {
         let line = TextLog::new(format!("{module}: {}", cut(text, LINE_MAX))).with_level(level.name());
-        self.log(entity(&["output", module]), &line)
+        self.log_event(entity(&["output", module]), &line);
     }
 }
 
@@ -110,7 +123,7 @@ mod tests {
     fn a_state_said_again_draws_nothing() {
         let mut drawing = Drawing::new();
         for (state, text) in [("starting", ""), ("on", ""), ("on", "still on"), ("dead", "killed by signal 9")] {
-            drawing.scene.module_state("laser.0", state, text).unwrap();
+            drawing.scene.module_state("laser.0", state, text);
         }
         let rows = drawing.rows();
         assert_eq!(rows["/modules/laser.0"], 3 + 1, "three changes and the colours");

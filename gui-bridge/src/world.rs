@@ -15,8 +15,8 @@ use crate::palette::{self, Rgb};
 use crate::scene::{DrawError, Scene, entity};
 use crate::trail::{CHUNKS_MAX, Change, Trail};
 use nalgebra::{Isometry2, Point2};
-use rerun::{Arrows2D, LineStrips2D, Points2D, Radius, RotationAxisAngle, SegmentationImage, Transform3D};
-use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose};
+use rerun::{Arrows2D, LineStrips2D, Points2D, Radius, RotationAxisAngle, Scalars, SegmentationImage, Transform3D};
+use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use std::collections::{HashMap, HashSet};
 
 mod extent;
@@ -37,6 +37,7 @@ pub(crate) struct World {
     robots: HashMap<String, Robot>,
     tiles: HashMap<String, HashSet<(i64, i64)>>,
     extent: Extent,
+    carrier: String,
 }
 
 /// A believed place, and the way to it.
@@ -59,23 +60,33 @@ const ODOMETRY: Look = Look { colour: palette::ODOMETRY, body_m: 0.2, line: 1.25
 
 impl Scene {
     /// Draws what never changes.
-    pub(crate) fn prepare_world(&self) -> Result<(), DrawError> {
+    pub(crate) fn prepare_world(&mut self) {
         // A 2D view counts y downwards, as pictures do; our frames are right-handed.
-        self.log_static(entity(&["world"]), &Transform3D::from_scale([1.0, -1.0, 1.0]))?;
-        self.log_static(entity(&["world", "map"]), &tile::colours())
+        self.log_static(entity(&["world"]), &Transform3D::from_scale([1.0, -1.0, 1.0]));
+        self.log_static(entity(&["world", "map"]), &tile::colours());
     }
 
     /// The robot is here, as `module` knows best (localisation, a corrected log).
-    pub fn pose(&mut self, module: &str, pose: &Pose) -> Result<(), DrawError> {
-        self.robot(module, pose, &BEST)
+    pub fn pose(&mut self, module: &str, pose: &Pose) {
+        self.robot(module, pose, &BEST);
     }
 
     /// The robot is here, counted from where it started. Drawn less brightly than [`Scene::pose`].
-    pub fn odometry(&mut self, module: &str, odometry: &Odometry) -> Result<(), DrawError> {
-        self.robot(module, &odometry.pose, &ODOMETRY)
+    pub fn odometry(&mut self, module: &str, odometry: &Odometry) {
+        if self.world.carrier.is_empty() {
+            self.world.carrier = module.into();
+        }
+        self.robot(module, &odometry.pose, &ODOMETRY);
     }
 
-    fn robot(&mut self, module: &str, pose: &Pose, look: &Look) -> Result<(), DrawError> {
+    /// How `module` moves: curves below `motion`.
+    pub fn motion(&mut self, module: &str, twist: &Twist) {
+        for (curve, value) in [("speed m_s", twist.speed_m_s), ("turn rate rad_s", twist.turn_rate_rad_s)] {
+            self.log(entity(&["motion", module, curve]), &Scalars::single(value));
+        }
+    }
+
+    fn robot(&mut self, module: &str, pose: &Pose, look: &Look) {
         let at = [pose.x_m as f32, pose.y_m as f32];
         let known = self.world.robots.contains_key(module);
         let robot = self.world.robots.entry(module.into()).or_default();
@@ -83,19 +94,19 @@ impl Scene {
         let change = robot.trail.push(at);
         self.world.extent.include(at);
         if !known {
-            self.body(module, look)?;
+            self.body(module, look);
         }
-        self.log(entity(&["world", "robot", module]), &placed(pose, 1.0))?;
+        self.log(entity(&["world", "robot", module]), &placed(pose, 1.0));
         match change {
             Change::None => {}
-            Change::Chunk(chunk) => self.trail(module, chunk, look)?,
-            Change::All => (0..CHUNKS_MAX).try_for_each(|chunk| self.trail(module, chunk, look))?,
+            Change::Chunk(chunk) => self.trail(module, chunk, look),
+            Change::All => (0..CHUNKS_MAX).for_each(|chunk| self.trail(module, chunk, look)),
         }
-        self.frame()
+        self.frame();
     }
 
     /// A disc and an arrow ahead. On a map of a whole building the disc would be lost, but for a dot of fixed size.
-    fn body(&self, module: &str, look: &Look) -> Result<(), DrawError> {
+    fn body(&mut self, module: &str, look: &Look) {
         let body = Points2D::new([[0.0f32, 0.0]])
             .with_radii([Radius::new_scene_units(look.body_m)])
             .with_colors([look.colour])
@@ -104,23 +115,28 @@ impl Scene {
             .with_radii([Radius::new_ui_points(look.line)])
             .with_colors([look.colour])
             .with_draw_order(look.order);
-        self.log_static(entity(&["world", "robot", module, "body"]), &body)?;
-        self.log_static(entity(&["world", "robot", module, "heading"]), &heading)
+        self.log_static(entity(&["world", "robot", module, "body"]), &body);
+        self.log_static(entity(&["world", "robot", module, "heading"]), &heading);
     }
 
-    fn trail(&self, module: &str, chunk: usize, look: &Look) -> Result<(), DrawError> {
+    fn trail(&mut self, module: &str, chunk: usize, look: &Look) {
         let points = self.world.robots.get(module).map_or(&[][..], |robot| robot.trail.chunk(chunk));
         let strips = if points.len() < 2 { vec![] } else { vec![points.to_vec()] };
         let line = LineStrips2D::new(strips)
             .with_radii([Radius::new_ui_points(look.line)])
             .with_colors([palette::muted(look.colour)])
             .with_draw_order(look.order - 1.0);
-        self.log(entity(&["world", "trail", module, &chunk.to_string()]), &line)
+        self.log(entity(&["world", "trail", module, &chunk.to_string()]), &line);
+    }
+
+    /// Whose odometry was drawn first: it carries scanners that do not know their own place.
+    pub fn carrier(&self) -> &str {
+        &self.world.carrier
     }
 
     /// A sweep of the scanner `module`. It is drawn where the scan says that its scanner stood; else `mount` on the
     /// robot, whose place is the last one drawn for `carrier`.
-    pub fn scan(&mut self, module: &str, scan: &LaserScan, carrier: &str, mount: &Pose) -> Result<(), DrawError> {
+    pub fn scan(&mut self, module: &str, scan: &LaserScan, carrier: &str, mount: &Pose) {
         let carried = || {
             let robot = self.world.robots.get(carrier).map(|robot| robot.pose).unwrap_or_default();
             robot.isometry() * mount.isometry()
@@ -131,8 +147,8 @@ impl Scene {
             .with_radii([Radius::new_scene_units(0.045)])
             .with_colors([palette::SCAN])
             .with_draw_order(10.0);
-        self.log(entity(&["world", "scan", module]), &cloud)?;
-        self.frame()
+        self.log(entity(&["world", "scan", module]), &cloud);
+        self.frame();
     }
 
     /// A tile of `module`'s map, or all of it. A tile replaces the one that had its origin; nothing else is erased.
@@ -149,14 +165,15 @@ impl Scene {
         let image = SegmentationImage::new(part.cells, tile::format(part.columns, part.rows))
             .with_opacity(1.0)
             .with_draw_order(-10.0);
-        self.log(place.clone(), &placed(&part.origin, grid.resolution_m))?;
-        self.log(place, &image)?;
-        self.frame()
+        self.log(place.clone(), &placed(&part.origin, grid.resolution_m));
+        self.log(place, &image);
+        self.frame();
+        Ok(())
     }
 
     /// Draws the frame anew if the world has grown.
-    fn frame(&mut self) -> Result<(), DrawError> {
-        let Some(frame) = self.world.extent.grown() else { return Ok(()) };
+    fn frame(&mut self) {
+        let Some(frame) = self.world.extent.grown() else { return };
         let (bar, metres) = frame.scale();
         // A view makes room for what is drawn, seen or not: the outline in the ground's colour is a margin.
         let lines = LineStrips2D::new([frame.outline(), bar])
@@ -164,7 +181,7 @@ impl Scene {
             .with_colors([palette::GROUND, palette::AID])
             .with_labels([String::new(), format!("{metres} m")])
             .with_draw_order(-20.0);
-        self.log(entity(&["world", "frame"]), &lines)
+        self.log(entity(&["world", "frame"]), &lines);
     }
 }
 

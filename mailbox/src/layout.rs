@@ -141,6 +141,13 @@ impl Identity {
         self.magic.store(MAGIC, std::sync::atomic::Ordering::Release);
     }
 
+    /// The version of the layout, if it is not ours.
+    pub(crate) fn other_version(&self) -> Option<u32> {
+        use std::sync::atomic::Ordering::{Acquire, Relaxed};
+        let version = (self.magic.load(Acquire) == MAGIC).then(|| self.version.load(Relaxed));
+        version.filter(|version| *version != VERSION)
+    }
+
     /// What the segment claims to be; none when that cannot be. Another process wrote it, so everything is checked here,
     /// once; afterwards only the result is used.
     pub(crate) fn read(&self) -> Option<(Name, Shape)> {

@@ -30,6 +30,7 @@
 //! ```
 
 mod about;
+mod bell;
 mod clock;
 mod counters;
 mod doorbell;
@@ -55,6 +56,8 @@ mod sync;
 pub mod sys;
 mod system_time;
 mod traffic;
+mod waiting;
+mod watch;
 mod word;
 
 pub use clock::{monotonic_ns, realtime_ns};
@@ -68,8 +71,10 @@ pub use node::{
 };
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;
-pub use receiver::{Package, Receiver, wait_any};
+pub use receiver::{Package, Receiver};
 pub use registry::{CreateError, MailboxInfo};
 pub use sender::{Label, Loan, SendError, Sender};
 pub use slots::{Full, SLOTS_MAX};
 pub use system_time::{SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource};
+pub use waiting::{Waiting, wait_any};
+pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};

@@ -11,6 +11,7 @@
 //! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the file
 //! `node`: the kernel drops that lock with the process, whatever killed it.
 
+use crate::bell::Bell;
 use crate::doorbell;
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, Held};
@@ -20,7 +21,7 @@ use crate::step::step;
 use crate::word::Claimant;
 use std::fs::{self, File, OpenOptions};
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -80,6 +81,8 @@ pub(crate) struct Entry {
     /// Times that launch has started this module again.
     pub(crate) restarts: AtomicU32,
     pub(crate) joined_ns: AtomicU64,
+    /// Not 0: it sleeps in `poll`; ring it through its pipe too.
+    pub(crate) polling: AtomicU32,
 }
 
 /// The file `node`.
@@ -109,7 +112,8 @@ pub enum NodeError {
     Foreign(PathBuf, u32),
     /// Another version's layout.
     #[error(
-        "node directory {0} has layout version {1}, this program version {VERSION}; stop what runs there and remove it"
+        "node {0} was made by another version of Rohrpost (layout {1}, this program has {VERSION}); use the `rohrpost` that \
+         launched it, or stop what runs there and remove the directory"
     )]
     Version(PathBuf, u32),
     /// No such node, or it was removed after it was opened.
@@ -152,6 +156,7 @@ pub struct Node {
     path: PathBuf,
     /// Holds no lock, so that it can ask about all.
     file: File,
+    directory: File,
     mapping: Mapping,
 }
 
@@ -195,11 +200,19 @@ impl Node {
         let failed = |error| NodeError::Io(path.into(), error);
         let file = open_shared(&path.join("node"), create).map_err(failed)?;
         let bytes = size_of::<NodePage>();
+        // Before anything is locked or made longer: what another version made is its own business.
+        if let Some(other) = other_version(&file) {
+            return Err(NodeError::Version(path.into(), other));
+        }
         let lock = RegistryLock::take(path)?;
         if file.metadata().map_err(failed)?.len() < bytes as u64 {
             allocate(&file, bytes).map_err(failed)?;
         }
-        let node = Self { path: path.into(), mapping: Mapping::new(&file, bytes, true).map_err(failed)?, file };
+        // Not to be read, only to find pipes by.
+        let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
+        let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
+        let mapping = Mapping::new(&file, bytes, true).map_err(failed)?;
+        let node = Self { path: path.into(), mapping, file, directory };
         node.check_in()?;
         drop(lock);
         Ok(Arc::new(node))
@@ -217,6 +230,7 @@ impl Node {
             step!("node: before magic");
             page.magic.store(MAGIC, Ordering::Release);
         }
+        // Whoever made it between the look before and the lock may have been another version's.
         match page.version.load(Ordering::Relaxed) {
             VERSION => Ok(()),
             other => Err(NodeError::Version(self.path.clone(), other)),
@@ -226,6 +240,10 @@ impl Node {
     /// Its directory.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    pub(crate) fn directory(&self) -> &File {
+        &self.directory
     }
 
     pub(crate) fn page(&self) -> &NodePage {
@@ -250,7 +268,8 @@ impl Node {
     /// whoever sees a process end (launch, above all) calls this.
     pub fn announce_death(&self) {
         self.page().deaths.fetch_add(1, Ordering::AcqRel);
-        self.page().entries.iter().filter(|e| e.pid.load(Ordering::Relaxed) != 0).for_each(|e| doorbell::ring(&e.bell));
+        let there = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
+        (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| doorbell::ring(self, index));
     }
 
     /// All participants alive, but for those that are joining or leaving just now.
@@ -335,6 +354,10 @@ pub struct ParticipantInfo {
 }
 
 impl Entry {
+    pub(crate) fn bell(&self) -> Bell<'_> {
+        Bell { rings: &self.bell, polling: &self.polling }
+    }
+
     fn read(&self) -> ParticipantInfo {
         ParticipantInfo {
             module: Name::from_raw(self.module.load(Ordering::Acquire)),
@@ -390,6 +413,16 @@ pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
             Ok(file)
         }
     }
+}
+
+/// The layout version that a node's file was made with, if it is whole and not ours. Every version begins its files with
+/// the magic number, which is written last, and its version.
+fn other_version(file: &File) -> Option<u32> {
+    let (mut magic, mut version) = ([0; 8], [0; 4]);
+    file.read_exact_at(&mut magic, 0).ok()?;
+    file.read_exact_at(&mut version, 8).ok()?;
+    let version = u32::from_ne_bytes(version);
+    (u64::from_ne_bytes(magic) == MAGIC && version != VERSION).then_some(version)
 }
 
 /// Opens a file of the node's directory to look at it: never through a link, never waiting for a pipe's other end.

@@ -21,6 +21,8 @@ pub struct Participant {
     traffic: Table,
     /// Mailboxes it sends to now, so that nobody holds more claims than the mailbox allows. Not on any hot path.
     sending: Mutex<Vec<Name>>,
+    /// Whether it watches descriptors.
+    watching: Mutex<bool>,
 }
 
 impl Participant {
@@ -48,6 +50,9 @@ impl Participant {
             let died = entry.pid.load(Ordering::Relaxed) != 0;
             entry.state.store(0, Ordering::Relaxed);
             entry.restarts.store(0, Ordering::Relaxed);
+            // Who was here before may have died in its sleep.
+            entry.polling.store(0, Ordering::Relaxed);
+            doorbell::remove_pipe(node, participant);
             entry.joined_ns.store(crate::clock::monotonic_ns(), Ordering::Relaxed);
             step!("join: before incarnation");
             entry.incarnation.store(incarnation, Ordering::Release);
@@ -59,7 +64,8 @@ impl Participant {
             entry.pid.store(std::process::id(), Ordering::Relaxed);
             entry.module.store(module.module().raw(), Ordering::Release);
             step!("join: joined");
-            return Ok(Arc::new(Self { node: node.clone(), file, me, traffic, sending: Default::default() }));
+            let (sending, watching) = Default::default();
+            return Ok(Arc::new(Self { node: node.clone(), file, me, traffic, sending, watching }));
         }
         Err(NodeError::Crowded(node.path().into()))
     }
@@ -92,7 +98,7 @@ impl Participant {
 
     /// Ends this participant's sleep, now or when it next wants to: for signal handlers' threads and the like.
     pub fn ring(&self) {
-        doorbell::ring(&self.entry().bell);
+        doorbell::ring(&self.node, self.me.participant);
     }
 
     pub(crate) fn entry(&self) -> &Entry {
@@ -109,6 +115,11 @@ impl Participant {
         &self.traffic
     }
 
+    /// Whether it watches descriptors; locked while that changes.
+    pub(crate) fn watching(&self) -> MutexGuard<'_, bool> {
+        self.watching.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     pub(crate) fn claimant(&self) -> Claimant {
         self.me
     }
@@ -119,6 +130,7 @@ impl Participant {
     /// same; this is for processes whose threads keep it until they end.
     pub fn leave(&self) {
         let entry = self.entry();
+        doorbell::remove_pipe(&self.node, self.me.participant);
         entry.module.store(0, Ordering::Relaxed);
         entry.state.store(0, Ordering::Relaxed);
         entry.pid.store(0, Ordering::Release);

@@ -2,7 +2,6 @@
 
 use crate::clock::monotonic_ns;
 use crate::counters::Loss;
-use crate::doorbell;
 use crate::lock::Held;
 use crate::name::Name;
 use crate::package::{Head, Options};
@@ -12,9 +11,10 @@ use crate::registry;
 use crate::segment::Segment;
 use crate::slots::Taken;
 use crate::step::step;
+use crate::waiting::{Waiting, wait_any};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// When a slot was still being filled at the last search, the next one comes after so many receives and waits.
 const SEARCH_AGAIN: u32 = 64;
@@ -64,22 +64,21 @@ impl Receiver {
             if let Some(taken) = self.next() {
                 return Package::new(self, taken);
             }
-            wait_any(&mut [self], None, || false);
+            wait_any(&mut [self], Waiting::default(), || false);
         }
     }
 
-    /// The most important package; sleeps until there is one, at most for `timeout`.
-    pub fn receive_timeout(&mut self, timeout: Duration) -> Option<Package<'_>> {
-        // A time too long to be told is for ever.
-        let deadline = Instant::now().checked_add(timeout);
+    /// The most important package; waits until there is one, at most for a timeout ([`Duration`]) or as a [`Waiting`] says.
+    pub fn receive_timeout(&mut self, waiting: impl Into<Waiting>) -> Option<Package<'_>> {
+        let waiting = waiting.into();
         loop {
             if let Some(taken) = self.next() {
                 return Some(Package::new(self, taken));
             }
-            if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+            if waiting.is_over() {
                 return None;
             }
-            wait_any(&mut [self], deadline, || false);
+            wait_any(&mut [self], waiting, || false);
         }
     }
 
@@ -165,42 +164,23 @@ impl Receiver {
     }
 
     /// Turns hints into what they speak of, so that those which speak of nothing keep nobody awake.
-    fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         self.search_if_due();
         self.queue.look(&self.segment.slots());
     }
 
-    fn may_have(&self) -> bool {
+    pub(crate) fn drowsy(&self) {
+        self.segment.slots().drowsy();
+    }
+
+    pub(crate) fn awake(&self) {
+        self.segment.slots().awake();
+    }
+
+    pub(crate) fn may_have(&self) -> bool {
         self.queue.may_have_more(&self.segment.slots())
             || self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen
     }
-}
-
-/// Sleeps until one of these mailboxes has a package, `other` says that there is something else to do, or the deadline
-/// has passed. May return early for no reason. All must be of one participant, whose bell it is that wakes.
-///
-/// Whoever makes `other` true from outside calls [`Participant::ring`] afterwards.
-///
-/// # Panics
-/// When the mailboxes are of different participants: their bells are different words.
-pub fn wait_any(receivers: &mut [&mut Receiver], deadline: Option<Instant>, other: impl Fn() -> bool) {
-    let Some(participant) = receivers.first().map(|receiver| receiver.participant.clone()) else {
-        return;
-    };
-    assert!(receivers.iter().all(|receiver| Arc::ptr_eq(&receiver.participant, &participant)));
-    receivers.iter_mut().for_each(|receiver| receiver.settle());
-    let bell = &participant.entry().bell;
-    // ORDERING: Acquire, and before `drowsy`: whatever is published after the looks below rings, and so changes this value.
-    let seen = bell.load(Ordering::Acquire);
-    receivers.iter().for_each(|receiver| receiver.segment.slots().drowsy());
-    step!("wait: drowsy");
-    if !other() && !receivers.iter().any(|receiver| receiver.may_have()) {
-        let left = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
-        if left != Some(Duration::ZERO) {
-            doorbell::sleep(bell, seen, left);
-        }
-    }
-    receivers.iter().for_each(|receiver| receiver.segment.slots().awake());
 }
 
 /// A package in hand, read where it lies. Dropped, its slot is free.

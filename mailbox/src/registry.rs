@@ -88,9 +88,9 @@ impl Participant {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
             Err(error) => return Err(memory(error)),
         };
-        let old = match Segment::check(&file, name, true) {
+        let old = match Segment::check(&file, name) {
             Ok(old) => Some(old),
-            Err(BadSegment::Foreign) => None,
+            Err(BadSegment::Foreign | BadSegment::Version(_)) => None,
             Err(BadSegment::Io(error)) => return Err(memory(error)),
         };
         let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(memory)? else {
@@ -218,7 +218,7 @@ impl Node {
 
     /// A mailbox as it is now; none when it does not exist (any more).
     pub fn look_at(&self, name: Name) -> Option<MailboxInfo> {
-        let (segment, file) = Segment::open(self.path(), name, false).ok()?;
+        let (segment, file) = Segment::look_at(self.path(), name).ok()?;
         let page = segment.page();
         let slots = segment.slots();
         let waits = |slot: &usize| {
@@ -247,7 +247,7 @@ impl Node {
         let failed = |error| NodeError::Io(path.clone(), error);
         let registry = RegistryLock::take(self.path())?;
         let Ok(file) = open_shared(&path, false) else { return Ok(false) };
-        let old = Segment::check(&file, name, true);
+        let old = Segment::check(&file, name);
         let Some(_owner) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else { return Ok(false) };
         if let Ok(old) = old {
             retire(&old);

@@ -1,7 +1,7 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
 use crate::clock::monotonic_ns;
-use crate::layout::{Page, SLOT_PREFIX, Shape};
+use crate::layout::{Page, SLOT_PREFIX, Shape, VERSION};
 use crate::memory::Mapping;
 use crate::name::Name;
 use crate::node::{open_shared, open_to_read};
@@ -24,9 +24,12 @@ pub(crate) struct Segment {
 pub(crate) enum BadSegment {
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// Foreign, damaged, or of another version.
-    #[error("it is no mailbox of this version")]
+    /// Foreign, or damaged.
+    #[error("its file is no mailbox, or damaged; end its owner, and remove the file with `rohrpost clean`")]
     Foreign,
+    /// Another version's layout.
+    #[error("it was made by another version (layout {0}, this program {VERSION}); build both from the same version")]
+    Version(u32),
 }
 
 /// The file of a mailbox.
@@ -54,23 +57,37 @@ impl Segment {
     }
 
     /// Maps the mailbox of this name as it stands.
-    pub(crate) fn open(node: &Path, name: Name, writable: bool) -> Result<(Self, File), BadSegment> {
-        let path = path_of(node, name);
-        let file = if writable { open_shared(&path, false)? } else { open_to_read(&path)? };
-        Ok((Self::check(&file, name, writable)?, file))
+    pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
+        Self::check(&open_shared(&path_of(node, name), false)?, name)
+    }
+
+    /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.
+    pub(crate) fn look_at(node: &Path, name: Name) -> Result<(Self, File), BadSegment> {
+        let file = open_to_read(&path_of(node, name))?;
+        let shape = Self::identify(&file, name)?;
+        Ok((Self { mapping: Mapping::new(&file, shape.slots_offset(), false)?, name, shape }, file))
     }
 
     /// Maps a file and checks that it is this mailbox, whole.
-    pub(crate) fn check(file: &File, name: Name, writable: bool) -> Result<Self, BadSegment> {
+    pub(crate) fn check(file: &File, name: Name) -> Result<Self, BadSegment> {
+        let shape = Self::identify(file, name)?;
+        Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), true)?, name, shape })
+    }
+
+    fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
         if file.metadata()?.len() < size_of::<Page>() as u64 {
             return Err(BadSegment::Foreign);
         }
         let front = Mapping::new(file, size_of::<Page>(), false)?;
-        let (found, shape) = front.at::<Page>(0).identity.read().ok_or(BadSegment::Foreign)?;
+        let identity = &front.at::<Page>(0).identity;
+        if let Some(other) = identity.other_version() {
+            return Err(BadSegment::Version(other));
+        }
+        let (found, shape) = identity.read().ok_or(BadSegment::Foreign)?;
         if found != name || file.metadata()?.len() < shape.segment_bytes() as u64 {
             return Err(BadSegment::Foreign);
         }
-        Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), writable)?, name, shape })
+        Ok(shape)
     }
 
     pub(crate) fn lock_in_memory(&self) -> bool {

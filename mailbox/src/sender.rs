@@ -103,8 +103,8 @@ impl Participant {
 }
 
 fn open(participant: &Participant, name: Name) -> Result<Segment, SendError> {
-    match Segment::open(participant.node().path(), name, true) {
-        Ok((segment, _)) => Ok(segment),
+    match Segment::open(participant.node().path(), name) {
+        Ok(segment) => Ok(segment),
         Err(BadSegment::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => Err(SendError::NoMailbox(name)),
         Err(error) => Err(SendError::Bad(name, error.to_string())),
     }
@@ -246,7 +246,7 @@ impl Sender {
     fn wake(&self) {
         step!("send: before bell");
         let owner = self.segment.page().owner.participant.load(std::sync::atomic::Ordering::Relaxed);
-        doorbell::ring(&self.participant.node().entry(owner as u16).bell);
+        doorbell::ring(self.participant.node(), owner as u16);
         step!("send: rung");
     }
 }

@@ -5,6 +5,7 @@
 mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, label, shape};
+use rohrpost_mailbox::{Full, Interest, Shape, Waiting, Watches};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::time::Duration;
@@ -35,18 +36,29 @@ unsafe impl GlobalAlloc for Counting {
 
 #[test]
 fn the_hot_paths_do_not_touch_the_heap() {
+    a_round_again_and_again(Full::Displace);
+    a_round_again_and_again(Full::Latest);
+}
+
+fn a_round_again_and_again(full: Full) {
     let ground = Ground::new();
     let node = ground.node();
-    let mut receiver = ground.join().receiver(MAILBOX, shape(8)).unwrap();
+    let mut receiver = ground.join().receiver(MAILBOX, Shape { full, ..shape(8) }).unwrap();
     let mut sender = ground.sender();
+    let (_far, near) = std::os::unix::net::UnixStream::pair().unwrap();
+    let mut watches = Watches::new(receiver.participant()).unwrap();
+    watches.add(&near, Interest::Both).unwrap();
     let clock = rohrpost_mailbox::SystemClock::open(&node);
     let mut publications = rohrpost_mailbox::Publications::new(&ground.join());
     let mut round = |id: u16, sender: &mut rohrpost_mailbox::Sender, receiver: &mut rohrpost_mailbox::Receiver| {
         for number in 1..=9 {
             // More types than a sender remembers, so that it looks for their rows, too.
             let kind = rohrpost_mailbox::Type::command(number);
-            let label = rohrpost_mailbox::Label { kind, ..label(LOW, id) };
-            let _ = sender.send(&label, &[b"parts", b"of a body"]);
+            let other = rohrpost_mailbox::Label { kind, ..label(LOW, id) };
+            let _ = sender.send(&other, &[b"parts", b"of a body"]);
+            // The same again, and more of them than it remembers.
+            let _ = sender.send(&label(LOW, id), &[b"parts", b"of a body"]);
+            let _ = sender.send(&label(LOW, id + number), &[b"more than it remembers"]);
             publications.published(MAILBOX, rohrpost_mailbox::Type::data(number), 10, Duration::ZERO);
         }
         sender.send(&label(HIGH, id), &[b"displaces"]).unwrap();
@@ -57,6 +69,11 @@ fn the_hot_paths_do_not_touch_the_heap() {
             all += package.body().len();
         }
         assert!(all > 0 && receiver.receive_timeout(Duration::from_micros(1)).is_none());
+        let spinning = Waiting { spin: Duration::from_micros(2), ..Duration::from_micros(3).into() };
+        assert!(receiver.receive_timeout(spinning).is_none());
+        watches.wait_any(&mut [receiver], Duration::from_micros(1), || false);
+        assert!(watches.next_ready().is_some_and(|ready| ready.writable));
+        receiver.participant().ring();
         node.announce_death();
         let _ = clock.now();
     };

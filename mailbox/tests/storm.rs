@@ -15,7 +15,8 @@ const SHAPE: Shape = Shape { slots: 16, body_bytes_max: 256, full: Full::Displac
 #[test]
 fn role() {
     let Some((role, ground)) = common::role() else { return };
-    match role.as_str() {
+    let (role, policy) = role.split_once(", ").unwrap_or((&role, "displace"));
+    match role {
         "send for a while" => {
             let end = Instant::now() + Duration::from_secs(4);
             let accepted = send_at_random(&ground, || Instant::now() < end);
@@ -25,7 +26,8 @@ fn role() {
             send_at_random(&ground, || true);
         }
         "receive until killed" => {
-            let mut receiver = ground.join().receiver(MAILBOX, SHAPE).unwrap();
+            let full = Full::ALL.into_iter().find(|full| full.name() == policy).unwrap();
+            let mut receiver = ground.join().receiver(MAILBOX, Shape { full, ..SHAPE }).unwrap();
             let mut order = Order::default();
             tell("ready");
             loop {
@@ -147,9 +149,20 @@ fn everything_sent_is_received_in_order_or_counted_as_lost() {
 
 #[test]
 fn a_storm_of_kills_leaves_nothing_torn_stuck_or_hidden() {
+    storm(Full::Displace, Loss::Displaced);
+}
+
+#[test]
+fn a_storm_of_kills_leaves_nothing_of_what_was_replaced() {
+    storm(Full::Latest, Loss::Replaced);
+}
+
+fn storm(full: Full, cause: Loss) {
+    let shape = Shape { full, ..SHAPE };
     let ground = Ground::new();
-    drop(ground.join().receiver(MAILBOX, SHAPE).unwrap());
-    let roles = ["receive until killed", "send until killed", "send until killed", "send until killed"];
+    drop(ground.join().receiver(MAILBOX, shape).unwrap());
+    let receive = format!("receive until killed, {}", full.name());
+    let roles = [&receive, "send until killed", "send until killed", "send until killed"];
     let mut processes: Vec<Process> = roles.iter().map(|role| ground.start(role)).collect();
     assert_eq!(processes[0].hear(), "ready");
     let node = ground.node();
@@ -169,13 +182,14 @@ fn a_storm_of_kills_leaves_nothing_torn_stuck_or_hidden() {
     kills += roles.len() as u64;
     node.announce_death();
 
-    let mut receiver = ground.join().receiver(MAILBOX, SHAPE).unwrap();
+    let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
     let mut order = Order::default();
     while let Some(package) = receiver.try_receive() {
         order.check(&package);
     }
     let info = ground.look();
     assert_eq!(info.depth, 0);
+    assert!(lost(&info, cause) > 100, "too quiet to prove anything: {info:?}");
     assert!(
         info.sent.abs_diff(accounted(&info)) <= kills,
         "{kills} kills, {} accounted for: {info:#?}",
@@ -183,8 +197,8 @@ fn a_storm_of_kills_leaves_nothing_torn_stuck_or_hidden() {
     );
     assert!(received(&info) > 1000, "too quiet to prove anything: {info:?}");
     let mut sender = ground.sender();
-    for _ in 0..SHAPE.slots {
-        sender.send(&label(Priority(1), 0), &[]).unwrap();
+    for id in 0..SHAPE.slots {
+        sender.send(&label(Priority(1), id), &[]).unwrap();
     }
     for _ in 0..SHAPE.slots {
         assert!(receiver.receive_timeout(PATIENCE).is_some());

@@ -3,6 +3,7 @@
 use crate::interface::Interfaces;
 use crate::parameter::ParameterSet;
 use crate::runtime::{Context, Received};
+use rohrpost_mailbox::Ready;
 use serde::de::DeserializeOwned;
 use std::fmt;
 
@@ -59,6 +60,18 @@ pub trait Module: Sized {
     /// # Errors
     /// The module is switched off and in error.
     fn received(&mut self, _context: &mut Context, _data: &Received<'_>) -> Result<(), ModuleError> {
+        Ok(())
+    }
+
+    /// Takes what a descriptor brings that it watches ([`Context::watch`]), while it is on. It is called again as long as there is
+    /// something; so read what there is, and when that is the end, [`Context::unwatch`].
+    ///
+    /// Whatever waits here keeps all else of the module waiting: read once, or make the descriptor non-blocking and read
+    /// until `WouldBlock`.
+    ///
+    /// # Errors
+    /// The module is switched off and in error.
+    fn ready(&mut self, _context: &mut Context, _ready: Ready) -> Result<(), ModuleError> {
         Ok(())
     }
 }

@@ -4,9 +4,10 @@
 
 use rohrpost_mailbox::{HEAD_BYTES, Head, Name, Options, Priority, Type};
 use rohrpost_modules::call::{CallEnvelope, Fault, ReplyEnvelope};
-use rohrpost_modules::common::{DataHead, OutputLevel};
+use rohrpost_modules::common::{self, DataHead, OutputLevel, SetParameters};
 use rohrpost_modules::interfaces::{DriveError, MotorInterface};
 use rohrpost_modules::output::{LINES, OutputLine};
+use rohrpost_modules::parameter::Refusal;
 
 const PAGE: &str = include_str!("../../docs/src/wire.md");
 
@@ -52,6 +53,42 @@ fn a_reply_has_the_documented_bytes() {
     let head =
         Head { to: PILOT, from: MOTOR, kind: Type::reply(16), id: 7, priority: Priority(140), ..Head::default() };
     check("reply", head, &envelope.to_bytes(), &postcard::to_stdvec(&Ok::<(), DriveError>(())).unwrap());
+}
+
+#[test]
+fn setting_a_parameter_has_the_documented_bytes() {
+    let tool = Name::new(1, 16, 1, 1);
+    let call = CallEnvelope {
+        interface: common::HASH,
+        incarnation: 1_234_567_890,
+        sequence: 7,
+        valid_for_us: 1_000_000,
+        age_us: 0,
+    };
+    let kind = Type::command(common::SET_PARAMETERS);
+    let head = Head { to: PILOT.with_local(0), from: tool, kind, id: 7, priority: Priority(16), ..Head::default() };
+    let values = vec![("cruise-m-s".to_owned(), postcard::to_stdvec(&0.4f64).unwrap())];
+    let wish = SetParameters { values, only_check: false };
+    check("set", head, &call.to_bytes(), &postcard::to_stdvec(&wish).unwrap());
+}
+
+#[test]
+fn refusals_have_the_documented_numbers() {
+    let (table, _) = PAGE.split("| | refusal |").nth(1).unwrap().split_once("\n\n").unwrap();
+    let rows = table.lines().skip(2).count();
+    let (name, text) = (String::new(), String::new());
+    let refusals = [
+        Refusal::NoParameters,
+        Refusal::Unknown { name: name.clone(), known: text.clone() },
+        Refusal::Twice(name.clone()),
+        Refusal::Type { name: name.clone(), text: text.clone() },
+        Refusal::Range { name, value: text.clone(), range: text.clone() },
+        Refusal::Module(text),
+    ];
+    assert_eq!(rows, refusals.len());
+    for (number, refusal) in refusals.iter().enumerate() {
+        assert_eq!(usize::from(postcard::to_stdvec(refusal).unwrap()[0]), number, "{refusal}");
+    }
 }
 
 #[test]

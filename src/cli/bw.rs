@@ -28,8 +28,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
-    let module = running.module(&arguments.name)?;
-    running.noted(module)?;
+    let module = running.present(&arguments.name)?;
     let data = arguments.data.as_deref().map(|name| data_of(&running, module, Some(name))).transpose()?;
     let mut tracks = Tracks::new(arguments.pace.window()?);
     let wanted = |flow: &FlowInfo| match &data {

@@ -1,27 +1,24 @@
 //! `rohrpost completions`, and the answers to the shells that it was set up in.
 //!
 //! A shell runs this command anew at each press of the key, with the words so far. Names of modules and nodes come from the
-//! configuration that launch has noted, so nobody is asked. What a built-in module offers is known here as well; a program
-//! of one's own is asked for its description, once, as `rohrpost call NAME` does.
+//! configuration that launch has noted, functions and data from what modules have noted of themselves beside their mailboxes:
+//! nobody is asked.
 
 use super::call::COMMON;
-use super::target::{Running, Target};
+use super::target::Target;
 use super::{Failure, say};
 use clap::builder::StyledStr;
 use clap::{Arg, Command, CommandFactory, ValueEnum};
 use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCandidate, PathCompleter};
 use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
 use rohrpost::common::OutputLevel;
-use rohrpost::config::{BUILTINS, Installation, Program};
+use rohrpost::config::{BUILTINS, Installation};
 use rohrpost::description::Description;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
 
 /// By this variable a shell tells that it asks, and which it is.
 const VARIABLE: &str = "ROHRPOST_COMPLETE";
-/// Nobody waits longer for a list that they did not call for.
-const PATIENCE: Duration = Duration::from_millis(300);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -63,12 +60,14 @@ pub(super) fn answer() {
 
 /// The command line, with what each argument can be. Arguments mean the same wherever they have the same name.
 fn command() -> Command {
-    let mut command = super::Arguments::command();
+    with_candidates(super::Arguments::command())
+}
+
+fn with_candidates(command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
-    for name in names {
-        command = command.mut_subcommand(&name, |sub| sub.mut_args(|arg| completed(&name, arg)));
-    }
-    command
+    let named = command.get_name().to_owned();
+    let command = command.mut_args(|arg| completed(&named, arg));
+    names.iter().fold(command, |command, name| command.mut_subcommand(name, with_candidates))
 }
 
 fn completed(command: &str, arg: Arg) -> Arg {
@@ -168,21 +167,10 @@ fn call_arguments() -> Vec<CompletionCandidate> {
     }
 }
 
-/// What the module says of itself that the words name.
+/// What the module says of itself that the words name: noted beside its mailboxes, so that it is not asked.
 fn described() -> Option<Description> {
     let running = target().find().ok()?;
     let classes = &running.installation.classes;
     let name = words().iter().find_map(|word| classes.parse_module(word).ok())?;
-    let module = running.installation.module(name)?;
-    match &module.program {
-        Program::Builtin(builtin) => rohrpost_modules::builtin::description(builtin, classes.name(name.class())?),
-        Program::Command(_) => asked(&running, name),
-    }
-}
-
-fn asked(running: &Running, module: rohrpost::Name) -> Option<Description> {
-    let mut tool = running.join(PATIENCE).ok()?;
-    let description = tool.describe(module).ok();
-    tool.close();
-    description
+    running.noted(name).ok()
 }

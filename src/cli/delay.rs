@@ -69,8 +69,7 @@ struct Delays {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
-    let module = running.module(&arguments.name)?;
-    running.noted(module)?;
+    let module = running.present(&arguments.name)?;
     let names = data_of(&running, module, None).unwrap_or_default();
     let long = arguments.pace.window()?;
     let mut watched = Watched { waits: Window::new(long), data: Tracks::new(long) };

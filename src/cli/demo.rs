@@ -122,7 +122,7 @@ fn configuration(arguments: &Arguments, temporary: &Path) -> Result<PathBuf, Fai
         return Ok(own);
     }
     let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
-    let folder = if there { own.parent().unwrap_or(Path::new(".")).canonicalize()? } else { std::env::current_dir()? };
+    let folder = if there { installation_folder(&own)? } else { std::env::current_dir()? };
     // Checked as it was written, so that a mistake is told with its own file and line.
     let installation = super::check::judge(Installation::parse(&text, &own)?)?;
     let mut table: toml::Table = toml::from_str(&text)?;
@@ -142,6 +142,11 @@ fn configuration(arguments: &Arguments, temporary: &Path) -> Result<PathBuf, Fai
     std::fs::write(&file, toml::to_string(&table)?)?;
     std::fs::write(temporary.join("building.map"), BUILDING)?;
     Ok(file)
+}
+
+/// The folder of a file that is there; a file named without one is in the present folder.
+fn installation_folder(file: &Path) -> Result<PathBuf, Failure> {
+    Ok(file.canonicalize()?.parent().map(Path::to_owned).unwrap_or_default())
 }
 
 fn is_gui(name: &str) -> bool {

@@ -82,6 +82,16 @@ pub(super) fn short(seconds: f64) -> String {
     time(Duration::try_from_secs_f64(seconds).unwrap_or_default())
 }
 
+/// Four digits or more: jitter is small beside the interval.
+fn fine(seconds: f64) -> String {
+    let us = seconds * 1e6;
+    match us {
+        us if us < 9_999.5 => format!("{us:.1} µs"),
+        us if us < 9_999_500.0 => format!("{:.2} ms", us / 1e3),
+        us => format!("{:.2} s", us / 1e6),
+    }
+}
+
 fn in_text(name: &str, wide: usize, figures: Option<Figures>) -> String {
     let Some(figures) = figures else {
         return format!("{name:wide$}  never published; `rohrpost status` tells whether the module is on");
@@ -89,11 +99,11 @@ fn in_text(name: &str, wide: usize, figures: Option<Figures>) -> String {
     let (Some(rate_hz), Some(std_s)) = (figures.rate_hz, figures.interval_std_s) else {
         return format!("{name:wide$}  nothing new in this window; the last came {} ago", short(figures.silent_s()));
     };
-    let (min, max) = figures.interval_s.map_or(("-".into(), "-".into()), |(min, max)| (short(min), short(max)));
+    let (min, max) = figures.interval_s.map_or(("-".into(), "-".into()), |(min, max)| (fine(min), fine(max)));
     format!(
-        "{name:wide$}  {rate_hz:9.3} Hz  mean {:>8}  min {min:>8}  max {max:>8}  std {:>8}  {} values",
-        short(1.0 / rate_hz),
-        short(std_s),
+        "{name:wide$}  {rate_hz:9.3} Hz  mean {:>9}  min {min:>9}  max {max:>9}  std {:>9}  {} values",
+        fine(1.0 / rate_hz),
+        fine(std_s),
         figures.packages
     )
 }

@@ -25,6 +25,7 @@ mod summary;
 mod table;
 mod target;
 mod top;
+mod version;
 mod watch;
 
 use clap::{Parser, Subcommand};
@@ -36,7 +37,7 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Prioritised mailboxes for robots: check a configuration, launch it, look at it, call it.
 #[derive(Parser)]
-#[command(name = "rohrpost", version, after_help = "Try `rohrpost demo`, then in another terminal `rohrpost list`.")]
+#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost list`.")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -90,6 +91,8 @@ enum Command {
     New(new::Arguments),
     /// Print a script by which a shell completes commands, modules, functions and data.
     Completions(completions::Arguments),
+    /// Print versions: of this program, and of what it shares with others.
+    Version(version::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
 }
@@ -121,6 +124,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
+        Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {

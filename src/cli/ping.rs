@@ -81,7 +81,10 @@ pub(super) fn stopped(stop: &std::sync::mpsc::Receiver<Event>, wait: Duration) -
 }
 
 fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64, error: &CallError) -> bool {
-    let why = running.told(module, error).to_string();
+    let why = match error {
+        CallError::Timeout(_, time) => format!("no answer within {time:?}"),
+        error => running.told(module, error).to_string(),
+    };
     if arguments.json {
         return say(json!({"number": number, "round_trip_s": null, "error": why}));
     }

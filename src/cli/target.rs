@@ -53,7 +53,14 @@ impl Target {
 fn only_running() -> Result<(PathBuf, String), Failure> {
     let running = rohrpost::find_running();
     match &running[..] {
-        [] => Err("no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into()),
+        [] => {
+            // One that cannot be looked into is no reason to say that none is there.
+            let others = rohrpost::find_other_versions().into_iter().next();
+            Err(others.map_or_else(
+                || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
+                Failure::from,
+            ))
+        }
         [only] => noted_config(only),
         several => {
             let list: Vec<String> = several.iter().map(|path| path.display().to_string()).collect();
@@ -68,7 +75,7 @@ fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
     let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
     match text.lines().collect::<Vec<_>>()[..] {
         [config, node] => Ok((config.into(), node.into())),
-        _ => Err(format!("{} is not what this version of launch writes; say --config FILE", file.display()).into()),
+        _ => Err(format!("{} was written by another version of launch; say --config FILE", file.display()).into()),
     }
 }
 
@@ -90,15 +97,22 @@ impl Running {
         Ok(self.installation.classes.parse_name(text)?.module())
     }
 
+    /// The module or face that a user names, if it has mailboxes on this node.
+    pub(super) fn present(&self, text: &str) -> Result<Name, Failure> {
+        let module = self.module(text)?;
+        let here = self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module);
+        if here { Ok(module) } else { Err(self.absent(module)) }
+    }
+
+    fn absent(&self, module: Name) -> Failure {
+        let known = self.installation.module(module).is_some();
+        let next = if known { "is it launched? see `rohrpost list`" } else { "`rohrpost list` shows those that run" };
+        format!("{} has no mailboxes here; {next}", self.text(module)).into()
+    }
+
     /// What the module offers, as it noted beside its mailboxes: nobody is asked.
     pub(super) fn noted(&self, module: Name) -> Result<Description, Failure> {
-        let text = self.text(module);
-        Description::noted(&self.node, module).ok_or_else(|| {
-            let known = self.installation.module(module).is_some();
-            let next =
-                if known { "is it launched? see `rohrpost list`" } else { "`rohrpost list` shows those that run" };
-            format!("{text} has no mailboxes here; {next}").into()
-        })
+        Description::noted(&self.node, module).ok_or_else(|| self.absent(module))
     }
 
     /// An error about a module, with its name as users write it: the lower layers know numbers only.

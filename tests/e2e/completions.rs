@@ -54,16 +54,15 @@ fn bash_offers_what_the_running_node_has() {
     assert_eq!(offered(&place, &["rohrpost", "log", "--module", "o"]), ["output.0"]);
     assert_eq!(offered(&place, &["rohrpost", "log", "--level", "d"]), ["debug"]);
     assert_eq!(offered(&place, &["rohrpost", "run", "m"]), ["mapper"]);
-    // What a built-in module offers.
+    // What modules have noted of themselves, built in or one's own.
     assert_eq!(offered(&place, &["rohrpost", "call", "output.0", "li"]), ["lines_from"]);
     assert_eq!(offered(&place, &["rohrpost", "echo", "output.0", ""]), ["line"]);
-    assert_eq!((received("probe.0"), received("output.0")), before, "nobody was sent anything for this");
-    // What one of our own offers only it knows.
     let functions = offered(&place, &["rohrpost", "call", "probe.0", ""]);
     assert!(["count", "tell", "on", "get"].iter().all(|name| functions.iter().any(|f| f == name)), "{functions:?}");
     assert_eq!(offered(&place, &["rohrpost", "call", "probe.0", "cou"]), ["count", "count_again"]);
     assert_eq!(offered(&place, &["rohrpost", "call", "probe.0", "get", "b"]), ["beat"]);
     assert_eq!(offered(&place, &["rohrpost", "echo", "probe.0", ""]), ["beat", "silence"]);
+    assert_eq!((received("probe.0"), received("output.0")), before, "nobody was sent anything for this");
     launch.stop();
     place.assert_empty();
 }

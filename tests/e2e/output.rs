@@ -46,7 +46,7 @@ fn a_flood_of_one_module_hides_no_error() {
     let told = all.iter().find(|line| line["suppressed"].as_u64() > Some(0)).unwrap();
     assert_eq!(told["level"], "warn");
     let text = told["text"].as_str().unwrap();
-    assert!(text.contains("lines were suppressed in") && text.contains("more than 100 a second"), "{text}");
+    assert!(text.contains("lines were suppressed in ") && text.contains("more than 100 a second"), "{text}");
     let status = place.say(&["status", "probe.0", "--json", "--timeout", "60"]).json();
     assert_eq!(status[0]["output_suppressed"], 100_000 - said);
 }

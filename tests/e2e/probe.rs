@@ -97,6 +97,10 @@ pub(crate) trait Probing {
     /// Never published.
     #[data(2)]
     fn silence() -> u64;
+
+    /// Bytes, of a size that changes; what it publishes is written down in the file `published`.
+    #[data(3)]
+    fn blob() -> Vec<u8>;
 }
 
 #[derive(Deserialize, Default)]
@@ -108,6 +112,8 @@ pub(crate) struct Settings {
     slow_ms: u64,
     /// Publishes `beat` so often.
     rate_hz: f64,
+    /// Publishes `blob` so often.
+    blob_hz: f64,
     panic_at_start: bool,
     /// Ends before it is ready.
     exit_at_start: Option<i32>,
@@ -152,6 +158,19 @@ fn write_line(record: &Path, line: &str) {
     file.write_all(format!("{line}\n").as_bytes()).unwrap();
 }
 
+impl Probe {
+    /// Publishes, and writes down when (between two moments of the monotonic clock) and how many bytes.
+    fn publish_blob(&self, context: &mut Context) -> Result<(), ModuleError> {
+        let blob = vec![0; 10 + self.beats as usize % 7 * 15];
+        let before = rohrpost::mailbox::monotonic_ns();
+        context.publish_now(ProbingInterface::BLOB, &blob)?;
+        let after = rohrpost::mailbox::monotonic_ns();
+        // As postcard: the length in one byte, and the bytes.
+        write_line(&context.path("published"), &format!("{before} {after} {}", blob.len() + 1));
+        Ok(())
+    }
+}
+
 impl Module for Probe {
     type Settings = Settings;
     type Interfaces = ProbingInterface;
@@ -159,7 +178,7 @@ impl Module for Probe {
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         let me = context.installation().classes.format(context.me());
         let record = settings.record.as_ref().map(|file| context.path(file));
-        let rate_hz = if settings.rate_hz > 0.0 { settings.rate_hz } else { 100.0 };
+        let rate_hz = [settings.blob_hz, settings.rate_hz].into_iter().find(|rate| *rate > 0.0).unwrap_or(100.0);
         context.set_period(Duration::from_secs_f64(1.0 / rate_hz));
         let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None };
         probe.note("start");
@@ -206,6 +225,9 @@ impl Module for Probe {
         self.beats += 1;
         if self.settings.rate_hz > 0.0 {
             context.publish_now(ProbingInterface::BEAT, &self.beats)?;
+        }
+        if self.settings.blob_hz > 0.0 {
+            self.publish_blob(context)?;
         }
         Ok(())
     }

@@ -129,6 +129,7 @@ fn a_mistaken_command_line_is_usage() {
         "doctor",
         "new",
         "completions",
+        "version",
     ] {
         let help = place.say(&[command, "--help"]).ok();
         assert!(help.contains("Example"), "{command} has no example:\n{help}");

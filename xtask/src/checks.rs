@@ -15,13 +15,26 @@ pub(crate) fn test() -> Result<ExitCode, Failure> {
     cargo::run("testing all but the GUI bridge", &mut cargo(&["test", "--workspace", "--exclude", BRIDGE]))?;
     let bridge = ["--profile", BRIDGE_PROFILE, "--package", BRIDGE];
     cargo::run("testing the GUI bridge", cargo(&["test"]).args(bridge))?;
-    cargo::run("building the GUI bridge", cargo(&["build"]).args(bridge))?;
+    // The example is a bridge with a view of one's own, which a test starts.
+    let bins = ["--bin", BRIDGE, "--example", "own_view"];
+    cargo::run("building the GUI bridge", cargo(&["build"]).args(bridge).args(bins))?;
     let rerun = venv::venv()?.rerun;
     cargo::run(
-        "testing drawings with Rerun's command line",
-        cargo(&["test", "--package", "rohrpost", "--features", "rerun-tests", "--test", "rerun"])
-            .env("ROHRPOST_RERUN", rerun)
-            .env("ROHRPOST_BRIDGE", cargo::target().join(BRIDGE_PROFILE).join(BRIDGE)),
+        "testing drawings, and a viewer that misbehaves, with Rerun's command line",
+        cargo(&[
+            "test",
+            "--package",
+            "rohrpost",
+            "--features",
+            "rerun-tests",
+            "--test",
+            "rerun",
+            "--",
+            "--test-threads",
+            "1",
+        ])
+        .env("ROHRPOST_RERUN", rerun)
+        .env("ROHRPOST_BRIDGE", cargo::target().join(BRIDGE_PROFILE).join(BRIDGE)),
     )?;
     Ok(ExitCode::SUCCESS)
 }

@@ -71,7 +71,7 @@ fn a_datum_lands_below_its_module_and_says_the_same_text_once() {
     for second in 0..5 {
         drawing.at_s(second);
         let gauge = map(&[("a/b", Value::U(second.into())), ("maker", Value::Text("Akku AG".into()))]);
-        drawing.scene.generic("battery.0", "gauge", &gauge).unwrap();
+        drawing.scene.generic("battery.0", "gauge", &gauge);
     }
     let rows = drawing.rows();
     assert_eq!(rows[r"/data/battery.0/gauge/a\/b"], 5, "a field's name is one part, whatever is in it");

@@ -14,7 +14,7 @@ fn a_way_of_any_length_is_drawn_with_few_entities_and_rows() {
     for step in 0..steps {
         let angle = f64::from(step) * 0.02;
         let pose = Pose { x_m: 10.0 * angle.cos(), y_m: 10.0 * angle.sin(), heading_rad: angle };
-        drawing.scene.pose("slam.0", &pose).unwrap();
+        drawing.scene.pose("slam.0", &pose);
     }
     let rows = drawing.rows();
     let trail: Vec<_> = rows.iter().filter(|(entity, _)| entity.starts_with("/world/trail/slam.0/")).collect();

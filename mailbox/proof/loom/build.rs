@@ -11,7 +11,7 @@ use broken::{BROKEN, Edit, MIRRORED, MODELS};
 
 const MAILBOX: &str = "../../src";
 /// What a variant consists of: the mailbox's, and ours.
-const PARTS: [&str; 5] = ["word", "slots", "queue", "rig", "models"];
+const PARTS: [&str; 6] = ["word", "slots", "queue", "bell", "rig", "models"];
 const OURS: [&str; 2] = ["rig", "models"];
 
 fn main() {

@@ -76,8 +76,9 @@ pub(super) fn saved<M: Module<Settings: Settings>>(
     module: &Configured,
 ) -> Option<SettingsError> {
     let saved = installation.saved.as_ref()?;
-    let settings: Result<M::Settings, _> = installation.settings_as(module);
-    settings.and_then(|settings| saved.check_names(installation, module, settings.parameters())).err()
+    let settings: M::Settings = installation.settings_without_saved(module).ok()?;
+    let names = saved.check_names(installation, module, settings.parameters());
+    names.and_then(|()| installation.settings_as::<M::Settings>(module).map(drop)).err()
 }
 
 /// What a built-in module would refuse.
@@ -146,18 +147,16 @@ fn data_of(installation: &Installation, show: &Show) -> Option<Problem> {
     let class = installation.classes.name(show.from.class())?;
     let Program::Builtin(builtin) = &module.program else { return None };
     let description = description(builtin, class)?;
-    if description.data_item(&show.data).is_some() {
+    let data = show.data.as_ref()?;
+    if description.data_item(data).is_some() {
         return None;
     }
     let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
-    let right = match (nearest(&show.data, names.iter().copied()), &names[..]) {
+    let right = match (nearest(data, names.iter().copied()), &names[..]) {
         (Some(name), _) => format!("did you mean `{name}`?"),
         (None, []) => "it publishes none; drop the entry".into(),
         (None, names) => format!("it has {}", names.join(", ")),
     };
     let from = installation.classes.format(show.from);
-    Some(Problem {
-        line: Some(show.line),
-        message: format!("[gui] show: `{from}` has no data `{}`; {right}", show.data),
-    })
+    Some(Problem { line: Some(show.line), message: format!("[gui] show: `{from}` has no data `{data}`; {right}") })
 }

@@ -19,7 +19,10 @@ pub enum Fault {
     #[error("interrupted, outcome unknown: the server was restarted while it had this command")]
     Interrupted,
     /// The caller was compiled with another interface; the server's hash.
-    #[error("interface differs: the server has {server:#010x}; build caller and server from the same interface")]
+    #[error(
+        "interface differs: the module has {server:#010x}; build caller and module from the same version of the interface \
+         and of Rohrpost (`rohrpost version`)"
+    )]
     InterfaceDiffers {
         /// Hash of the server's interface.
         server: u32,

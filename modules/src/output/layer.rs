@@ -5,6 +5,7 @@ use super::{TEXT_MAX, way};
 use crate::common::OutputLevel;
 use std::fmt::{self, Write};
 use tracing::field::{Field, Visit};
+use tracing::level_filters::LevelFilter;
 use tracing::subscriber::Interest;
 use tracing::{Event, Metadata, Subscriber};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
@@ -29,13 +30,23 @@ pub(super) fn listen() {
 struct OutputLayer;
 
 impl<S: Subscriber> Layer<S> for OutputLayer {
-    fn register_callsite(&self, _: &'static Metadata<'static>) -> Interest {
-        // The level changes at run time, so each event asks.
-        Interest::sometimes()
+    fn register_callsite(&self, metadata: &'static Metadata<'static>) -> Interest {
+        // Asked again for all of them when the level changes: an event that nobody hears costs its loop next to nothing.
+        if is_heard(metadata) { Interest::always() } else { Interest::never() }
     }
 
     fn enabled(&self, metadata: &Metadata<'_>, _: Context<'_, S>) -> bool {
-        way::installed().is_some_and(|output| level_of_event(metadata.level()) <= output.level())
+        is_heard(metadata)
+    }
+
+    fn max_level_hint(&self) -> Option<LevelFilter> {
+        Some(match way::installed()?.level() {
+            OutputLevel::Error => LevelFilter::ERROR,
+            OutputLevel::Warn => LevelFilter::WARN,
+            OutputLevel::Info => LevelFilter::INFO,
+            OutputLevel::Debug => LevelFilter::DEBUG,
+            OutputLevel::Trace => LevelFilter::TRACE,
+        })
     }
 
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
@@ -48,6 +59,15 @@ impl<S: Subscriber> Layer<S> for OutputLayer {
             output.say(level, cut(text.0));
         }
     }
+}
+
+/// What events are heard has changed.
+pub(super) fn level_changed() {
+    tracing::callsite::rebuild_interest_cache();
+}
+
+fn is_heard(metadata: &Metadata<'_>) -> bool {
+    way::installed().is_some_and(|output| level_of_event(metadata.level()) <= output.level())
 }
 
 fn level_of_event(level: &tracing::Level) -> OutputLevel {

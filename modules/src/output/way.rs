@@ -153,7 +153,9 @@ pub(crate) fn is_installed() -> bool {
 
 /// Sets which lines this process sends from now on; returns which it sent before, if it sends any.
 pub fn set_level(level: OutputLevel) -> Option<OutputLevel> {
-    installed().map(|output| level_from(output.level.swap(level as u8, Ordering::Relaxed)))
+    let before = level_from(installed()?.level.swap(level as u8, Ordering::Relaxed));
+    layer::level_changed();
+    Some(before)
 }
 
 /// Which lines this process sends, if it sends any.
@@ -194,7 +196,9 @@ pub fn retry_at() -> Option<Instant> {
     let now = Instant::now();
     let retry = (!output.is_idle()).then(|| now + RETRY_FULL.max(output.patience()));
     let now_ns = monotonic_ns();
-    let due_ns = output.lanes.iter().filter_map(|lane| lane.excess.due_ns()).min();
+    // Where there is no room for it, it is told when there is; until then its time would have passed again and again.
+    let room = output.lanes.iter().filter(|lane| !lane.queue.is_full());
+    let due_ns = room.filter_map(|lane| lane.excess.due_ns()).min();
     let due = due_ns.map(|due_ns| now + Duration::from_nanos(due_ns.saturating_sub(now_ns)));
     [retry, due].into_iter().flatten().min()
 }
@@ -212,7 +216,7 @@ impl Output {
         }
         self.suppressed.fetch_add(1, Ordering::Relaxed);
         if own.excess.add(now_ns) {
-            // The module's loop has slept since before there was something to tell.
+            // The module's loop may sleep, and has to wake up when it is time to tell.
             self.participant.ring();
         }
         false
@@ -229,7 +233,7 @@ impl Output {
         }
     }
 
-    /// A panic is over when its module's loop has sent what waits, unless nothing comes after it.
+    /// Says a panic. What finds no room now is sent later by the module's loop, or at the process's end.
     pub(super) fn panicked(&self, text: String) {
         if self.allows(Lane::Panic) {
             self.push(Lane::Panic, OutputLevel::Error, 0, text);
@@ -237,7 +241,7 @@ impl Output {
         self.drain();
         let before = PANICS.try_with(|panics| panics.replace(panics.get() + 1)).unwrap_or(0);
         if before > 0 || cfg!(panic = "abort") {
-            // A panic while another one unwinds aborts the process.
+            // Nothing comes after it: a second panic while the first one unwinds aborts the process.
             self.flush();
         } else if !self.is_idle() {
             self.participant.ring();
@@ -264,8 +268,7 @@ impl Output {
             }
             if let Some(Told { lines, within }) = told(&own.excess, monotonic_ns()) {
                 let ((what, level), rate) = (lane.words(), self.rate);
-                let within = within.as_secs_f64();
-                let text = format!("… {lines} {what} were suppressed in {within:.1} s: more than {rate} a second");
+                let text = format!("… {lines} {what} were suppressed in {within:.1?}: more than {rate} a second");
                 self.push(lane, level, lines, text);
             }
         }

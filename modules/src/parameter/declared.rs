@@ -1,8 +1,7 @@
 //! What `#[parameters]` makes of one field.
 
-use super::{Parameter, ParameterType, Refusal, value_text};
-use crate::value::{Value, encode};
-use postcard_schema::schema::owned::OwnedDataModelType as Ty;
+use super::{Parameter, ParameterType, Refusal, from_file, value_text};
+use crate::value::Value;
 use serde::{Deserialize, Deserializer, de};
 
 /// A parameter as its struct declares it.
@@ -66,18 +65,8 @@ impl<T: ParameterType> Declared<T> {
     /// What [`Refusal`] says; the deserializer knows the place.
     pub fn read<'de, D: Deserializer<'de>>(&self, deserializer: D) -> Result<T, D::Error> {
         let value = Value::deserialize(deserializer)?;
-        self.check_setting(&value).map_err(de::Error::custom)
-    }
-
-    fn check_setting(&self, value: &Value) -> Result<T, Refusal> {
-        let ty = T::schema();
-        // On a command line all is text; in a file a number stands without quotes.
-        if let (Value::Text(text), false) = (value, matches!(ty.ty, Ty::String | Ty::Enum(_))) {
-            let right = crate::value::describe_type(&ty);
-            return Err(self.type_refusal(format!("{text:?} is text; write a value of type {right}, without quotes")));
-        }
-        let bytes = encode(&ty, value).map_err(|error| self.type_refusal(error.to_string()))?;
-        self.check(&bytes)
+        let bytes = from_file(&T::schema(), &value).map_err(|text| self.type_refusal(text));
+        bytes.and_then(|bytes| self.check(&bytes)).map_err(de::Error::custom)
     }
 
     fn type_refusal(&self, text: String) -> Refusal {

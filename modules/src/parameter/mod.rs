@@ -9,6 +9,38 @@
 //!
 //! A value travels as postcard of its type, and whoever has no such type reads it by the description that comes with it:
 //! [`Parameter`].
+//!
+//! ```
+//! #[rohrpost_modules::parameters(crate = rohrpost_modules::macro_support)]
+//! struct Settings {
+//!     /// Speed when nothing is in the way.
+//!     #[parameter(unit = "m/s", min = 0.0, max = 1.5, default = 0.5)]
+//!     cruise_m_s: f64,
+//! }
+//! let settings: Settings = toml::from_str("cruise-m-s = 1.2").unwrap();
+//! assert_eq!(settings.cruise_m_s, 1.2);
+//! assert!(toml::from_str::<Settings>("cruise-m-s = 7.0").is_err());
+//! ```
+//!
+//! A range or a default that cannot be does not compile:
+//!
+//! ```compile_fail
+//! #[rohrpost_modules::parameters(crate = rohrpost_modules::macro_support)]
+//! struct Settings {
+//!     /// Beams to leave out.
+//!     #[parameter(min = 5, max = 3)]
+//!     skip: u8,
+//! }
+//! ```
+//!
+//! ```compile_fail
+//! #[rohrpost_modules::parameters(crate = rohrpost_modules::macro_support)]
+//! struct Settings {
+//!     /// Speed when nothing is in the way.
+//!     #[parameter(max = 1.5, default = 2.0)]
+//!     cruise_m_s: f64,
+//! }
+//! ```
 
 mod declared;
 mod kinds;
@@ -16,11 +48,11 @@ mod words;
 
 pub use declared::{Declared, put_parameter};
 pub use kinds::ParameterType;
-pub use words::{toml_text, value_text};
+pub use words::{from_file, from_word, toml_text, value_text};
 
-use crate::value::{Value, WalkError, decode, describe_type};
+use crate::value::{Value, WalkError, decode};
 use postcard_schema::Schema;
-use postcard_schema::schema::owned::{OwnedDataModelType, OwnedNamedType};
+use postcard_schema::schema::owned::OwnedNamedType;
 use serde::{Deserialize, Serialize};
 
 /// The parameters of a module and their present values. Written by [`crate::parameters`] for the settings struct.
@@ -75,14 +107,11 @@ impl Parameter {
             let value = bytes.as_ref().and_then(|bytes| decode(&self.ty, bytes).ok());
             value.map(|value| value_text(&value))
         };
-        match (bound(&self.least), bound(&self.most), &self.ty.ty) {
-            (Some(least), Some(most), _) => format!("{least}..={most}"),
-            (Some(least), None, _) => format!("at least {least}"),
-            (None, Some(most), _) => format!("at most {most}"),
-            (None, None, OwnedDataModelType::Enum(variants)) => {
-                variants.iter().map(|variant| words::kebab(&variant.name)).collect::<Vec<_>>().join("|")
-            }
-            (None, None, _) => describe_type(&self.ty),
+        match (bound(&self.least), bound(&self.most)) {
+            (Some(least), Some(most)) => format!("{least}..={most}"),
+            (Some(least), None) => format!("at least {least}"),
+            (None, Some(most)) => format!("at most {most}"),
+            (None, None) => words::type_text(&self.ty),
         }
     }
 
@@ -118,7 +147,7 @@ pub enum Refusal {
         text: String,
     },
     /// A value too small or too large.
-    #[error("`{name}` is {value}, which is out of its range {range}")]
+    #[error("`{name}` is {value}, out of range: {range}")]
     Range {
         /// The parameter.
         name: String,

@@ -1,6 +1,7 @@
 //! Values of parameters as people and files write them.
 
-use crate::value::Value;
+use crate::value::{Value, WalkError, describe_type, encode, parse_argument};
+use postcard_schema::schema::owned::{OwnedDataModelType as Ty, OwnedNamedType};
 
 /// A value for people: a choice as a word in kebab-case, all else as ever.
 ///
@@ -14,6 +15,38 @@ pub fn value_text(value: &Value) -> String {
         Value::Variant(name, payload) if **payload == Value::Null => kebab(name),
         other => other.to_string(),
     }
+}
+
+/// The bytes of a value that a file gives.
+///
+/// # Errors
+/// What is wrong with it. On a command line all is text; in a file a number stands without quotes.
+pub fn from_file(ty: &OwnedNamedType, value: &Value) -> Result<Vec<u8>, String> {
+    if let (Value::Text(text), false) = (value, matches!(ty.ty, Ty::String | Ty::Enum(_))) {
+        return Err(format!("{text:?} is text; write a value of type {}, without quotes", type_text(ty)));
+    }
+    encode(ty, value).map_err(|error| told(ty, &error))
+}
+
+/// The bytes of a value that was typed as one word.
+///
+/// # Errors
+/// What was expected.
+pub fn from_word(ty: &OwnedNamedType, word: &str) -> Result<Vec<u8>, String> {
+    let value = parse_argument(ty, word).map_err(|error| told(ty, &error))?;
+    encode(ty, &value).map_err(|error| told(ty, &error))
+}
+
+/// A type as people read it; of a choice, its words.
+pub(super) fn type_text(ty: &OwnedNamedType) -> String {
+    match &ty.ty {
+        Ty::Enum(variants) => variants.iter().map(|variant| kebab(&variant.name)).collect::<Vec<_>>().join("|"),
+        _ => describe_type(ty),
+    }
+}
+
+fn told(ty: &OwnedNamedType, error: &WalkError) -> String {
+    error.to_string().replace(&describe_type(ty), &type_text(ty))
 }
 
 /// A value as TOML writes it, so that it reads back as the same.
@@ -33,7 +66,7 @@ pub fn toml_text(value: &Value) -> String {
 }
 
 /// `TurnLeft` as `turn-left`.
-pub(super) fn kebab(name: &str) -> String {
+fn kebab(name: &str) -> String {
     let mut word = String::with_capacity(name.len() + 2);
     for (at, char) in name.char_indices() {
         if char.is_uppercase() && at > 0 && !word.ends_with('-') {

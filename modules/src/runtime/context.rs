@@ -8,9 +8,12 @@ use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
 use rohrpost_config::{Installation, NameTextError};
 use rohrpost_mailbox::{
-    CreateError, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime, Type, local,
+    CreateError, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime,
+    Type, Watch, Watches, local,
 };
 use std::cell::RefCell;
+use std::io;
+use std::os::fd::AsFd;
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -58,6 +61,8 @@ pub struct Context {
     pub(crate) clock: SystemClock,
     /// Mailboxes of the module's own, besides commands, replies and data.
     pub(crate) own: Vec<Receiver>,
+    /// Descriptors that the module waits for; none as long as it never asked.
+    pub(crate) watches: Option<Watches>,
     pub(crate) period: Option<Duration>,
     pub(crate) next_tick: Option<Instant>,
     scratch: Vec<u8>,
@@ -83,6 +88,7 @@ impl Context {
             followings: Followings::default(),
             clock,
             own: Vec::new(),
+            watches: None,
             period: None,
             next_tick: None,
             scratch: Vec::new(),
@@ -163,6 +169,27 @@ impl Context {
         let participant = self.link.borrow().participant().clone();
         self.own.push(participant.receiver(self.me.with_local(local), shape)?);
         Ok(())
+    }
+
+    /// Waits for a file descriptor too: a serial port, a socket, a pipe, anything that `poll` knows. When there is something to do
+    /// [`crate::Module::ready`] is called, while the module is on; until then it waits in the kernel.
+    ///
+    /// A duplicate is kept until [`Context::unwatch`]: closing one's own descriptor does not end it.
+    ///
+    /// # Errors
+    /// When [`rohrpost_mailbox::WATCHES_MAX`] are watched, the process has no descriptor left, or the pipe by which senders wake who
+    /// waits like this cannot be made in the node's directory.
+    pub fn watch(&mut self, descriptor: &impl AsFd, interest: Interest) -> io::Result<Watch> {
+        let watches = match &mut self.watches {
+            Some(watches) => watches,
+            none => none.insert(Watches::new(self.link.borrow().participant())?),
+        };
+        watches.add(descriptor, interest)
+    }
+
+    /// Waits for it no longer; false when it was not waited for.
+    pub fn unwatch(&mut self, watch: Watch) -> bool {
+        self.watches.as_mut().is_some_and(|watches| watches.remove(watch))
     }
 
     fn named(&self, module: &str, wanted: &'static str) -> Result<Name, ContextError> {

@@ -9,7 +9,7 @@ use crate::common::{DataHead, Status};
 use crate::interface::Interfaces;
 use crate::module::{Module, ModuleError};
 use crate::output;
-use rohrpost_mailbox::{Kind, ModuleState, Participant, Receiver, monotonic_ns, wait_any};
+use rohrpost_mailbox::{Kind, ModuleState, Participant, Receiver, Waiting, Watches, monotonic_ns, wait_any};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -173,6 +173,8 @@ pub(crate) struct Running<M> {
     pub(crate) turn_on: bool,
     /// Nobody else removes its mailboxes.
     pub(crate) by_hand: bool,
+    /// See [`Waiting::spin`].
+    pub(crate) spin: Duration,
     /// Empty; kept for its memory, so that going to sleep allocates nothing.
     pub(crate) receivers: Vec<&'static mut Receiver>,
 }
@@ -193,11 +195,9 @@ impl<M: Module> Running<M> {
             busy |= self.take_data();
             self.periodic();
             output::drain();
-            let before = Instant::now();
-            if !busy {
-                self.sleep();
-            }
-            if before.elapsed() >= PAUSE {
+            let slept = if busy { self.look() } else { self.sleep() };
+            self.ready();
+            if slept >= PAUSE {
                 awake_since = Instant::now();
             } else if awake_since.elapsed() >= AWAKE_MAX {
                 std::thread::sleep(PAUSE);
@@ -255,9 +255,30 @@ impl<M: Module> Running<M> {
         }
     }
 
-    /// Until a package comes, something is due, or it is told to stop.
-    fn sleep(&mut self) {
-        let on = self.life.state == ModuleState::On;
+    fn is_on(&self) -> bool {
+        self.life.state == ModuleState::On
+    }
+
+    /// Descriptors have their turn also when packages leave no time to sleep.
+    fn look(&mut self) -> Duration {
+        let on = self.is_on();
+        self.context.watches.iter_mut().filter(|_| on).for_each(Watches::look);
+        Duration::ZERO
+    }
+
+    /// Each descriptor that was ready, once.
+    fn ready(&mut self) {
+        while self.is_on()
+            && let Some(ready) = self.context.watches.as_mut().and_then(Watches::next_ready)
+        {
+            let result = self.life.module.ready(&mut self.context, ready);
+            self.life.check(result, &mut self.context);
+        }
+    }
+
+    /// Until a package comes, a descriptor is ready, something is due, or it is told to stop. How long it slept.
+    fn sleep(&mut self) -> Duration {
+        let on = self.is_on();
         let tick = self.context.next_tick.filter(|_| on);
         let renewal = self.context.followings.next().filter(|_| on);
         let now_ns = monotonic_ns();
@@ -271,8 +292,15 @@ impl<M: Module> Running<M> {
         receivers.push(&mut self.data);
         receivers.extend(&mut self.context.own);
         receivers.push(link.replies());
-        wait_any(&mut receivers, deadline, || self.stop.load(Ordering::Acquire));
+        let waiting = Waiting { spin: self.spin, deadline };
+        let stop = || self.stop.load(Ordering::Acquire);
+        // What comes for a module that is off waits where it is: it would end every sleep.
+        let slept = match self.context.watches.as_mut().filter(|_| on) {
+            Some(watches) => watches.wait_any(&mut receivers, waiting, stop),
+            None => wait_any(&mut receivers, waiting, stop),
+        };
         self.receivers = empty(receivers);
+        slept
     }
 
     fn end(mut self) {

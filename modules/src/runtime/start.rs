@@ -179,8 +179,9 @@ impl Start {
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
+        let spin = module.spin;
         let life = Life::new(made, participant);
-        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, receivers: Vec::new() })
+        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, spin, receivers: Vec::new() })
     }
 }
 
@@ -251,9 +252,24 @@ fn schedule(wanted: Scheduling) {
 
 /// Directories of the nodes of this user that are launched now.
 pub fn find_running() -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(base_directory()) else { return Vec::new() };
-    let running = |path: &PathBuf| Node::open(path).is_ok_and(|node| node.launcher().is_some());
-    let mut found: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(running).collect();
-    found.sort();
-    found
+    let launched = |node: &Node| node.launcher().is_some();
+    nodes()
+        .into_iter()
+        .filter(|(_, node)| node.as_ref().is_ok_and(|node| launched(node)))
+        .map(|(path, _)| path)
+        .collect()
+}
+
+/// Why nodes of this user cannot be looked into that another version of Rohrpost made: [`NodeError::Version`] of each.
+pub fn find_other_versions() -> Vec<NodeError> {
+    let errors = nodes().into_iter().filter_map(|(_, node)| node.err());
+    errors.filter(|error| matches!(error, NodeError::Version(..))).collect()
+}
+
+/// All nodes of this user, by their directories.
+fn nodes() -> Vec<(PathBuf, Result<Arc<Node>, NodeError>)> {
+    let entries = std::fs::read_dir(base_directory()).into_iter().flatten();
+    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.sort();
+    paths.into_iter().map(|path| (path.clone(), Node::open(&path))).collect()
 }

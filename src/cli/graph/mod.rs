@@ -256,6 +256,8 @@ fn common(number: u16) -> String {
         c::UNSUBSCRIBE => "unsubscribe",
         c::OUTPUT_LEVEL => "output-level",
         c::DESCRIBE => "describe",
+        c::PARAMETERS => "param get",
+        c::SET_PARAMETERS => "param set",
         other => return format!("number {other}"),
     };
     name.into()

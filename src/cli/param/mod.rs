@@ -1,5 +1,8 @@
 //! `rohrpost param`: settings that modules change while they run.
 
+mod file;
+mod load;
+mod save;
 mod set;
 mod show;
 
@@ -8,13 +11,16 @@ use super::{Failure, say};
 use rohrpost::parameter::{Parameter, Refusal};
 use rohrpost::survey::Survey;
 use rohrpost::{CallError, Fault, Name, ToolLink};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost param list                          the parameters of all modules
   rohrpost param get pilot.0                   those of one
-  rohrpost param set pilot.0 cruise-m-s 0.4    another value, from now on")]
+  rohrpost param set pilot.0 cruise-m-s 0.4    another value, from now on
+  rohrpost param save                          into the file that the configuration names
+  rohrpost param load tuned.toml --dry-run     what a file would change")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     action: Action,
@@ -28,6 +34,10 @@ enum Action {
     Get(Get),
     /// Change a parameter of a running module.
     Set(Set),
+    /// Write present values into a file.
+    Save(Save),
+    /// Set what a file says: of each module all of it, or nothing.
+    Load(Load),
 }
 
 #[derive(clap::Args)]
@@ -76,6 +86,28 @@ struct Set {
     common: Common,
 }
 
+#[derive(clap::Args)]
+struct Save {
+    /// Modules; all that have parameters, if none is named.
+    names: Vec<String>,
+    /// File to write; else the one that the configuration names as `parameters`.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(clap::Args)]
+struct Load {
+    /// File to read; else the one that the configuration names as `parameters`.
+    file: Option<PathBuf>,
+    /// Only say what would change, or be refused for its name, type or range.
+    #[arg(long)]
+    dry_run: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.action {
         Action::List(list) => at_work(&list.common, |session| show::list(session, list.name.as_deref(), list.json)),
@@ -83,6 +115,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             at_work(&get.common, |session| show::get(session, &get.name, get.parameter.as_deref(), get.json))
         }
         Action::Set(set) => at_work(&set.common, |session| set::run(session, &set.name, &set.parameter, &set.value)),
+        Action::Save(save) => at_work(&save.common, |session| save::run(session, &save.names, save.output.as_deref())),
+        Action::Load(load) => at_work(&load.common, |session| load::run(session, load.file.as_deref(), load.dry_run)),
     }
 }
 

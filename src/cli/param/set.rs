@@ -3,37 +3,30 @@
 use super::{Failure, Session, find, say};
 use rohrpost::Name;
 use rohrpost::common::{Change, SetParameters};
-use rohrpost::parameter::{Parameter, value_text};
-use rohrpost::value::{Value, decode, encode, parse_argument};
+use rohrpost::parameter::{Parameter, from_word, value_text};
+use rohrpost::value::decode;
 use std::process::ExitCode;
 
 pub(super) fn run(session: &mut Session, name: &str, parameter: &str, value: &str) -> Result<ExitCode, Failure> {
     let module = session.running.module(name)?;
     let parameters = session.parameters(module)?;
     let wanted = find(&parameters, name, parameter)?;
-    let value = parse_argument(&wanted.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;
-    let changes = set(session, module, &parameters, vec![(wanted.name.clone(), value)], false)?;
+    let bytes = from_word(&wanted.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;
+    let changes = set(session, module, vec![(wanted.name.clone(), bytes)], false)?;
     for change in &changes {
         say(format_args!("{name} {}", told(change, wanted)?));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Sets all of these, or only asks whether they would do; the names are of `parameters`.
+/// Sets all of these, or none; or only asks whether they would do.
 pub(super) fn set(
     session: &mut Session,
     module: Name,
-    parameters: &[Parameter],
-    values: Vec<(String, Value)>,
+    values: Vec<(String, Vec<u8>)>,
     only_check: bool,
 ) -> Result<Vec<Change>, Failure> {
-    let mut wish = SetParameters { values: Vec::with_capacity(values.len()), only_check };
-    for (name, value) in values {
-        let parameter = find(parameters, &session.running.text(module), &name)?;
-        let bytes = encode(&parameter.ty, &value).map_err(|error| format!("`{name}`: {error}"))?;
-        wish.values.push((name, bytes));
-    }
-    let set = session.tool.set_parameters(module, &wish);
+    let set = session.tool.set_parameters(module, &SetParameters { values, only_check });
     set.map_err(|error| session.refused(module, error))
 }
 

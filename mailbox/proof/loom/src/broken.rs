@@ -19,6 +19,9 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("no_wake_up_is_lost", 3),
     ("no_wake_up_is_lost_between_two", 2),
     ("no_wake_up_is_lost_when_displaced", 2),
+    ("no_wake_up_is_lost_in_poll", 2),
+    ("no_wake_up_is_lost_in_poll_between_two", 1),
+    ("a_dead_ringer_takes_no_wake_up_along", 2),
     ("a_retired_mailbox_keeps_nothing", 3),
     ("a_retired_mailbox_keeps_nothing_of_the_dead", 2),
     ("a_retired_mailbox_counts_the_displaced", 3),
@@ -361,7 +364,7 @@ pub(crate) const BROKEN: &[Broken] = &[
             ),
         ],
         caught_by: "the_newest_replaces_what_waits",
-        says: WRONG,
+        says: "it goes back",
     },
     // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
     Broken {
@@ -424,8 +427,9 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "bell_read_after_the_last_look",
         edits: &[
-            edit("rig", "        let seen = self.mailbox.bell.load(Ordering::Acquire);\n", ""),
-            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(self.mailbox.bell.load(Ordering::Acquire));"),
+            edit("rig", "        let seen = bell.seen();\n", ""),
+            edit("rig", "bell.may_poll(seen)", "bell.may_poll(bell.seen())"),
+            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(bell.seen());"),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -450,6 +454,52 @@ pub(crate) const BROKEN: &[Broken] = &[
             "                    self.mailbox.ring();\n                    slots.awake();\n",
         )],
         caught_by: "no_wake_up_is_lost_between_two",
+        says: ENDLESS,
+    },
+    // ---- sleeping in poll ----
+    // Neither sees the other: the ringer reads the old `polling`, the sleeper the old rings.
+    Broken {
+        name: "no_fence_h",
+        edits: &[edit("bell", "Pairs with (I).\n        fence(Ordering::SeqCst);\n", "Pairs with (I).\n")],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    Broken {
+        name: "no_fence_i",
+        edits: &[edit("bell", "Pairs with (H).\n        fence(Ordering::SeqCst);\n", "Pairs with (H).\n")],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    // Rung between the two: the ringer writes nothing, and the sleeper sleeps.
+    Broken {
+        name: "polls_before_it_says_so",
+        edits: &[
+            edit(
+                "bell",
+                "        self.polling.store(1, Ordering::Relaxed);\n",
+                "        let quiet = self.rings.load(Ordering::Relaxed) == seen;\n        self.polling.store(1, Ordering::Relaxed);\n",
+            ),
+            edit("bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "quiet\n    }"),
+        ],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    // As for a futex, but there is no kernel that compares.
+    Broken {
+        name: "polls_without_comparing",
+        edits: &[edit("bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "true\n    }")],
+        caught_by: "no_wake_up_is_lost_in_poll",
+        says: ENDLESS,
+    },
+    // To save the others the system call. Who dies now takes along what the others would have written.
+    Broken {
+        name: "the_first_ringer_clears_polling",
+        edits: &[edit(
+            "bell",
+            "step!(\"bell: rung\");\n        self.polling.load(Ordering::Relaxed) != 0",
+            "let polling = self.polling.swap(0, Ordering::Relaxed) != 0;\n        step!(\"bell: rung\");\n        polling",
+        )],
+        caught_by: "a_dead_ringer_takes_no_wake_up_along",
         says: ENDLESS,
     },
     // ---- giving up ----
@@ -564,16 +614,22 @@ pub(crate) struct Mirrored {
 
 pub(crate) const MIRRORED: &[Mirrored] = &[
     Mirrored {
-        file: "receiver",
+        file: "waiting",
         what: "models::Receiver::wait does the same, change both",
         lines: &[
-            "pub fn wait_any(",
-            "let seen = bell.load(Ordering::Acquire);",
+            "pub(crate) fn wait(",
+            "let seen = entry.bell().seen();",
             ".drowsy());",
-            ".may_have())",
-            "doorbell::sleep(bell, seen,",
+            "let idle = !found()",
+            "watches.sleep(entry.bell(), seen,",
+            "doorbell::sleep(&entry.bell, seen,",
             ".awake());",
         ],
+    },
+    Mirrored {
+        file: "watch",
+        what: "models::Receiver::wait does the same, change both",
+        lines: &["fn sleep(", "let quiet = bell.may_poll(seen);", "self.poll(if quiet", "bell.polled();"],
     },
     Mirrored {
         file: "receiver",
@@ -620,6 +676,6 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
     Mirrored {
         file: "doorbell",
         what: "models::Mailbox::ring does the same, change both",
-        lines: &["fn ring(", "bell.fetch_add(1, Ordering::Release);", "FUTEX_WAKE"],
+        lines: &["fn ring(", "let polling = bell.ring();", "FUTEX_WAKE", "if polling {", "write_to_pipe("],
     },
 ];

@@ -2,9 +2,9 @@
 //! threads' steps and with every stale value that C11's memory model lets a load return.
 //!
 //! ```text
-//!  mailbox/src/{word,slots,queue}.rs ──┬── unchanged ──▶ variants::real        every model holds
-//!  src/models.rs ──────────────────────┤
-//!  src/broken.rs, one edit or a few ───┴── edited ─────▶ variants::no_fence_e  one model fails, and says how
+//!  mailbox/src/{word,slots,queue,…}.rs ─┬── unchanged ──▶ variants::real        every model holds
+//!  src/models.rs ───────────────────────┤
+//!  src/broken.rs, one edit or a few ────┴── edited ─────▶ variants::no_fence_e  one model fails, and says how
 //!                                                        variants::…
 //! ```
 //!
@@ -12,8 +12,8 @@
 //! - `broken.rs`: a table of mistakes, each with the model that catches it. A proof that cannot fail proves nothing. An
 //!   edit must find its text exactly once, so that a variant cannot rot: the build fails and names it.
 //! - `step.rs`: the core's crash points, here places to switch threads and to die.
-//! - `build.rs`: puts them together with loom's atomics. It also compares what the models had to write again (the bell,
-//!   `wait_any`, sending, giving up) with the lines that the mailbox has.
+//! - `build.rs`: puts them together with loom's atomics. It also compares what the models had to write again (what is asked of the
+//!   kernel, waiting, sending, giving up) with the lines that the mailbox has.
 //!
 //! Plain `cargo test -p rohrpost-proof-loom` runs all. Each model bounds how often loom takes the processor away from a
 //! thread that could go on; most mistakes need one or two such preemptions. Deeper, one model at a time, over night:

@@ -2,7 +2,7 @@
 //! that a load may read. This file is compiled beside the real slot core and beside each broken one.
 
 use crate::name::Priority;
-use crate::rig::{Mailbox, Sender, Sent, of_first, sorted};
+use crate::rig::{Mailbox, Receiver, Sender, Sent, of_first, sorted};
 use crate::slots::{Full, Published};
 use crate::step::{dies_at, reached};
 use crate::sync::Ordering;
@@ -252,6 +252,34 @@ pub(crate) fn no_wake_up_is_lost_when_displaced() {
     while receiver.receive() == Some(10) {}
     low.join().unwrap();
     high.join().unwrap();
+}
+
+/// As the two before, by one who sleeps in `poll`, where the kernel compares nothing.
+pub(crate) fn no_wake_up_is_lost_in_poll() {
+    let mailbox = Mailbox::new(2);
+    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
+    assert_eq!([receiver.receive(), receiver.receive()], [Some(1), Some(2)]);
+    sender.join().unwrap();
+}
+
+pub(crate) fn no_wake_up_is_lost_in_poll_between_two() {
+    let mailbox = Mailbox::new(2);
+    let one = mailbox.send_from(1, Full::Reject, &[(10, 1)]);
+    let other = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
+    assert_eq!(sorted([receiver.receive(), receiver.receive()].into_iter().flatten().collect()), [1, 2]);
+    one.join().unwrap();
+    other.join().unwrap();
+}
+
+/// One who rang dies before it writes into the pipe: whoever rings after that wakes the sleeper all the same.
+pub(crate) fn a_dead_ringer_takes_no_wake_up_along() {
+    let mailbox = Mailbox::new(1);
+    let dead = mailbox.dies_sending(1, Full::Reject, "bell: rung", &[(10, 1)]);
+    let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
+    assert_eq!(receiver.receive(), Some(1));
+    dead.join().unwrap();
 }
 
 // ---- giving up ----

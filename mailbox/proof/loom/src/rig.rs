@@ -4,6 +4,7 @@
 //! written here again, small; `build.rs` fails when the lines that matter are no longer there in this order.
 
 use crate::name::Priority;
+use crate::bell::Bell;
 use crate::queue::Queue;
 use crate::slots::{Full, HINT_WORDS, Hot, NoSlot, Posted, Published, Slots};
 use crate::step::{dies_at, reached};
@@ -18,7 +19,10 @@ pub(super) struct Mailbox {
     pub(super) hot: Hot,
     pub(super) words: Vec<AtomicU64>,
     pub(super) bodies: Vec<UnsafeCell<u8>>,
-    pub(super) bell: AtomicU32,
+    rings: AtomicU32,
+    polling: AtomicU32,
+    /// Bytes in the pipe. The kernel would order more than these plain accesses do.
+    pipe: AtomicU32,
     /// Not 0: the receiver has something else to do. Whoever says so rings.
     pub(super) other: AtomicU32,
     /// One bit for each dead participant.
@@ -43,7 +47,9 @@ impl Mailbox {
             hot,
             words: (0..slots).map(|_| AtomicU64::new(FREE.0)).collect(),
             bodies: (0..slots).map(|_| UnsafeCell::new(0)).collect(),
-            bell: AtomicU32::new(0),
+            rings: AtomicU32::new(0),
+            polling: AtomicU32::new(0),
+            pipe: AtomicU32::new(0),
             other: AtomicU32::new(0),
             dead: AtomicU32::new(0),
             victims: Mutex::default(),
@@ -59,7 +65,7 @@ impl Mailbox {
     }
 
     pub(super) fn receiver(&self) -> Receiver<'_> {
-        Receiver { mailbox: self, queue: Queue::new(self.words.len()) }
+        Receiver { mailbox: self, queue: Queue::new(self.words.len()), polls: false }
     }
 
     /// Sends these packages (priority, body) from a thread of its own; returns the bodies of the accepted ones.
@@ -81,8 +87,11 @@ impl Mailbox {
             let died = dies_at(step, || {
                 mailbox.sender(participant, full).send_all(packages);
             });
-            // The kernel releases the lock by which others see it alive.
+            // The kernel releases the lock by which others see it alive; whoever notices that rings.
             mailbox.dead.fetch_or(u32::from(died) << participant, Ordering::Release);
+            if died {
+                mailbox.ring();
+            }
             died
         })
     }
@@ -109,15 +118,29 @@ impl Mailbox {
         (0..self.words.len()).all(|slot| self.slots().load(slot) == FREE)
     }
 
+    fn bell(&self) -> Bell<'_> {
+        Bell { rings: &self.rings, polling: &self.polling }
+    }
+
     pub(super) fn ring(&self) {
-        self.bell.fetch_add(1, Ordering::Release);
+        if self.bell().ring() {
+            self.pipe.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// A futex that never returns early: who is not rung does not wake, and loom gives up on a program without end.
     pub(super) fn sleep(&self, seen: u32) {
-        while self.bell.load(Ordering::Relaxed) == seen {
+        while self.rings.load(Ordering::Relaxed) == seen {
             thread::yield_now();
         }
+    }
+
+    /// A `poll` that never returns early, unless it is told not to wait; then the pipe is emptied.
+    fn poll(&self, sleeps: bool) {
+        while sleeps && self.pipe.load(Ordering::Relaxed) == 0 {
+            thread::yield_now();
+        }
+        self.pipe.swap(0, Ordering::Relaxed);
     }
 }
 
@@ -180,6 +203,8 @@ impl Sender<'_> {
 pub(super) struct Receiver<'a> {
     pub(super) mailbox: &'a Mailbox,
     pub(super) queue: Queue,
+    /// It watches descriptors too.
+    pub(super) polls: bool,
 }
 
 impl Receiver<'_> {
@@ -221,10 +246,17 @@ impl Receiver<'_> {
 
     pub(super) fn wait(&mut self) {
         let slots = self.mailbox.slots();
-        let seen = self.mailbox.bell.load(Ordering::Acquire);
+        let bell = self.mailbox.bell();
+        let seen = bell.seen();
         slots.drowsy();
         if self.mailbox.other.load(Ordering::Relaxed) == 0 && !self.queue.may_have_more(&slots) {
-            self.mailbox.sleep(seen);
+            if self.polls {
+                let quiet = bell.may_poll(seen);
+                self.mailbox.poll(quiet);
+                bell.polled();
+            } else {
+                self.mailbox.sleep(seen);
+            }
         }
         slots.awake();
     }

@@ -11,6 +11,7 @@ pub(crate) const MAILBOX: Name = Name::new(1, 200, 1, 0);
 /// Small, so that it is full at once.
 pub(crate) const SHAPE: Shape = Shape { slots: 4, body_bytes_max: 64, full: Full::Displace, max_age: None, claims: 1 };
 pub(crate) const OTHER_SHAPE: Shape = Shape { slots: 5, ..SHAPE };
+pub(crate) const LATEST: Shape = Shape { full: Full::Latest, ..SHAPE };
 pub(crate) const LOW: Priority = Priority(10);
 pub(crate) const HIGH: Priority = Priority(20);
 

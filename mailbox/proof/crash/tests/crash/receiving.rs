@@ -37,6 +37,23 @@ fn a_receiver_dies_going_to_sleep() {
 }
 
 #[test]
+fn a_receiver_dies_asleep_in_poll() {
+    each_step(
+        "sleep in poll",
+        2,
+        |ground| drop(ground.receiver()),
+        |ground, (), death| {
+            // Rings a bell that nobody hears, and writes into a pipe that nobody reads.
+            let mut first = ground.join().sender(MAILBOX).unwrap();
+            crate::ground::send(&mut first, HIGH, 100).unwrap();
+            drop(first);
+            let found = adopt_and_drain(ground, u64::from(death.is_some()));
+            assert_eq!(found.packages, [(100, false)]);
+        },
+    );
+}
+
+#[test]
 fn a_receiver_dies_dropping_stale_packages() {
     each_step(
         "receive stale",

@@ -2,7 +2,7 @@
 
 use crate::aftermath::{adopt_and_drain, empty};
 use crate::ground::{Ground, LOW, MAILBOX, each_step, send};
-use rohrpost_mailbox_crash::SendError;
+use rohrpost_mailbox_crash::{SendError, Watches};
 
 #[test]
 fn a_maker_of_a_node_dies() {
@@ -37,6 +37,24 @@ fn a_joiner_dies() {
             assert_eq!(ground.node().traffic().iter().map(|flow| flow.packages).sum::<u64>(), 1);
             drop((sender, participant));
             receiver.close();
+            empty(ground);
+        },
+    );
+}
+
+#[test]
+fn who_begins_to_watch_dies() {
+    each_step(
+        "watch",
+        1,
+        |_| (),
+        |ground, (), _| {
+            let participant = ground.join();
+            assert_eq!(ground.node().participants().len(), 1);
+            drop(Watches::new(&participant).unwrap());
+            drop(participant);
+            let there = std::fs::read_dir(ground.path()).unwrap().count();
+            assert_eq!(there, 1, "no pipe stays");
             empty(ground);
         },
     );

@@ -1,15 +1,16 @@
 //! Deaths of senders.
 
 use crate::aftermath::{all_usable, drain};
-use crate::ground::{Death, Ground, HIGH, LOW, MAILBOX, OTHER_SHAPE, each_step, send};
-use rohrpost_mailbox_crash::{Loss, Receiver};
+use crate::ground::{Death, Ground, HIGH, LATEST, LOW, MAILBOX, OTHER_SHAPE, each_step, send};
+use rohrpost_mailbox_crash::{Interest, Label, Loss, Receiver, Watches};
 use std::time::{Duration, Instant};
 
 /// Steps at which the package is accepted, or will be when the word changes: all from `publish: ready` on.
 fn accepted(death: Option<&Death>) -> bool {
     death.is_none_or(|death| {
         let after = ["publish: ready", "publish: hint", "send: before bell", "send: rung", "send: before count"];
-        after.contains(&death.step.as_str()) || death.step.starts_with("traffic: ")
+        let begins = ["traffic: ", "bell: ", "ring: "];
+        after.contains(&death.step.as_str()) || begins.iter().any(|begin| death.step.starts_with(begin))
     })
 }
 
@@ -39,6 +40,48 @@ fn a_sender_dies_displacing() {
     });
 }
 
+/// What waited is received or counted as replaced, whatever step its sender died at, and never comes after the newer one.
+fn a_sender_dies_replacing(others: u32, steps_min: u64) {
+    let scene = |ground: &Ground| {
+        let receiver = ground.join().receiver(MAILBOX, LATEST).unwrap();
+        // Each from a sender of its own, so that none replaces another.
+        (0..others).for_each(|id| ground.send(LOW, [id]));
+        receiver
+    };
+    each_step("send the newest", steps_min, scene, |ground, mut receiver, death| {
+        let found = drain(ground, &mut receiver, u64::from(death.is_some()));
+        assert_eq!(found.scene(), (0..others).collect::<Vec<u32>>(), "{death:?}");
+        assert_eq!(found.times(101), usize::from(accepted(death)), "{death:?}");
+        assert!(found.packages.is_sorted(), "{death:?}: {found:?}");
+        let (old, replaced) = (found.times(100) as u64, found.lost(Loss::Replaced));
+        let expected: &[_] = match death.map(|death| death.step.as_str()) {
+            None => &[(0, 1)],
+            // It had said that it would, and is believed.
+            Some("replace: marked") => &[(1, 1)],
+            // Counted by itself, then by whoever freed its slot.
+            Some("counters: loss" | "publish: ticket") => &[(0, 2)],
+            Some(_) => &[(1, 0), (0, 1)],
+        };
+        assert!(expected.contains(&(old, replaced)), "{death:?}: {old} received, {replaced} replaced");
+        let mut sender = ground.sender();
+        for id in 0..LATEST.slots {
+            sender.send(&Label { id, ..Label::default() }, &[]).unwrap();
+        }
+        drop(sender);
+        assert_eq!(receiver.close(), usize::from(LATEST.slots), "every slot can be used");
+    });
+}
+
+#[test]
+fn a_sender_dies_replacing_beside_a_free_slot() {
+    a_sender_dies_replacing(1, 8);
+}
+
+#[test]
+fn a_sender_dies_replacing_in_a_full_mailbox() {
+    a_sender_dies_replacing(3, 10);
+}
+
 #[test]
 fn a_sender_dies_being_refused() {
     let scene = |ground: &Ground| {
@@ -60,18 +103,41 @@ fn a_sender_dies_being_refused() {
 
 #[test]
 fn a_sender_dies_beside_a_sleeping_receiver() {
+    a_sender_dies_beside_a_sleeper(6, |receiver| {
+        receiver.receive_timeout(Duration::from_secs(30)).map(|package| package.body()[0])
+    });
+}
+
+#[test]
+fn a_sender_dies_beside_a_receiver_that_sleeps_in_poll() {
+    a_sender_dies_beside_a_sleeper(9, |receiver| {
+        let (_far, near) = std::os::unix::net::UnixStream::pair().unwrap();
+        let mut watches = Watches::new(receiver.participant()).unwrap();
+        watches.add(&near, Interest::Read).unwrap();
+        let end = Instant::now() + Duration::from_secs(30);
+        while Instant::now() < end {
+            if let Some(package) = receiver.try_receive() {
+                return Some(package.body()[0]);
+            }
+            watches.wait_any(&mut [receiver], Some(end), || false);
+        }
+        None
+    });
+}
+
+fn a_sender_dies_beside_a_sleeper(steps_min: u64, receive: fn(&mut Receiver) -> Option<u8>) {
     let scene = |ground: &Ground| {
         let mut receiver = ground.receiver();
         let (tell, told) = std::sync::mpsc::channel();
         let sleeper = std::thread::spawn(move || {
             tell.send(nix::unistd::gettid()).unwrap();
-            let woken = receiver.receive_timeout(Duration::from_secs(30)).map(|package| package.body()[0]);
+            let woken = receive(&mut receiver);
             (receiver, woken)
         });
         until_asleep(told.recv().unwrap());
         sleeper
     };
-    each_step("send", 6, scene, |ground, sleeper, death| {
+    each_step("send", steps_min, scene, |ground, sleeper, death| {
         ground.node().announce_death();
         if !accepted(death) {
             ground.send(HIGH, [101]);

@@ -2,7 +2,9 @@
 
 use crate::ground::{Ground, HIGH, LOW, MAILBOX, OTHER_SHAPE, SHAPE, send};
 use nix::sys::resource::{Resource, setrlimit};
-use rohrpost_mailbox_crash::{Label, Loan, Name, Node, Participant, Priority, TimeKeeper, TimeSource, Type, step};
+use rohrpost_mailbox_crash::{
+    Interest, Label, Loan, Name, Node, Participant, Priority, TimeKeeper, TimeSource, Type, Watches, step,
+};
 use std::path::Path;
 use std::time::Duration;
 
@@ -42,6 +44,27 @@ fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             arm();
             send(&mut sender, HIGH, 100).unwrap();
             die_with(sender);
+        }
+        "send the newest" => {
+            let mut sender = ground.sender();
+            send(&mut sender, LOW, 100).unwrap();
+            arm();
+            send(&mut sender, LOW, 101).unwrap();
+            die_with(sender);
+        }
+        "watch" => {
+            let participant = ground.join();
+            arm();
+            die_with(Watches::new(&participant).unwrap());
+        }
+        "sleep in poll" => {
+            let mut receiver = ground.receiver();
+            let (_far, near) = std::os::unix::net::UnixStream::pair().unwrap();
+            let mut watches = Watches::new(receiver.participant()).unwrap();
+            watches.add(&near, Interest::Read).unwrap();
+            arm();
+            watches.wait_any(&mut [&mut receiver], Duration::from_millis(1), || false);
+            die_with((receiver, watches));
         }
         "be refused" => {
             let mut sender = ground.sender();

@@ -1,28 +1,10 @@
-//! Drawings of whole demos, read with Rerun's own command line.
-//!
-//! Behind the feature `rerun-tests`, since they need two programs that nobody else does; `cargo xtask test` brings both.
+//! Drawings of whole demos, in files.
 
-#![allow(clippy::unwrap_used, reason = "these are tests")]
-
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use super::programs::{bridge, entities_of, ok, rerun, rows, rrd, search_path};
+use std::collections::BTreeMap;
+use std::process::Command;
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
-
-/// A program that the environment names.
-fn program(variable: &str) -> PathBuf {
-    let path = std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_file());
-    path.unwrap_or_else(|| {
-        panic!("{variable} names no program; run them by \"cargo xtask test\", which installs Rerun's command line")
-    })
-}
-
-fn ok(what: &str, output: &Output) -> String {
-    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{what}: {}\n{out}\n{err}", output.status);
-    format!("{out}{err}")
-}
 
 /// A demo that was run to its end: what it said, and how many rows its drawing has of each entity.
 struct Drawing {
@@ -32,15 +14,12 @@ struct Drawing {
 
 impl Drawing {
     fn of(arguments: &[&str]) -> Self {
-        let (rerun, bridge) = (program("ROHRPOST_RERUN"), program("ROHRPOST_BRIDGE"));
+        let (rerun, bridge) = (rerun(), bridge());
         let folder = tempfile::tempdir().unwrap();
-        let bridges = bridge.parent().unwrap().to_owned();
-        let search = std::env::var_os("PATH").unwrap_or_default();
-        let search = std::env::join_paths(std::iter::once(bridges).chain(std::env::split_paths(&search))).unwrap();
         let demo = Command::new(env!("CARGO_BIN_EXE_rohrpost"))
             .args(["demo", "--quiet"])
             .args(arguments)
-            .env("PATH", search)
+            .env("PATH", search_path(&bridge))
             .env("ROHRPOST_DIR", folder.path().join("memory"))
             .current_dir(folder.path())
             .output();
@@ -86,29 +65,6 @@ impl Drawing {
         }
         self.has(r"/modules\ now", 1..=10);
     }
-}
-
-fn rrd(rerun: &Path, command: &str, file: &Path) -> String {
-    let output = Command::new(rerun).args(["rrd", command]).arg(file).env("NO_COLOR", "1").output();
-    ok(&format!("rerun rrd {command}"), &output.unwrap())
-}
-
-/// Lines such as `Chunk(…) with 3 rows (4.6 KiB) - /world/map - data columns: […]`.
-fn rows(printed: &str) -> BTreeMap<String, u64> {
-    let mut all = BTreeMap::new();
-    for line in printed.lines().filter(|line| line.starts_with("Chunk(")) {
-        let (rows, rest) = line.split_once(" with ").unwrap().1.split_once(" rows ").unwrap();
-        let entity = rest.split(" - ").nth(1).unwrap();
-        let digits: String = rows.chars().filter(char::is_ascii_digit).collect();
-        *all.entry(entity.to_owned()).or_default() += digits.parse::<u64>().unwrap();
-    }
-    all
-}
-
-/// The table "Num chunks per entity", lines such as `/world/frame: 18`.
-fn entities_of(stats: &str) -> BTreeSet<String> {
-    let lines = stats.lines().skip_while(|line| !line.starts_with("Num chunks per entity"));
-    lines.filter(|line| line.starts_with('/')).filter_map(|line| Some(line.rsplit_once(": ")?.0.to_owned())).collect()
 }
 
 #[test]

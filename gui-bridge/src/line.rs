@@ -1,0 +1,138 @@
+//! The way to a viewer: Rerun speaks to a socket of ours, and we to the viewer.
+//!
+//! ```text
+//!   Rerun's gRPC client ──▶ 127.0.0.1:some port ──▶ [Line] ──▶ viewer
+//! ```
+//!
+//! Rerun's client never gives up: without a viewer it tries for ever, and with one that stands still it waits for as long as
+//! that lives, and whoever draws waits with it. It has no way to be told otherwise. A line has one: when it is cut, all that
+//! Rerun waits for fails at once, its threads end, and its memory is free. It also tells whether the viewer has answered:
+//! the kernel connects to one that stands still, too.
+
+use std::io::{self, Read, Write};
+use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream, ToSocketAddrs};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+/// Bytes handed over at once.
+const PIECE: usize = 64 * 1024;
+/// How often a thread that waits for Rerun's client looks whether it is still wanted.
+const GLANCE: Duration = Duration::from_millis(10);
+
+struct Shared {
+    viewer: TcpStream,
+    client: OnceLock<TcpStream>,
+    answered: AtomicBool,
+    broken: AtomicBool,
+}
+
+/// A connection to a viewer that can be cut.
+pub(crate) struct Line {
+    shared: Arc<Shared>,
+    port: u16,
+}
+
+impl Line {
+    /// Connects to a viewer, at one of its addresses.
+    pub(crate) fn open(host: &str, port: u16, patience: Duration) -> io::Result<Self> {
+        let mut failure = io::Error::new(io::ErrorKind::NotFound, "its name has no address");
+        for address in (host, port).to_socket_addrs()? {
+            match TcpStream::connect_timeout(&address, patience) {
+                Ok(viewer) => return Self::over(viewer),
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+
+    fn over(viewer: TcpStream) -> io::Result<Self> {
+        viewer.set_nodelay(true)?;
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+        let port = listener.local_addr()?.port();
+        listener.set_nonblocking(true)?;
+        let (answered, broken) = (AtomicBool::new(false), AtomicBool::new(false));
+        let shared = Arc::new(Shared { viewer, client: OnceLock::new(), answered, broken });
+        let outward = shared.clone();
+        std::thread::Builder::new().name("to viewer".into()).spawn(move || outward.run(&listener))?;
+        Ok(Self { shared, port })
+    }
+
+    /// Where Rerun finds it.
+    pub(crate) fn url(&self) -> String {
+        format!("rerun+http://127.0.0.1:{}/proxy", self.port)
+    }
+
+    /// Whether the viewer has said anything.
+    pub(crate) fn has_answered(&self) -> bool {
+        self.shared.answered.load(Ordering::Relaxed)
+    }
+
+    /// Whether one of the two ends has gone.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.shared.broken.load(Ordering::Relaxed)
+    }
+
+    /// Ends it: both ends are told.
+    pub(crate) fn cut(&self) {
+        self.shared.cut();
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.cut();
+    }
+}
+
+impl Shared {
+    fn cut(&self) {
+        self.broken.store(true, Ordering::Relaxed);
+        // What is closed already cannot be closed; that is as good.
+        let _ = self.viewer.shutdown(Shutdown::Both);
+        if let Some(client) = self.client.get() {
+            let _ = client.shutdown(Shutdown::Both);
+        }
+    }
+
+    /// Waits for Rerun's client, then passes on what it sends; another thread passes on the answers.
+    fn run(self: Arc<Self>, listener: &TcpListener) {
+        let client = loop {
+            match listener.accept() {
+                Ok((client, _)) => break client,
+                Err(_) if self.broken.load(Ordering::Relaxed) => return,
+                Err(_) => std::thread::sleep(GLANCE),
+            }
+        };
+        // A socket inherits that its listener does not block on some systems.
+        let made = client.set_nonblocking(false).and_then(|()| client.set_nodelay(true));
+        let client = self.client.get_or_init(|| client);
+        let back = self.clone();
+        let answers = std::thread::Builder::new().name("from viewer".into()).spawn(move || back.answer());
+        if made.is_ok() && answers.is_ok() && !self.broken.load(Ordering::Relaxed) {
+            self.pass_on(client);
+        }
+        self.cut();
+    }
+
+    fn pass_on(&self, mut client: &TcpStream) {
+        let mut piece = vec![0; PIECE];
+        while let Ok(bytes @ 1..) = client.read(&mut piece) {
+            if (&self.viewer).write_all(&piece[..bytes]).is_err() {
+                break;
+            }
+        }
+    }
+
+    fn answer(&self) {
+        let mut piece = vec![0; PIECE];
+        let Some(mut client) = self.client.get() else { return };
+        while let Ok(bytes @ 1..) = (&self.viewer).read(&mut piece) {
+            self.answered.store(true, Ordering::Relaxed);
+            if client.write_all(&piece[..bytes]).is_err() {
+                break;
+            }
+        }
+        self.cut();
+    }
+}

@@ -1,0 +1,183 @@
+//! What the bridge draws of which module: wanted by the configuration, described by the module, drawn by a view.
+
+use crate::blueprint::{Layout, Tab};
+use crate::view::{Datum, View};
+use crate::{Scene, views};
+use rohrpost::config::Show;
+use rohrpost::description::{DataItem, Description};
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::CollectorInterface;
+use rohrpost::{Context, Name, Rate, Received, Subscription};
+use std::time::{Duration, Instant};
+
+/// A module whose description is wanted answers within this time, or is asked again later.
+const PATIENCE: Duration = Duration::from_millis(300);
+/// A module is asked at most so often to send everything once more.
+const REPAIR: Duration = Duration::from_secs(5);
+
+/// One entry of `[gui] show`.
+struct Wish {
+    from: Name,
+    module: String,
+    /// None: all that its module has a view for.
+    data: Option<String>,
+    rate: Option<Rate>,
+    /// Its module has described itself.
+    answered: bool,
+}
+
+/// Data that are subscribed to.
+struct Subject {
+    from: Name,
+    module: String,
+    item: DataItem,
+    subscription: Subscription<()>,
+    /// Which view draws it.
+    view: usize,
+    /// Number that the next package should have.
+    expected: u32,
+    repair: Option<Repair>,
+}
+
+/// How to ask for everything once more.
+struct Repair {
+    function: u16,
+    interface: u32,
+    wanted: bool,
+    asked: Option<Instant>,
+}
+
+/// See the module's text.
+pub(crate) struct Subjects {
+    views: Vec<Box<dyn View>>,
+    wishes: Vec<Wish>,
+    subjects: Vec<Subject>,
+}
+
+impl Subjects {
+    /// What the configuration wants to be shown, and what modules say. `own` views are asked before those built in.
+    pub(crate) fn new(own: Vec<Box<dyn View>>, context: &Context) -> Self {
+        let installation = context.installation();
+        let text = |name| installation.classes.format(name);
+        let wish = |show: &Show| Wish {
+            from: show.from,
+            module: text(show.from),
+            data: show.data.clone(),
+            rate: show.rate.map(Rate::hz),
+            answered: false,
+        };
+        let mut wishes: Vec<Wish> = installation.gui.show.iter().map(wish).collect();
+        if let Some(class) = installation.classes.id(CollectorInterface::CLASS) {
+            let from = Name::new(installation.system.id, class.0, 0, 0);
+            if installation.module(from).is_some() {
+                wishes.push(Wish { from, module: text(from), data: Some("line".into()), rate: None, answered: false });
+            }
+        }
+        let views = own.into_iter().chain(views::built_in()).collect();
+        Self { views, wishes, subjects: Vec::new() }
+    }
+
+    /// Asks modules that run for descriptions that are missing, and subscribes to what they tell; arranges the views anew when
+    /// there are more.
+    pub(crate) fn find(
+        &mut self,
+        context: &mut Context,
+        runs: impl Fn(Name) -> bool,
+        mut found: impl FnMut(Name),
+    ) -> bool {
+        let before = self.subjects.len();
+        for wish in self.wishes.iter_mut().filter(|wish| !wish.answered && runs(wish.from)) {
+            let description = match rohrpost::describe(&mut context.link().borrow_mut(), wish.from, PATIENCE) {
+                Ok(description) => description,
+                Err(error) => {
+                    tracing::debug!("{} does not describe itself yet: {error}", wish.module);
+                    continue;
+                }
+            };
+            wish.answered = true;
+            let items = wish.items(&description, &self.views);
+            for item in items {
+                let known = |subject: &Subject| subject.from == wish.from && subject.item.number == item.number;
+                let Some(view) = self.views.iter().position(|view| view.wants(&description, &item)) else { continue };
+                if self.subjects.iter().any(known) {
+                    continue;
+                }
+                found(wish.from);
+                let rate = wish.rate.unwrap_or_else(|| self.views[view].rate());
+                let interface = description.hash();
+                let subscription = context.subscribe_untyped(wish.from, item.number, interface, rate);
+                let repair = self.views[view].repair(&description);
+                // It may have sent much before anybody listened.
+                let repair = repair.map(|function| Repair { function, interface, wanted: true, asked: None });
+                let (from, module) = (wish.from, wish.module.clone());
+                self.subjects.push(Subject { from, module, item, subscription, view, expected: 0, repair });
+            }
+        }
+        self.subjects.len() > before
+    }
+
+    /// The tabs of all views that have something to draw, in the order of the views.
+    pub(crate) fn layout(&self) -> Layout {
+        let used = (0..self.views.len()).filter(|view| self.subjects.iter().any(|subject| subject.view == *view));
+        let mut tabs: Vec<Tab> = Vec::new();
+        for tab in used.flat_map(|view| self.views[view].tabs()) {
+            if tabs.iter().all(|known| known.name() != tab.name()) {
+                tabs.push(tab);
+            }
+        }
+        Layout::new(tabs)
+    }
+
+    /// Draws what came, if somebody wants it.
+    pub(crate) fn draw(&mut self, scene: &mut Scene, context: &Context, data: &Received<'_>) {
+        let is_it = |subject: &&mut Subject| data.is_of(&subject.subscription);
+        let Some(subject) = self.subjects.iter_mut().find(is_it) else { return };
+        // A number left out is a package lost; the first, or one after a restart, is 0.
+        if let Some(repair) = subject.repair.as_mut().filter(|_| data.head.sequence != subject.expected) {
+            repair.wanted = true;
+        }
+        subject.expected = data.head.sequence.wrapping_add(1);
+        scene.set_time(data.head.stamp_ns);
+        let Subject { from, module, item, view, .. } = subject;
+        let installation = context.installation();
+        let datum = Datum { from: *from, module, item, installation, bytes: data.value };
+        if let Err(error) = self.views[*view].draw(scene, &datum) {
+            tracing::warn!("{error}");
+        }
+    }
+
+    /// Asks those of whom a part was lost for everything once more. Waits for nobody.
+    pub(crate) fn repair(&mut self, context: &Context) {
+        for subject in &mut self.subjects {
+            let Some(repair) = subject.repair.as_mut().filter(|repair| repair.wanted) else { continue };
+            if repair.asked.is_some_and(|asked| asked.elapsed() < REPAIR) {
+                continue;
+            }
+            (repair.wanted, repair.asked) = (false, Some(Instant::now()));
+            let mut link = context.link().borrow_mut();
+            match link.begin(subject.from, repair.function, repair.interface, REPAIR, |_| Ok(())) {
+                Ok(call) => link.forget(call),
+                Err(error) => tracing::debug!("{} does not send everything once more: {error}", subject.module),
+            }
+        }
+    }
+}
+
+impl Wish {
+    /// The data of a module that are wanted; those that only the last view, which wants all, would draw are not worth it
+    /// unless they are all that there is.
+    fn items(&self, description: &Description, views: &[Box<dyn View>]) -> Vec<DataItem> {
+        let Some(name) = &self.data else {
+            let special = &views[..views.len().saturating_sub(1)];
+            let known = |item: &&DataItem| special.iter().any(|view| view.wants(description, item));
+            let items: Vec<DataItem> = description.data.iter().filter(known).cloned().collect();
+            return if items.is_empty() { description.data.clone() } else { items };
+        };
+        let item = description.data_item(name).cloned();
+        if item.is_none() {
+            let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
+            tracing::warn!("{} has no data `{name}` to draw; it has: {}", self.module, names.join(", "));
+        }
+        item.into_iter().collect()
+    }
+}

@@ -1,0 +1,97 @@
+//! Views: what is drawn of a module, chosen by how the module describes itself.
+
+use crate::blueprint::Tab;
+use crate::scene::{DrawError, RATE_HZ, Scene};
+use rohrpost::config::Installation;
+use rohrpost::description::{DataItem, Description};
+use rohrpost::value::{Data, Value, decode};
+use rohrpost::{Name, Rate};
+
+/// Draws the data of modules that describe themselves in a certain way: those of a class, or those with a certain type.
+///
+/// The bridge asks all views, a user's own before those that are built in; the first that wants a datum draws it.
+pub trait View {
+    /// Whether it draws this datum of a module that describes itself so.
+    fn wants(&self, module: &Description, item: &DataItem) -> bool;
+
+    /// How often it wants values for which the configuration names no rate. [`Rate::Each`] for those that are parts of
+    /// something larger, such as the tiles of a map.
+    fn rate(&self) -> Rate {
+        Rate::hz(RATE_HZ)
+    }
+
+    /// Draws one value. The scene's time is the value's.
+    ///
+    /// # Errors
+    /// When the value cannot be true; it is told once in a while, and nothing else happens.
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError>;
+
+    /// Tabs for what it draws, asked for when it has got something to draw.
+    fn tabs(&self) -> Vec<Tab> {
+        Vec::new()
+    }
+
+    /// The number of a function without arguments by which a module sends everything once more: it is called when a part was
+    /// lost on the way.
+    fn repair(&self, _module: &Description) -> Option<u16> {
+        None
+    }
+}
+
+/// One value, and whose it is.
+pub struct Datum<'a> {
+    /// The module, or face, that sent it.
+    pub from: Name,
+    /// Its name as text, such as `laser.0`: the last part of entities.
+    pub module: &'a str,
+    /// Which of its data.
+    pub item: &'a DataItem,
+    /// The configuration: other modules' names, and settings.
+    pub installation: &'a Installation,
+    pub(crate) bytes: &'a [u8],
+}
+
+impl Datum<'_> {
+    /// The value, as the type that [`View::wants`] has seen in the description.
+    ///
+    /// # Errors
+    /// When the sender does not keep to its description.
+    pub fn read<T: Data>(&self) -> Result<T, DrawError> {
+        rohrpost::macro_support::from_bytes(self.bytes).map_err(|error| self.unreadable(&error))
+    }
+
+    /// The value, by its description alone.
+    ///
+    /// # Errors
+    /// When the sender does not keep to its description.
+    pub fn value(&self) -> Result<Value, DrawError> {
+        decode(&self.item.ty, self.bytes).map_err(|error| self.unreadable(&error))
+    }
+
+    fn unreadable(&self, cause: &dyn std::fmt::Display) -> DrawError {
+        DrawError::Unreadable { module: self.module.into(), data: self.item.name.clone(), cause: cause.to_string() }
+    }
+}
+
+/// A user's own views: one, or a tuple of them; `()` for none.
+pub trait Views {
+    /// Makes them.
+    fn make() -> Vec<Box<dyn View>>;
+}
+
+impl<V: View + Default + 'static> Views for V {
+    fn make() -> Vec<Box<dyn View>> {
+        vec![Box::new(V::default())]
+    }
+}
+
+macro_rules! views_of_tuples {
+    ($(($($view:ident),*))*) => {$(
+        impl<$($view: View + Default + 'static),*> Views for ($($view,)*) {
+            fn make() -> Vec<Box<dyn View>> {
+                vec![$(Box::new($view::default())),*]
+            }
+        }
+    )*};
+}
+views_of_tuples! { () (A) (A, B) (A, B, C) (A, B, C, D) }

@@ -1,0 +1,149 @@
+//! The views that are built in: a scan is a scan, whoever sends it, and what nobody knows is drawn by its description.
+
+use crate::blueprint::Tab;
+use crate::scene::{DrawError, Scene};
+use crate::states::Level;
+use crate::view::{Datum, View};
+use rohrpost::Rate;
+use rohrpost::description::{DataItem, Description};
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::CartographerInterface;
+use rohrpost::output::OutputLine;
+use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose};
+use rohrpost::value::Data;
+
+/// All of them; the last wants everything.
+pub(crate) fn built_in() -> Vec<Box<dyn View>> {
+    vec![Box::new(Laser), Box::new(Wheels), Box::new(Mapper), Box::new(Localisation), Box::new(Output), Box::new(Other)]
+}
+
+fn is<T: Data>(item: &DataItem) -> bool {
+    item.ty == T::schema()
+}
+
+/// Scans, from where their scanner stood, or on the robot whose odometry came first.
+struct Laser;
+
+impl View for Laser {
+    fn wants(&self, _: &Description, item: &DataItem) -> bool {
+        is::<LaserScan>(item)
+    }
+
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
+        let scan: LaserScan = datum.read()?;
+        if let Some(pose) = &scan.pose {
+            scene.pose(datum.module, pose);
+        }
+        let carrier = scene.carrier().to_owned();
+        scene.scan(datum.module, &scan, &carrier, &Pose::default());
+        Ok(())
+    }
+
+    fn tabs(&self) -> Vec<Tab> {
+        vec![Tab::plane("Laser", &["/world/scan/**", "/world/robot/**"])]
+    }
+}
+
+/// Where the wheels say that the robot is, and how it moves.
+struct Wheels;
+
+impl View for Wheels {
+    fn wants(&self, _: &Description, item: &DataItem) -> bool {
+        is::<Odometry>(item)
+    }
+
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
+        let odometry: Odometry = datum.read()?;
+        scene.odometry(datum.module, &odometry);
+        scene.motion(datum.module, &odometry.twist);
+        Ok(())
+    }
+
+    fn tabs(&self) -> Vec<Tab> {
+        vec![Tab::curves("Wheels", "motion")]
+    }
+}
+
+/// Maps, tile by tile.
+struct Mapper;
+
+impl View for Mapper {
+    fn wants(&self, _: &Description, item: &DataItem) -> bool {
+        is::<OccupancyGrid>(item)
+    }
+
+    fn rate(&self) -> Rate {
+        Rate::Each
+    }
+
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
+        scene.grid(datum.module, &datum.read::<OccupancyGrid>()?)
+    }
+
+    fn tabs(&self) -> Vec<Tab> {
+        vec![Tab::plane("Map", &["/world/map/**", "/world/trail/**", "/world/robot/**"])]
+    }
+
+    fn repair(&self, module: &Description) -> Option<u16> {
+        let own = CartographerInterface::description();
+        let known = own.function("publish_all").filter(|_| module.hash() == own.hash())?;
+        Some(known.number)
+    }
+}
+
+/// Poses, from whoever knows best where the robot is.
+struct Localisation;
+
+impl View for Localisation {
+    fn wants(&self, _: &Description, item: &DataItem) -> bool {
+        is::<Pose>(item)
+    }
+
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
+        scene.pose(datum.module, &datum.read()?);
+        Ok(())
+    }
+}
+
+/// Lines of output. Their place in the layout is always there.
+struct Output;
+
+impl View for Output {
+    fn wants(&self, _: &Description, item: &DataItem) -> bool {
+        is::<OutputLine>(item)
+    }
+
+    fn rate(&self) -> Rate {
+        Rate::Each
+    }
+
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
+        draw_line(scene, datum.installation, &datum.read()?);
+        Ok(())
+    }
+}
+
+/// A line of output at its own time.
+pub(crate) fn draw_line(scene: &mut Scene, installation: &rohrpost::config::Installation, line: &OutputLine) {
+    scene.set_time(line.time_ns);
+    let module = installation.classes.format(line.module());
+    scene.output_line(&module, Level::from(line.level), &line.text);
+}
+
+/// Everything else: numbers as curves, the rest as text.
+pub(crate) struct Other;
+
+impl View for Other {
+    fn wants(&self, _: &Description, _: &DataItem) -> bool {
+        true
+    }
+
+    fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
+        scene.generic(datum.module, &datum.item.name, &datum.value()?);
+        Ok(())
+    }
+
+    fn tabs(&self) -> Vec<Tab> {
+        vec![Tab::curves_and_lines("Other data", "data")]
+    }
+}

@@ -1,0 +1,111 @@
+//! Waiting for mailboxes: how long, and whether awake for a moment before asleep.
+
+use crate::participant::Participant;
+use crate::receiver::Receiver;
+use crate::step::step;
+use crate::watch::Watches;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How to wait. By default: asleep, for ever. A [`Duration`] is a timeout from now on, an `Option<Instant>` a deadline.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Waiting {
+    /// Before sleeping, look again and again for so long. A sender that finds its receiver awake makes no system call, and the
+    /// receiver has the package sooner by the time that waking takes (some microseconds, more from a deep sleep of the
+    /// processor). It costs a whole processor meanwhile, so give it some ten microseconds, where a package is mostly about to
+    /// come; with one processor, or more threads that spin than processors, it only keeps others from working. A real-time thread
+    /// (SCHED_FIFO) must not spin for long: it keeps everything below it out, and the kernel, which gives ordinary
+    /// threads their share by its fair server (or by throttling, before Linux 6.12), then stops it when it matters.
+    pub spin: Duration,
+    /// When to give up; none: never.
+    pub deadline: Option<Instant>,
+}
+
+impl From<Duration> for Waiting {
+    /// A time too long to be told is for ever.
+    fn from(timeout: Duration) -> Self {
+        Self { deadline: Instant::now().checked_add(timeout), ..Self::default() }
+    }
+}
+
+impl From<Option<Instant>> for Waiting {
+    fn from(deadline: Option<Instant>) -> Self {
+        Self { deadline, ..Self::default() }
+    }
+}
+
+impl Waiting {
+    /// Time left to sleep; none: for ever.
+    fn left(&self) -> Option<Duration> {
+        self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()))
+    }
+
+    pub(crate) fn is_over(&self) -> bool {
+        self.left() == Some(Duration::ZERO)
+    }
+
+    /// Looks until there is something, but not for longer than it may; says whether there is.
+    fn spin_until(&self, found: impl Fn() -> bool) -> bool {
+        if self.spin.is_zero() {
+            return false;
+        }
+        let spin = self.left().map_or(self.spin, |left| left.min(self.spin));
+        let began = Instant::now();
+        while began.elapsed() < spin {
+            if found() {
+                return true;
+            }
+            std::hint::spin_loop();
+        }
+        false
+    }
+}
+
+/// Waits until one of these mailboxes has a package, `other` says that there is something else to do, or the deadline
+/// has passed. May return early for no reason. Says how long it slept, that is, left the processor to others. All must be of
+/// one participant, whose bell it is that wakes.
+///
+/// Whoever makes `other` true from outside calls [`Participant::ring`] afterwards.
+///
+/// # Panics
+/// When the mailboxes are of different participants: their bells are different words.
+pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, other: impl Fn() -> bool) -> Duration {
+    let Some(participant) = receivers.first().map(|receiver| receiver.participant().clone()) else {
+        return Duration::ZERO;
+    };
+    wait(&participant, receivers, None, waiting.into(), other)
+}
+
+pub(crate) fn wait(
+    participant: &Arc<Participant>,
+    receivers: &mut [&mut Receiver],
+    watches: Option<&mut Watches>,
+    waiting: Waiting,
+    other: impl Fn() -> bool,
+) -> Duration {
+    assert!(receivers.iter().all(|receiver| Arc::ptr_eq(receiver.participant(), participant)));
+    receivers.iter_mut().for_each(|receiver| receiver.settle());
+    let watches = watches.filter(|watches| !watches.is_empty());
+    let found = || other() || receivers.iter().any(|receiver| receiver.may_have());
+    // Until here, and while it spins, nobody needs to ring.
+    if waiting.spin_until(found) {
+        watches.into_iter().for_each(Watches::look);
+        return Duration::ZERO;
+    }
+    let entry = participant.entry();
+    // Before `drowsy`: whatever is published after the looks below rings, and so changes this value.
+    let seen = entry.bell().seen();
+    receivers.iter().for_each(|receiver| receiver.drowsy());
+    step!("wait: drowsy");
+    let idle = !found() && !waiting.is_over();
+    let began = Instant::now();
+    match watches {
+        Some(watches) if idle => watches.sleep(entry.bell(), seen, waiting.left()),
+        Some(watches) => watches.look(),
+        None if idle => crate::doorbell::sleep(&entry.bell, seen, waiting.left()),
+        None => {}
+    }
+    let slept = began.elapsed();
+    receivers.iter().for_each(|receiver| receiver.awake());
+    if idle { slept } else { Duration::ZERO }
+}

@@ -1,0 +1,12 @@
+//! The GUI bridge with Rerun's own command line: what is in a drawing, and what a viewer that misbehaves does to a robot.
+//!
+//! Behind the feature `rerun-tests`, since they need two programs that nobody else does; `cargo xtask test` brings both.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod drawings;
+mod own_view;
+mod programs;
+mod robot;
+mod torture;
+mod viewer;

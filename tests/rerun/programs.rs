@@ -1,0 +1,60 @@
+//! Rerun's command line and the GUI bridge, which `cargo xtask test` brings.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Rerun's command line.
+pub(crate) fn rerun() -> PathBuf {
+    program("ROHRPOST_RERUN")
+}
+
+/// The GUI bridge.
+pub(crate) fn bridge() -> PathBuf {
+    program("ROHRPOST_BRIDGE")
+}
+
+/// A program that the environment names.
+fn program(variable: &str) -> PathBuf {
+    let path = std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_file());
+    path.unwrap_or_else(|| {
+        panic!("{variable} names no program; run them by \"cargo xtask test\", which installs Rerun's command line")
+    })
+}
+
+/// The search path with a program's folder in front.
+pub(crate) fn search_path(program: &Path) -> OsString {
+    let folder = program.parent().unwrap().to_owned();
+    let search = std::env::var_os("PATH").unwrap_or_default();
+    std::env::join_paths(std::iter::once(folder).chain(std::env::split_paths(&search))).unwrap()
+}
+
+pub(crate) fn ok(what: &str, output: &Output) -> String {
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{what}: {}\n{out}\n{err}", output.status);
+    format!("{out}{err}")
+}
+
+pub(crate) fn rrd(rerun: &Path, command: &str, file: &Path) -> String {
+    let output = Command::new(rerun).args(["rrd", command]).arg(file).env("NO_COLOR", "1").output();
+    ok(&format!("rerun rrd {command}"), &output.unwrap())
+}
+
+/// Lines such as `Chunk(…) with 3 rows (4.6 KiB) - /world/map - data columns: […]`.
+pub(crate) fn rows(printed: &str) -> BTreeMap<String, u64> {
+    let mut all = BTreeMap::new();
+    for line in printed.lines().filter(|line| line.starts_with("Chunk(")) {
+        let (rows, rest) = line.split_once(" with ").unwrap().1.split_once(" rows ").unwrap();
+        let entity = rest.split(" - ").nth(1).unwrap();
+        let digits: String = rows.chars().filter(char::is_ascii_digit).collect();
+        *all.entry(entity.to_owned()).or_default() += digits.parse::<u64>().unwrap();
+    }
+    all
+}
+
+/// The table "Num chunks per entity", lines such as `/world/frame: 18`.
+pub(crate) fn entities_of(stats: &str) -> BTreeSet<String> {
+    let lines = stats.lines().skip_while(|line| !line.starts_with("Num chunks per entity"));
+    lines.filter(|line| line.starts_with('/')).filter_map(|line| Some(line.rsplit_once(": ")?.0.to_owned())).collect()
+}
