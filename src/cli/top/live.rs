@@ -35,7 +35,9 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
         let typed = keyboard()?;
         live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(Told::Stop)))
     };
-    live.calls.map(Calls::close);
+    if let Some(calls) = live.calls {
+        calls.close();
+    }
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
@@ -206,7 +208,9 @@ impl Live {
         if !now.launched {
             return;
         }
-        self.calls.take().map(Calls::close);
+        if let Some(calls) = self.calls.take() {
+            calls.close();
+        }
         (self.running, self.now, self.earlier) = (running, now, None);
         self.children.clear();
         self.absent.clear();
