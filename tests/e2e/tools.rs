@@ -45,7 +45,7 @@ fn calls_take_arguments_as_people_type_them() {
         assert_eq!(place.say(&[&["call", "probe.0"], arguments].concat()).ok(), format!("{answer}\n"));
     }
     let status = place.say(&["call", "probe.0", "--json", "status"]).json();
-    assert_eq!(status["state"], "On");
+    assert_eq!(status["state"], "on");
     let beat = wait("a beat", || place.say(&["call", "probe.0", "get", "beat"]).ok().trim().parse::<u64>().ok());
     assert!(beat > 0);
     let refused = place.say(&["call", "probe.0", "refuse", "too late"]);
