@@ -156,6 +156,8 @@ impl Launch {
             .filter(|module| missing.iter().all(|program| program.module != module.name))
             .map(|module| Child::new(module, &installation, &executable, &relay))
             .collect();
+        // It holds launch's place on the node, which is to be given back if the start fails.
+        drop(relay);
         let node_name = node_name.to_owned();
         let switching = vec![None; children.len()];
         let mut launch =
