@@ -27,6 +27,9 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(50);
 /// Looks at a call that does not come back: 0.5 s.
 const LOOKS_AT_CALL: u32 = 10;
+/// After a stream that stood still soon, the next is given twice the looks, up to so many times: a computer that is merely
+/// overloaded would else begin anew without end.
+const LENIENCE_MAX: u32 = 16;
 /// Looks at threads of the stream that do not move (a pulse may have to wait behind much work), and at a viewer that was
 /// connected to and says nothing: 3 s.
 const LOOKS_AT_PULSE: u32 = 60;
@@ -84,7 +87,7 @@ impl Pen {
         let recording = RecordingId::random();
         let shared = Arc::new(Shared { store, closing: AtomicBool::new(false), failure: Mutex::new(None) });
         let canvas = move |surface| Canvas { application: application.clone(), recording: recording.clone(), surface };
-        let mut work = Work { shared: shared.clone(), canvas: Box::new(canvas), streams: 0 };
+        let mut work = Work { shared: shared.clone(), canvas: Box::new(canvas), streams: 0, lenience: 1 };
         let run = move || match (sink, address) {
             (Sink::File { path, bytes_max }, _) => work.files(&path, bytes_max),
             (Sink::Window, Some(address)) => match sink::start_window() {
@@ -128,6 +131,7 @@ struct Work {
     shared: Arc<Shared>,
     canvas: Box<dyn Fn(Surface) -> Canvas + Send>,
     streams: u64,
+    lenience: u32,
 }
 
 impl Work {
@@ -201,7 +205,7 @@ impl Work {
                 told = "draws";
             }
             let end = self.watch(&feeder, Some(&line), &|| false);
-            let was_broken = line.is_broken();
+            let (was_broken, had_answered) = (line.is_broken(), line.has_answered());
             feeder.give_up();
             line.cut();
             if !ended_within(&feeder, END) {
@@ -231,7 +235,9 @@ impl Work {
                 _ => {}
             }
             if began.elapsed() >= GOOD {
-                backoff = *BACKOFF.start();
+                (backoff, self.lenience) = (*BACKOFF.start(), 1);
+            } else if had_answered && told == "still" {
+                self.lenience = (self.lenience * 2).min(LENIENCE_MAX);
             }
             self.rest(&mut backoff);
         }
@@ -293,7 +299,7 @@ impl Work {
                 *looks = if now.is_some() && now == *before { *looks + 1 } else { 0 };
                 *before = now;
             }
-            let still = seen[0].1 >= LOOKS_AT_CALL || seen[1].1 >= LOOKS_AT_PULSE;
+            let still = seen[0].1 >= LOOKS_AT_CALL * self.lenience || seen[1].1 >= LOOKS_AT_PULSE * self.lenience;
             if still && line.is_some() {
                 return End::Still;
             }
