@@ -38,6 +38,7 @@ fn every_key_arrives() {
     assert_eq!((motor.start, motor.restart.policy), (Start::Off, RestartPolicy::Always));
     assert_eq!((motor.restart.at_most, motor.restart.within), (3, Duration::from_secs(300)));
     assert_eq!((motor.ready_within, motor.stop_within), (Duration::from_secs(3), Duration::from_millis(500)));
+    assert_eq!(motor.spin, Duration::from_micros(20));
     let commands = motor.mailboxes.commands;
     assert_eq!((commands.slots, commands.size, commands.full, commands.claims), (16, 200, Full::Reject, 2));
     assert_eq!(commands.max_age, Some(Duration::from_millis(300)));

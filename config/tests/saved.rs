@@ -1,5 +1,7 @@
 //! Saved values of parameters: what a file may say, and what goes before what.
 
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
 use rohrpost_config::{Installation, Saved, SavedValue, explain};
 use serde::Deserialize;
 use std::path::Path;

@@ -2,6 +2,7 @@
 
 use crate::clock::monotonic_ns;
 use crate::counters::Loss;
+use crate::layout::Shape;
 use crate::lock::Held;
 use crate::name::Name;
 use crate::package::{Head, Options};
@@ -45,6 +46,11 @@ impl Receiver {
     /// The mailbox's name.
     pub fn name(&self) -> Name {
         self.segment.name
+    }
+
+    /// What it was made as.
+    pub fn shape(&self) -> &Shape {
+        &self.segment.shape
     }
 
     /// Whom its bell wakes.

@@ -5,7 +5,8 @@
 mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, label};
-use rohrpost_mailbox::{Full, ModuleState, Name, Participant, Shape, TimeKeeper, TimeSource};
+use rohrpost_mailbox::{Class, Full, Interest, ModuleState, Name, Participant, Shape, TimeKeeper, TimeSource, Watches};
+use std::os::unix::fs::FileTypeExt;
 use std::time::Duration;
 
 struct Bytes(Vec<u8>);
@@ -62,6 +63,69 @@ fn a_mailbox_is_as_documented() {
     }
 }
 
+/// The histogram as another language would read it: file, row of the class, buckets.
+#[test]
+fn waiting_times_by_class_are_as_documented() {
+    const ROWS: usize = 320;
+    const BYTES: usize = 320;
+    let ground = Ground::new();
+    let mut receiver = ground.join().receiver(MAILBOX, Shape::default()).unwrap();
+    let mut sender = ground.sender();
+    for (priority, wait) in [(LOW, 0), (LOW, 3_000), (HIGH, 700), (LOW, 90)] {
+        sender.send(&label(priority, 0), &[]).unwrap();
+        std::thread::sleep(Duration::from_micros(wait));
+        assert!(receiver.try_receive().is_some());
+    }
+    let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
+    let seen = ground.look();
+    for (class, packages) in [(LOW, 3), (HIGH, 1)] {
+        let row =
+            (0..10).map(|row| ROWS + row * BYTES).find(|row| there.u32(*row) == 256 + u32::from(class.0)).unwrap();
+        let waits: Vec<u32> = (0..56).map(|bucket| there.u32(row + 80 + 4 * bucket)).collect();
+        assert_eq!((there.u64(row + 8), waits.iter().sum::<u32>()), (packages, packages as u32));
+        let ours = &seen.classes.iter().find(|ours| ours.class == Some(Class(class.0))).unwrap().latency;
+        let longest = there.u64(row + 72);
+        assert_eq!((waits.as_slice(), u128::from(longest)), (&ours.buckets[..], ours.max.as_nanos()));
+        // Bucket 2 k + h begins at 2^(8+k) × (1 + h/2) ns; the longest lies in the last that is not empty.
+        let start = |bucket: usize| (1u64 << (8 + bucket / 2)) * (2 + bucket as u64 % 2) / 2;
+        let last = waits.iter().rposition(|count| *count > 0).unwrap();
+        assert!((last == 0 || start(last) <= longest) && longest < start(last + 1), "{last}: {longest}");
+    }
+}
+
+#[test]
+fn a_word_tells_whom_its_package_replaces() {
+    let ground = Ground::new();
+    let shape = Shape { slots: 1, body_bytes_max: 8, full: Full::Latest, ..Shape::default() };
+    let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
+    let mut sender = ground.sender();
+    (0..3).for_each(|_| sender.send(&label(LOW, 0), &[]).unwrap());
+    let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
+    let word = there.u64(4096);
+    assert_eq!((there.u32(24), there.u64(128)), (2, 3), "policy, tickets");
+    assert_eq!((word >> 62, word & ((1 << 53) - 1)), (2, 0), "ready, in the place of the first");
+    assert_eq!((there.u32(320), there.u64(320 + 64)), (256 + u32::from(LOW.0), 2), "replaced");
+    assert!(receiver.try_receive().is_some());
+}
+
+#[test]
+fn who_sleeps_in_poll_says_so_as_documented() {
+    let ground = Ground::new();
+    let me = ground.join();
+    let mut receiver = me.receiver(MAILBOX, Shape::default()).unwrap();
+    let mut watches = Watches::new(&me).unwrap();
+    let (_far, near) = std::os::unix::net::UnixStream::pair().unwrap();
+    watches.add(&near, Interest::Read).unwrap();
+    assert!(std::fs::metadata(ground.path().join("bell.0")).unwrap().file_type().is_fifo());
+    let sleeper = std::thread::spawn(move || watches.wait_any(&mut [&mut receiver], None, || false));
+    common::until("it polls", || file(&ground, "node").u32(64 + 32) == 1);
+    // As a ringer of another language does it.
+    let bell = std::fs::OpenOptions::new().read(true).write(true).open(ground.path().join("bell.0"));
+    std::io::Write::write_all(&mut bell.unwrap(), &[1]).unwrap();
+    sleeper.join().unwrap();
+    assert_eq!(file(&ground, "node").u32(64 + 32), 0);
+}
+
 #[test]
 fn a_filling_word_names_its_participant() {
     let ground = Ground::new();
@@ -72,7 +136,11 @@ fn a_filling_word_names_its_participant() {
     first.send(&label(LOW, 0), &[b"lost"]).unwrap();
     let _loan = second.loan(HIGH).unwrap();
     let word = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw())).u64(4096);
-    assert_eq!((word >> 62, word >> 61 & 1, word >> 53 & 0xff, word >> 48 & 0x1f), (1, 1, u64::from(LOW.0), 0));
+    assert_eq!(
+        (word >> 62, word >> 61 & 1, word >> 53 & 0xff, word >> 48 & 0x1f),
+        (1, 1, u64::from(LOW.0), 0),
+        "displaced"
+    );
     let entry = 64 + 64 * (word >> 32 & 0xffff) as usize;
     assert_eq!(word as u32, filler.incarnation());
     assert_eq!(file(&ground, "node").u32(entry), filler.incarnation());

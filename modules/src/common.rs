@@ -65,6 +65,7 @@ pub struct Status {
 
 /// What a module is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
 pub enum State {
     /// Not ready for commands yet.
     Starting,
@@ -105,6 +106,7 @@ pub struct Subscribe {
 
 /// Which output lines a module sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Schema)]
+#[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
 pub enum OutputLevel {
     /// Errors alone.
     Error,

@@ -1,5 +1,5 @@
 //! A module's thread takes nothing from the heap, once it is warm, for: a command and its answer, publishing to subscribers,
-//! and receiving data of a plain type. (Data with a `Vec` inside, such as scans, allocate that in decoding; output lines
+//! receiving data of a plain type, and reading from a descriptor that it watches. (Data with a `Vec` inside, such as scans, allocate that in decoding; output lines
 //! allocate their text.)
 //!
 //! The module runs on a thread of this process; only that thread counts. One test, as a process has one output.
@@ -7,7 +7,7 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, node_directory};
+use rohrpost_mailbox::{Interest, Name, Node, Ready, node_directory};
 use rohrpost_modules::call::CallError;
 use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
 use rohrpost_modules::runtime::{Context, Rate, Received, Start, Subscription, ToolLink, run_started};
@@ -15,8 +15,10 @@ use rohrpost_modules::types::Twist;
 use rohrpost_modules::{Module, ModuleError};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::sync::Arc;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 thread_local! {
@@ -25,6 +27,10 @@ thread_local! {
 static USES: AtomicU64 = AtomicU64::new(0);
 static RECEIVED: AtomicU64 = AtomicU64::new(0);
 static TICKS: AtomicU64 = AtomicU64::new(0);
+/// Bytes written to the module's descriptor, and those that it read.
+static WRITTEN: AtomicU64 = AtomicU64::new(0);
+static READ: AtomicU64 = AtomicU64::new(0);
+static FAR: Mutex<Option<UnixStream>> = Mutex::new(None);
 
 struct Counting;
 
@@ -56,6 +62,7 @@ unsafe impl GlobalAlloc for Counting {
 struct Wheels {
     own: Subscription<Twist>,
     told: Twist,
+    port: UnixStream,
 }
 
 impl Module for Wheels {
@@ -67,13 +74,21 @@ impl Module for Wheels {
         // Both kinds of subscription: each value, and periodic.
         let own = context.subscribe(MotorInterface::MOTION, "motor.0", Rate::Each)?;
         let _ = context.subscribe(MotorInterface::MOTION, "motor.0", Rate::Every(Duration::from_millis(2)))?;
-        Ok(Self { own, told: Twist::default() })
+        let (far, port) = UnixStream::pair()?;
+        context.watch(&port, Interest::Read)?;
+        *FAR.lock().unwrap() = Some(far);
+        Ok(Self { own, told: Twist::default(), port })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         COUNTED.with(|counted| counted.set(true));
         TICKS.fetch_add(1, Ordering::Relaxed);
         Ok(context.publish_now(MotorInterface::MOTION, &self.told)?)
+    }
+
+    fn ready(&mut self, _: &mut Context, _: Ready) -> Result<(), ModuleError> {
+        READ.fetch_add(self.port.read(&mut [0; 16])? as u64, Ordering::Relaxed);
+        Ok(())
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
@@ -108,6 +123,7 @@ tool = { id = 16, text = "By hand" }
 name = "motor.0"
 program = "motor"
 optional = true
+spin = "10 us"
 "#;
 const MOTOR: Name = Name::new(1, 100, 0, 0);
 
@@ -117,8 +133,11 @@ fn work(motor: &MotorProxy, ticks: u64, received: u64) {
     let (ticks_then, received_then) = (TICKS.load(Ordering::Relaxed), RECEIVED.load(Ordering::Relaxed));
     while TICKS.load(Ordering::Relaxed) < ticks_then + ticks
         || RECEIVED.load(Ordering::Relaxed) < received_then + received
+        || READ.load(Ordering::Relaxed) + 50 < WRITTEN.load(Ordering::Relaxed)
     {
         motor.drive(0.5, 0.25).unwrap();
+        let written = FAR.lock().unwrap().as_mut().unwrap().write(b"x").unwrap();
+        WRITTEN.fetch_add(written as u64, Ordering::Relaxed);
         assert!(matches!(motor.halt(), Err(CallError::Module(_, DriveError::NotFinite))));
         // There is none before the first tick.
         moves = motor.motion().ok();

@@ -43,6 +43,16 @@ pub(super) const COMMON: [(&str, &str); 5] = [
     ("output-level", "Sets which lines it sends"),
 ];
 
+/// What a function that every module has takes.
+fn usage_of_common(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "on" | "off" | "status" => "nothing",
+        "get" => "the name of one kind of data",
+        "output-level" => "one level (error, warn, info, debug or trace)",
+        _ => return None,
+    })
+}
+
 /// A time that a user gave in seconds.
 pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
     Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())
@@ -75,6 +85,9 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
         }
         ("output-level", [level]) => tool.output_level(module, level_of(level)?).map(|_| Value::Null)?,
         ("get", [data]) => get(module, data, tool)?,
+        (common, texts) if let Some(right) = usage_of_common(common) => {
+            return Err(format!("`{common}` takes {right}, not {} arguments", texts.len()).into());
+        }
         (_, texts) => call(module, name, texts, tool)?,
     };
     // A function's own error is an answer too; scripts see it by the exit code.
@@ -85,6 +98,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
     };
     let text = match &value {
         _ if arguments.json => serde_json::to_string(&value)?,
+        Value::Variant(_, why) if failed => format!("{} answers with an error: {why}", arguments.name),
         Value::Null => "ok".into(),
         value => value.to_string(),
     };

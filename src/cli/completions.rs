@@ -1,24 +1,28 @@
 //! `rohrpost completions`, and the answers to the shells that it was set up in.
 //!
 //! A shell runs this command anew at each press of the key, with the words so far. Names of modules and nodes come from the
-//! configuration that launch has noted, functions and data from what modules have noted of themselves beside their mailboxes:
-//! nobody is asked.
+//! configuration that launch has noted, functions and data from what modules have noted of themselves beside their mailboxes.
+//! Only a module whose parameters are to be completed is asked for them.
 
 use super::call::COMMON;
-use super::target::Target;
+use super::target::{Running, Target};
 use super::{Failure, say};
 use clap::builder::StyledStr;
 use clap::{Arg, Command, CommandFactory, ValueEnum};
 use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCandidate, PathCompleter};
 use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
+use rohrpost::Name;
 use rohrpost::common::OutputLevel;
-use rohrpost::config::{BUILTINS, Installation};
+use rohrpost::config::Installation;
 use rohrpost::description::Description;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// By this variable a shell tells that it asks, and which it is.
 const VARIABLE: &str = "ROHRPOST_COMPLETE";
+/// Nobody waits longer for a list that they did not call for.
+const PATIENCE: Duration = Duration::from_millis(300);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -74,14 +78,14 @@ fn completed(command: &str, arg: Arg) -> Arg {
     match (command, arg.get_id().as_str()) {
         // A name that there is not yet.
         ("new", _) => arg,
-        (_, "builtin") => from(arg, || BUILTINS.iter().map(CompletionCandidate::new).collect()),
         (_, "name" | "names" | "module" | "modules") => from(arg, modules),
         (_, "node") => from(arg, nodes),
         (_, "function") => from(arg, functions),
         (_, "data") => from(arg, data),
         (_, "level") => from(arg, levels),
+        (_, "parameter") => from(arg, parameters),
         ("call", "arguments") => from(arg, call_arguments),
-        ("check" | "launch", "file") | (_, "config") => {
+        ("check" | "launch" | "load", "file") | (_, "config") => {
             let toml =
                 PathCompleter::any().filter(|path| path.is_dir() || path.extension().is_some_and(|end| end == "toml"));
             arg.add(ArgValueCompleter::new(toml))
@@ -129,7 +133,7 @@ fn modules() -> Vec<CompletionCandidate> {
     let Some((installation, node)) = installation() else { return Vec::new() };
     let modules = installation.modules.iter().filter(|module| node.as_ref().is_none_or(|node| module.node == *node));
     let name = |name| {
-        let text = installation.classes.text(rohrpost::Name::class(name)).unwrap_or_default();
+        let text = installation.classes.text(Name::class(name)).unwrap_or_default();
         candidate(installation.classes.format(name), text)
     };
     modules.flat_map(|module| module.names()).map(name).collect()
@@ -156,6 +160,17 @@ fn data() -> Vec<CompletionCandidate> {
     data.iter().map(|item| candidate(&item.name, &item.text)).collect()
 }
 
+fn parameters() -> Vec<CompletionCandidate> {
+    let found = target().find().ok().and_then(|running| {
+        let name = named(&running)?;
+        let mut tool = running.join(PATIENCE).ok()?;
+        let answer = tool.parameters(name).ok();
+        tool.close();
+        answer
+    });
+    found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.name, &parameter.text)).collect()
+}
+
 /// Arguments of functions that every module has; those of its own are numbers and words.
 fn call_arguments() -> Vec<CompletionCandidate> {
     let words = words();
@@ -170,7 +185,11 @@ fn call_arguments() -> Vec<CompletionCandidate> {
 /// What the module says of itself that the words name: noted beside its mailboxes, so that it is not asked.
 fn described() -> Option<Description> {
     let running = target().find().ok()?;
+    running.noted(named(&running)?).ok()
+}
+
+/// The module that the words name.
+fn named(running: &Running) -> Option<Name> {
     let classes = &running.installation.classes;
-    let name = words().iter().find_map(|word| classes.parse_module(word).ok())?;
-    running.noted(name).ok()
+    words().iter().find_map(|word| classes.parse_module(word).ok())
 }

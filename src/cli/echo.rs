@@ -27,10 +27,10 @@ pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
     /// At most so many a second; 0 for each.
-    #[arg(long, default_value_t = 0.0, value_name = "HZ")]
+    #[arg(long, default_value_t = 0.0, value_name = "HZ", value_parser = rate)]
     rate: f64,
     /// End after so many.
-    #[arg(long, short, value_name = "N")]
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
     /// Fail when no data comes for so long, seconds; 0 waits for ever.
     #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
@@ -38,6 +38,12 @@ pub(super) struct Arguments {
     /// One JSON object a line.
     #[arg(long)]
     json: bool,
+}
+
+/// A rate that can be subscribed to: the period goes as whole microseconds, of which 32 bits hold 71 minutes.
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| *rate == 0.0 || (0.001..=1e6).contains(rate));
+    rate.ok_or_else(|| "write 0 for each value, or 0.001 to 1000000 a second".into())
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -64,7 +70,7 @@ fn echo(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(), 
 fn choose<'a>(description: &'a Description, name: Option<&str>) -> Result<&'a DataItem, Failure> {
     let names = || description.data.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", ");
     match (name, &description.data[..]) {
-        (_, []) => Err("publishes no data".into()),
+        (_, []) => Err("publishes no data; `rohrpost call NAME` lists what it offers".into()),
         (None, [only]) => Ok(only),
         (None, _) => Err(format!("which data? it has: {}", names()).into()),
         (Some(name), _) => {

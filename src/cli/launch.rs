@@ -1,5 +1,6 @@
 //! `rohrpost launch`: the modules of a node, with a live table.
 
+use super::manager::{Manager, Urgency, for_journal};
 use super::summary::{ModuleLine, module_lines, print_modules_live};
 use super::{Failure, say};
 use rohrpost::launch::{Launch, choose_node, events};
@@ -29,13 +30,19 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let installation = Arc::new(super::check::load(&arguments.file)?);
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
+    let mut manager = Manager::from_environment()?;
+    manager.starting(&node);
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
+    manager.ready(&launch);
     let mut view = View::new(arguments.quiet);
+    view.began(&launch, &node);
     let mut shown = Ok(());
-    while shown.is_ok() && launch.watch(view.wait()) {
+    while shown.is_ok() && launch.watch(view.wait().min(manager.wait())) {
+        manager.alive(&launch);
         shown = view.show(&mut launch);
     }
     view.leave();
+    manager.stopping();
     // Also when it can be shown no more: the modules are stopped in order.
     let code = end(launch);
     shown.map(|()| code)
@@ -47,14 +54,15 @@ pub(super) fn end(mut launch: Launch) -> ExitCode {
     let failures = launch.failures();
     say_all(&launch.stop());
     for (module, why) in &failures {
-        eprintln!("{module} failed for good: {why}");
+        let line = format!("{module} failed for good: {why}");
+        eprintln!("{}", for_journal(std::io::stderr(), Urgency::Error, &line));
     }
     if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 fn say_all(notes: &[String]) {
     for note in notes {
-        say(note);
+        say(for_journal(std::io::stdout(), Urgency::Notice, note));
     }
 }
 
@@ -75,6 +83,16 @@ impl View {
     pub(super) fn new(quiet: bool) -> Self {
         let live = !quiet && std::io::stdout().is_terminal();
         Self { live, begun: Instant::now(), next: Instant::now(), last: None, notes: Vec::new() }
+    }
+
+    /// All modules are on. Without a table, one line says so.
+    fn began(&self, launch: &Launch, node: &str) {
+        if !self.live {
+            let modules = launch.phases().count();
+            let word = if modules == 1 { "module" } else { "modules" };
+            let line = format!("node {node} of {} runs: {modules} {word}", launch.installation().name);
+            say_all(&[line]);
+        }
     }
 
     /// How long to watch until the next drawing.

@@ -15,6 +15,7 @@ mod hz;
 mod launch;
 mod list;
 mod log;
+mod manager;
 mod new;
 mod param;
 mod ping;
@@ -29,6 +30,7 @@ mod version;
 mod watch;
 
 use clap::{Parser, Subcommand};
+use std::io::Write;
 use std::process::ExitCode;
 
 /// What went wrong, in words for the person at the terminal.
@@ -127,13 +129,13 @@ pub(crate) fn main() -> ExitCode {
         Command::Run(arguments) => run::run(arguments),
     };
     result.unwrap_or_else(|error| {
-        eprintln!("{error}");
+        // Who would read it may be gone, too.
+        let _ = writeln!(std::io::stderr(), "{error}");
         ExitCode::FAILURE
     })
 }
 
 /// Prints a line; false when nobody reads any more (a closed pipe is the reader's way to say enough).
 fn say(line: impl std::fmt::Display) -> bool {
-    use std::io::Write;
     writeln!(std::io::stdout(), "{line}").is_ok()
 }

@@ -10,6 +10,7 @@ use std::process::ExitCode;
 #[command(after_help = "Example: rohrpost run sim --config config/demo.toml --name motor.0")]
 pub(super) struct Arguments {
     /// Which built-in module.
+    #[arg(value_parser = clap::builder::PossibleValuesParser::new(BUILTINS))]
     builtin: String,
     /// What every module takes: --config FILE --name CLASS.INSTANCE [--off].
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -23,6 +24,7 @@ pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
     };
     match rohrpost_modules::builtin::run(&arguments.builtin, start) {
         Some(result) => Ok(exit(result)),
-        None => Err(format!("no built-in module `{}`; there are: {}", arguments.builtin, BUILTINS.join(", ")).into()),
+        // The command line takes no other names; one of them without a program would be our own mistake.
+        None => Err(format!("the built-in module `{}` has no program; report this", arguments.builtin).into()),
     }
 }

@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod boot;
 mod check;
 mod completions;
 mod control;
@@ -23,13 +24,16 @@ mod once_wrap;
 mod output;
 mod output_log;
 mod param;
+mod printed;
 mod probe;
 mod process;
 mod readme;
 mod restart;
 mod screen;
 mod start;
+mod terminal;
 mod tools;
 mod tools_data;
+mod top;
 mod tuned;
 mod versions;

@@ -122,6 +122,8 @@ fn a_follower_survives_the_collector_and_says_so() {
     for number in 0..20 {
         say(&format!("earlier {number}"));
     }
+    let is_last = |line: &String| line.ends_with("earlier 19");
+    wait("the collector has all", || shown(&place, &[]).last().is_some_and(is_last).then_some(()));
     let mut follower = Running::start(place.command(&["log", "--follow", "--last", "1", "--timeout", "1"]));
     follower.wait_for("earlier 19");
     assert!(!follower.out().contains("earlier 18"), "{}", follower.out());

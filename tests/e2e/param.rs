@@ -1,5 +1,6 @@
 //! `rohrpost param`, as a person uses it on a robot that runs.
 
+use crate::completions::offered;
 use crate::harness::{OUTPUT, PATIENCE, Place, Robot, signal, wait};
 use crate::process::Running;
 use crate::tuned::{shown, tuned};
@@ -79,7 +80,7 @@ fn a_set_value_is_what_the_module_works_with_and_is_told() {
         let log = place.say(&["log", "--module", "probe.0"]).ok();
         log.contains("label: ").then_some(log)
     });
-    assert!(log.contains("info  probe.0: far-m: 9 -> 16 m (by tool."), "{log}");
+    assert!(log.contains("probe.0: far-m: 9 -> 16 m (by tool."), "{log}");
     assert_eq!(log.matches("gain: ").count(), 2, "what stays the same is no change: {log}");
 }
 
@@ -116,6 +117,20 @@ fn a_refused_value_says_why_and_changes_nothing() {
     }
     assert_eq!(place.say(&["param"]).code, Some(2));
     assert_eq!(place.say(&["param", "set", "probe.0", "gain"]).code, Some(2));
+}
+
+#[test]
+fn shells_offer_modules_and_their_parameters() {
+    let place = Place::new();
+    let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "", "")]);
+    for (words, offers) in [
+        (&["rohrpost", "param", "get", "pro"][..], &["probe.0"][..]),
+        (&["rohrpost", "param", "save", "o"], &["output.0"]),
+        (&["rohrpost", "param", "set", "probe.0", "l"], &["look", "label"]),
+        (&["rohrpost", "param", "get", "output.0", ""], &[]),
+    ] {
+        assert_eq!(offered(&place, words), offers, "{words:?}");
+    }
 }
 
 #[test]

@@ -86,6 +86,14 @@ pub(crate) trait Probing {
     #[command(40)]
     fn flood(&mut self, level: String, lines: u32);
 
+    /// Prints so many lines, `text 0` and so on, to `stdout` or `stderr`.
+    #[command(42)]
+    fn print(&mut self, stream: String, text: String, lines: u32);
+
+    /// Prints this to its standard error, and aborts.
+    #[command(43)]
+    fn last_words(&mut self, text: String);
+
     /// Panics: `here`, in a `thread`, or `twice`, the second time while the first unwinds.
     #[command(41)]
     fn panic(&mut self, place: String);
@@ -271,6 +279,20 @@ impl Probing for Probe {
             self.say(level.clone(), format!("flood {line}"));
         }
         self.note("flooded");
+    }
+
+    fn print(&mut self, stream: String, text: String, lines: u32) {
+        for line in 0..lines {
+            match stream.as_str() {
+                "stdout" => println!("{text} {line}"),
+                _ => eprintln!("{text} {line}"),
+            }
+        }
+    }
+
+    fn last_words(&mut self, text: String) {
+        eprintln!("{text}");
+        std::process::abort();
     }
 
     fn panic(&mut self, place: String) {

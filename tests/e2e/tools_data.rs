@@ -136,7 +136,7 @@ fn status_shows_each_module() {
     echo.wait_for("\n");
     let status = place.say(&["status", "--json"]).json();
     let module = &status[1];
-    assert_eq!((&module["module"], &module["state"]), (&"probe.0".into(), &"On".into()));
+    assert_eq!((&module["module"], &module["state"]), (&"probe.0".into(), &"on".into()));
     assert_eq!((&module["subscribers"], &module["missed"]), (&1.into(), &0.into()));
     assert_eq!(module["incarnation"], robot.process("probe.0").unwrap().incarnation);
     assert!(module["failure"].is_null());

@@ -5,6 +5,7 @@ use super::control::{ChildState, Phase};
 use super::leftovers::KILL_TIME;
 use super::policy::{Next, Policy};
 use super::printed::Printed;
+use crate::output::Relay;
 use crate::runtime::{StartError, environment};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -78,7 +79,7 @@ pub(super) struct Child {
 }
 
 impl Child {
-    pub(super) fn new(module: &Module, installation: &Installation, executable: &Path) -> Self {
+    pub(super) fn new(module: &Module, installation: &Installation, executable: &Path, relay: &Relay) -> Self {
         let beside = executable.parent().unwrap_or(Path::new("."));
         let (program, arguments) = match &module.program {
             Program::Builtin(name) => (executable.to_owned(), vec!["run".to_owned(), name.clone()]),
@@ -108,7 +109,7 @@ impl Child {
             lives: 0,
             restarts: 0,
             last_end: String::new(),
-            printed: Printed::default(),
+            printed: Printed::new(relay.voice(installation, module.name)),
             last_life: false,
         }
     }
@@ -171,6 +172,11 @@ impl Child {
 
     /// When it has to be looked after again, if no signal comes before.
     pub(super) fn look_again(&self, now: Instant) -> Option<Duration> {
+        let attend = self.printed.attend_at().map(|at| at.saturating_duration_since(now));
+        self.look_at_phase(now).into_iter().chain(attend).min()
+    }
+
+    fn look_at_phase(&self, now: Instant) -> Option<Duration> {
         match self.phase {
             _ if self.over.is_some() => Some(LOOK),
             Phase::Starting | Phase::Stopping => Some(LOOK),
@@ -199,12 +205,16 @@ impl Child {
 
     fn try_spawn(&mut self) -> io::Result<std::process::Child> {
         // First: a process whose words nobody reads would be stuck at the first of them too many.
-        let writer = self.printed.begin()?;
+        let [stdout, stderr] = self.printed.begin()?;
         let mut command = Command::new(&self.program);
         // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes before any
         // word of launch's: so it switches itself on. At the first start launch does, when all are ready.
         if self.lives == 0 || !self.turn_on {
             command.env(environment::OFF, "1");
+        }
+        // Launch alone speaks to the service manager.
+        for variable in ["NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "JOURNAL_STREAM"] {
+            command.env_remove(variable);
         }
         command
             .args(&self.arguments)
@@ -213,14 +223,15 @@ impl Child {
             .env(environment::LAUNCHER, std::process::id().to_string())
             .env(environment::RESTARTS, self.restarts.to_string())
             .stdin(Stdio::null())
-            .stdout(writer.try_clone()?)
-            .stderr(writer)
+            .stdout(stdout)
+            .stderr(stderr)
             .process_group(0)
             .spawn()
     }
 
     /// Looks after it; what there is to say.
     pub(super) fn step(&mut self, node: &Node, now: Instant) -> Option<String> {
+        self.printed.attend(now);
         if let Some(process) = &mut self.process {
             match process.try_wait() {
                 Ok(Some(status)) => {
@@ -270,6 +281,7 @@ impl Child {
             (None, None) => "ended".to_owned(),
         };
         if let Some(ending) = self.ending.take() {
+            self.printed.pass_on(None);
             return self.ended_as_told(&ending, &how, now);
         }
         // Whoever waits for its work expects it to go on as configured.
@@ -282,22 +294,24 @@ impl Child {
         let told = match next {
             Next::Stay => {
                 self.phase = if status.success() { Phase::Ended } else { Phase::Failed };
-                &self.last_end
+                how
             }
             Next::GivenUp => {
                 let Restart { at_most, within, .. } = self.policy.restart();
                 self.phase = Phase::Failed;
-                self.last_end = format!("{how}; given up after {at_most} restarts within {within:?}{printed}");
-                &self.last_end
+                let told = format!("{how}; given up after {at_most} restarts within {within:?}");
+                self.last_end = format!("{told}{printed}");
+                told
             }
             Next::Again(pause) => {
                 self.restarts += 1;
                 self.phase = Phase::Waiting;
                 self.since = now + pause;
-                &format!("{how}; starts again in {pause:?}{printed}")
+                format!("{how}; starts again in {pause:?}")
             }
         };
-        Some(format!("{} {told}", self.text))
+        self.printed.pass_on((!status.success()).then_some(&told));
+        Some(format!("{} {told}{printed}", self.text))
     }
 
     fn ended_as_told(&mut self, ending: &Ending, how: &str, now: Instant) -> Option<String> {

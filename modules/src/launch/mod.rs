@@ -29,6 +29,7 @@ pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
 
 use crate::call::CallError;
+use crate::output::Relay;
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
@@ -53,6 +54,8 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const LOOK_SWITCHING: Duration = Duration::from_millis(50);
 /// While all modules are being stopped, it is looked so often who may be told next.
 const LOOK_ENDING: Duration = Duration::from_millis(20);
+/// By then no thread of launch's holds its place on the node any more.
+const LET_GO: Duration = Duration::from_secs(1);
 /// Notes that are kept for who asks; the oldest go first.
 const NOTES_MAX: usize = 1000;
 
@@ -147,11 +150,14 @@ impl Launch {
         let tool = ToolLink::join_as_launch(&installation, &node, node_name, PATIENCE)?;
         let counter = Counter::open(&tool.link).map_err(ClientError::from)?;
         let bell = Bell::listen(events, tool.link.participant())?;
+        let relay = Relay::new(tool.link.participant());
         let children: Vec<Child> = installation
             .modules_on(node_name)
             .filter(|module| missing.iter().all(|program| program.module != module.name))
-            .map(|module| Child::new(module, &installation, &executable))
+            .map(|module| Child::new(module, &installation, &executable, &relay))
             .collect();
+        // It holds launch's place on the node, which is to be given back if the start fails.
+        drop(relay);
         let node_name = node_name.to_owned();
         let switching = vec![None; children.len()];
         let mut launch =
@@ -311,6 +317,11 @@ impl Launch {
         self.children.iter().find(|child| child.name() == name).map(Child::phase)
     }
 
+    /// Where launch stands with each module, by its name.
+    pub fn phases(&self) -> impl Iterator<Item = (&str, Phase)> {
+        self.children.iter().map(|child| (child.text(), child.phase()))
+    }
+
     /// How often a module was started again.
     pub fn restarts(&self, name: Name) -> u32 {
         self.children.iter().find(|child| child.name() == name).map_or(0, Child::restarts)
@@ -351,9 +362,17 @@ impl Launch {
             self.serve(true);
             self.sleep(0..self.children.len(), LOOK_ENDING);
         }
-        let Self { node, tool, counter, lock, _time, mut notes, .. } = self;
+        let participant = Arc::downgrade(self.tool.link.participant());
+        let Self { node, children, tool, counter, lock, _time, mut notes, .. } = self;
+        // They hold a way to the collector.
+        drop(children);
         counter.close();
         tool.close();
+        // A thread that passes on a last line holds it for a moment; it never waits.
+        let deadline = Instant::now() + LET_GO;
+        while participant.strong_count() > 0 && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_millis(1));
+        }
         drop(lock);
         match node.remove_if_dead() {
             Ok(true) => remove_base_if_empty(),

@@ -3,12 +3,17 @@
 use super::way::Lane;
 use super::{TEXT_MAX, way};
 use crate::common::OutputLevel;
+use std::backtrace::{Backtrace, BacktraceStatus};
 use std::fmt::{self, Write};
 use tracing::field::{Field, Visit};
 use tracing::level_filters::LevelFilter;
 use tracing::subscriber::Interest;
 use tracing::{Event, Metadata, Subscriber};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
+
+/// Lines of a back trace that are printed: what lies further out is how the program began. Launch keeps 64 lines to tell when
+/// a process has ended, and the panic itself is to be among them.
+const TRACE_LINES_MAX: usize = 40;
 
 /// Makes this process's events and panics lines.
 pub(super) fn listen() {
@@ -23,6 +28,11 @@ pub(super) fn listen() {
                 Some(thread) => format!("thread `{thread}` {panic}"),
             };
             output.panicked(cut(text));
+            let trace = Backtrace::capture();
+            if trace.status() == BacktraceStatus::Captured {
+                // Asked for by RUST_BACKTRACE; too long for a line.
+                trace.to_string().lines().take(TRACE_LINES_MAX).for_each(|line| super::print(&line));
+            }
         }
     }));
 }
@@ -56,7 +66,7 @@ impl<S: Subscriber> Layer<S> for OutputLayer {
         if output.allows(Lane::of(level)) {
             let mut text = Text(String::new());
             event.record(&mut text);
-            output.say(level, cut(text.0));
+            output.say(level, output.now_ns(), cut(text.0));
         }
     }
 }
@@ -81,7 +91,7 @@ fn level_of_event(level: &tracing::Level) -> OutputLevel {
 }
 
 /// What is too long ends with a `…`, never inside a character.
-fn cut(mut text: String) -> String {
+pub(super) fn cut(mut text: String) -> String {
     if text.len() > TEXT_MAX {
         let end = (0..=TEXT_MAX - 4).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
         text.truncate(end);

@@ -13,10 +13,12 @@ mod allowance;
 #[cfg(feature = "builtin")]
 mod format;
 mod layer;
+mod relay;
 mod way;
 
 #[cfg(feature = "builtin")]
 pub use format::{Format, iso};
+pub(crate) use relay::{Relay, Voice, Whisper};
 pub(crate) use way::is_installed;
 pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
 
@@ -31,6 +33,9 @@ pub const LINES: u8 = 3;
 pub const CLASS: &str = "output";
 /// Longest text of a line, bytes; what is longer is cut.
 pub const TEXT_MAX: usize = 900;
+
+/// Begins each line that a launched module prints although it sends it, too: launch repeats it, and does not send it again.
+pub(crate) const SENT: char = '\u{1e}';
 
 /// Prints a line to standard error, if that takes it at once: whoever reads it may be gone, or stopped, and neither is a
 /// reason to panic or to wait.

@@ -1,7 +1,7 @@
 //! The way of a line out of this process: allowances, queues, and whoever finds the way free sends.
 
 use super::allowance::{Bucket, Excess, Told};
-use super::{CLASS, LINES, OutputLine, layer};
+use super::{CLASS, LINES, OutputLine, SENT, layer};
 use crate::common::{DataHead, OutputLevel};
 use crossbeam_queue::ArrayQueue;
 use rohrpost_config::{Installation, Level};
@@ -9,6 +9,7 @@ use rohrpost_mailbox::{
     Label, Name, Options, Participant, Priority, SendError, Sender, SystemClock, Type, monotonic_ns,
 };
 use std::cell::Cell;
+use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 use std::time::{Duration, Instant};
@@ -62,7 +63,7 @@ struct Waiting {
     queue: ArrayQueue<OutputLine>,
 }
 
-/// The output of this process.
+/// What is said in the name of one module: by its own process, or by launch for what it printed.
 pub(super) struct Output {
     me: Name,
     to: Name,
@@ -77,15 +78,46 @@ pub(super) struct Output {
     lost_now: AtomicU32,
     lost: AtomicU64,
     suppressed: AtomicU64,
-    way: Mutex<Way>,
-    /// Whether `way` holds a line back.
-    held: AtomicBool,
-    /// Also print lines from this level on.
-    print: OutputLevel,
+    out: Arc<Out>,
+    print: Print,
     /// Whether the configuration has a collector to wait for.
     collected: bool,
 }
 
+/// Which lines are printed as well.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Print {
+    /// All: a person at the terminal started it.
+    All,
+    /// What launch may have to repeat, marked as sent.
+    Errors,
+    /// None.
+    Nothing,
+}
+
+impl Print {
+    fn line(self, level: OutputLevel, text: &dyn Display) {
+        match self {
+            Self::All => super::print(&format_args!("{:5} {text}", level.name())),
+            Self::Errors if level == OutputLevel::Error => {
+                // Each line of it: launch reads line by line.
+                let marked = format!("{SENT}{:5} {text}", level.name()).replace('\n', &format!("\n{SENT}"));
+                super::print(&marked);
+            }
+            Self::Errors | Self::Nothing => {}
+        }
+    }
+}
+
+/// The one way out of a process, however many modules it speaks for.
+#[derive(Default)]
+pub(super) struct Out {
+    way: Mutex<Way>,
+    /// Whether `way` holds a line back.
+    held: AtomicBool,
+}
+
+#[derive(Default)]
 struct Way {
     sender: Option<Sender>,
     retry_at: Option<Instant>,
@@ -97,34 +129,46 @@ struct Way {
 
 /// Makes this process's `tracing` events and panics lines of this module. The first caller in a process decides.
 pub fn install(participant: &Arc<Participant>, installation: &Installation, me: Name, launched: bool) {
-    let Some(class) = installation.classes.id(CLASS) else { return };
-    let (rate, burst) = (installation.output.rate, installation.output.burst);
-    let to = Name::new(me.system(), class.0, 0, LINES);
-    let way = Way { sender: None, retry_at: None, held: None, bytes: Vec::with_capacity(1024), sequence: 0 };
-    let output = Output {
-        me,
-        to,
-        priority: class.priority(),
-        level: AtomicU8::new(level_of(installation.output_level(me)) as u8),
-        clock: SystemClock::open(participant.node()),
-        participant: participant.clone(),
-        lanes: WAITING_MAX.map(|lines| Waiting {
-            bucket: Bucket::new(rate, burst),
-            excess: Excess::default(),
-            queue: ArrayQueue::new(lines),
-        }),
-        rate,
-        lost_now: AtomicU32::new(0),
-        lost: AtomicU64::new(0),
-        suppressed: AtomicU64::new(0),
-        way: Mutex::new(way),
-        held: AtomicBool::new(false),
-        // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard error.
-        print: if launched { OutputLevel::Error } else { OutputLevel::Trace },
-        collected: installation.module(to).is_some(),
-    };
+    // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard error.
+    let print = if launched { Print::Errors } else { Print::All };
+    let Some(output) = Output::new(participant, installation, me, Arc::default(), print) else { return };
     if OUTPUT.set(output).is_ok() {
         layer::listen();
+    }
+}
+
+impl Output {
+    /// None: the configuration knows no collector.
+    pub(super) fn new(
+        participant: &Arc<Participant>,
+        installation: &Installation,
+        me: Name,
+        out: Arc<Out>,
+        print: Print,
+    ) -> Option<Self> {
+        let class = installation.classes.id(CLASS)?;
+        let (rate, burst) = (installation.output.rate, installation.output.burst);
+        let to = Name::new(me.system(), class.0, 0, LINES);
+        Some(Self {
+            me,
+            to,
+            priority: class.priority(),
+            level: AtomicU8::new(level_of(installation.output_level(me)) as u8),
+            clock: SystemClock::open(participant.node()),
+            participant: participant.clone(),
+            lanes: WAITING_MAX.map(|lines| Waiting {
+                bucket: Bucket::new(rate, burst),
+                excess: Excess::default(),
+                queue: ArrayQueue::new(lines),
+            }),
+            rate,
+            lost_now: AtomicU32::new(0),
+            lost: AtomicU64::new(0),
+            suppressed: AtomicU64::new(0),
+            out,
+            print,
+            collected: installation.module(to).is_some(),
+        })
     }
 }
 
@@ -176,8 +220,7 @@ pub fn suppressed() -> u64 {
 /// Sends the lines that wait, as far as there is room, and tells of suppressed ones when it is time.
 pub fn drain() {
     if let Some(output) = installed() {
-        output.tell(|excess, now_ns| excess.tell(now_ns));
-        output.drain();
+        output.attend();
     }
 }
 
@@ -192,18 +235,33 @@ pub fn flush() {
 
 /// When to call [`drain`] again, if lines wait or there is something to tell.
 pub fn retry_at() -> Option<Instant> {
-    let output = installed()?;
-    let now = Instant::now();
-    let retry = (!output.is_idle()).then(|| now + RETRY_FULL.max(output.patience()));
-    let now_ns = monotonic_ns();
-    // Where there is no room for it, it is told when there is; until then its time would have passed again and again.
-    let room = output.lanes.iter().filter(|lane| !lane.queue.is_full());
-    let due_ns = room.filter_map(|lane| lane.excess.due_ns()).min();
-    let due = due_ns.map(|due_ns| now + Duration::from_nanos(due_ns.saturating_sub(now_ns)));
-    [retry, due].into_iter().flatten().min()
+    installed()?.retry_at()
 }
 
 impl Output {
+    /// See [`drain`].
+    pub(super) fn attend(&self) {
+        self.tell(|excess, now_ns| excess.tell(now_ns));
+        self.drain();
+    }
+
+    /// See [`retry_at`].
+    pub(super) fn retry_at(&self) -> Option<Instant> {
+        let now = Instant::now();
+        let retry = (!self.is_idle()).then(|| now + RETRY_FULL.max(self.patience()));
+        let now_ns = monotonic_ns();
+        // Where there is no room for it, it is told when there is; until then its time would have passed again and again.
+        let room = self.lanes.iter().filter(|lane| !lane.queue.is_full());
+        let due_ns = room.filter_map(|lane| lane.excess.due_ns()).min();
+        let due = due_ns.map(|due_ns| now + Duration::from_nanos(due_ns.saturating_sub(now_ns)));
+        [retry, due].into_iter().flatten().min()
+    }
+
+    /// System time, as lines carry it.
+    pub(super) fn now_ns(&self) -> u64 {
+        self.clock.now().ns
+    }
+
     pub(super) fn level(&self) -> OutputLevel {
         level_from(self.level.load(Ordering::Relaxed))
     }
@@ -222,10 +280,10 @@ impl Output {
         false
     }
 
-    /// Says a line that is allowed.
-    pub(super) fn say(&self, level: OutputLevel, text: String) {
+    /// Says a line that is allowed, and was true at this system time.
+    pub(super) fn say(&self, level: OutputLevel, time_ns: u64, text: String) {
         self.tell(|excess, now_ns| excess.tell(now_ns));
-        self.push(Lane::of(level), level, 0, text);
+        self.push(Lane::of(level), level, time_ns, 0, text);
         self.drain();
         if !self.is_idle() {
             // Said by another thread, it would wait for whatever wakes the module's loop next.
@@ -236,7 +294,7 @@ impl Output {
     /// Says a panic. What finds no room now is sent later by the module's loop, or at the process's end.
     pub(super) fn panicked(&self, text: String) {
         if self.allows(Lane::Panic) {
-            self.push(Lane::Panic, OutputLevel::Error, 0, text);
+            self.push(Lane::Panic, OutputLevel::Error, self.now_ns(), 0, text);
         }
         self.drain();
         let before = PANICS.try_with(|panics| panics.replace(panics.get() + 1)).unwrap_or(0);
@@ -249,11 +307,9 @@ impl Output {
     }
 
     /// Puts a line into its queue.
-    fn push(&self, lane: Lane, level: OutputLevel, suppressed: u32, text: String) {
-        if level <= self.print {
-            super::print(&format_args!("{:5} {text}", level.name()));
-        }
-        let line = OutputLine { time_ns: self.clock.now().ns, module: self.me.raw(), level, lost: 0, suppressed, text };
+    fn push(&self, lane: Lane, level: OutputLevel, time_ns: u64, suppressed: u32, text: String) {
+        self.print.line(level, &text);
+        let line = OutputLine { time_ns, module: self.me.raw(), level, lost: 0, suppressed, text };
         if self.lanes[lane as usize].queue.push(line).is_err() {
             self.lose_one();
         }
@@ -269,7 +325,7 @@ impl Output {
             if let Some(Told { lines, within }) = told(&own.excess, monotonic_ns()) {
                 let ((what, level), rate) = (lane.words(), self.rate);
                 let text = format!("… {lines} {what} were suppressed in {within:.1?}: more than {rate} a second");
-                self.push(lane, level, lines, text);
+                self.push(lane, level, self.now_ns(), lines, text);
             }
         }
     }
@@ -280,11 +336,11 @@ impl Output {
     }
 
     fn is_idle(&self) -> bool {
-        !self.held.load(Ordering::Relaxed) && self.lanes.iter().all(|lane| lane.queue.is_empty())
+        !self.out.held.load(Ordering::Relaxed) && self.lanes.iter().all(|lane| lane.queue.is_empty())
     }
 
     fn patience(&self) -> Duration {
-        match self.way.try_lock() {
+        match self.out.way.try_lock() {
             Ok(way) => way.retry_at.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now())),
             Err(_) => Duration::ZERO,
         }
@@ -306,7 +362,7 @@ impl Output {
             if self.is_idle() {
                 return;
             }
-            let mut way = match self.way.try_lock() {
+            let mut way = match self.out.way.try_lock() {
                 Ok(way) => way,
                 Err(TryLockError::Poisoned(way)) => way.into_inner(),
                 Err(TryLockError::WouldBlock) => return,
@@ -326,16 +382,23 @@ impl Output {
 
     /// False when nothing more goes through now.
     fn send(&self, way: &mut Way, mut line: OutputLine) -> bool {
-        line.lost = self.lost_now.swap(0, Ordering::Relaxed);
-        let label =
-            Label { from: self.me, kind: Type::data(1), id: 0, priority: self.priority, options: Options::STAMPED };
+        // The line that was held back may be that of another for whom this process speaks.
+        let own = line.module() == self.me;
+        line.lost = if own { self.lost_now.swap(0, Ordering::Relaxed) } else { 0 };
+        let label = Label {
+            from: line.module(),
+            kind: Type::data(1),
+            id: 0,
+            priority: self.priority,
+            options: Options::STAMPED,
+        };
         way.bytes.clear();
         // A line can be written: text and numbers.
         let _ = crate::interface::append(&mut way.bytes, &line);
         let head = DataHead { stamp_ns: line.time_ns, sequence: way.sequence, missed: line.lost };
         let Some(sender) = &mut way.sender else { return false };
         let sent = sender.send(&label, &[&head.to_bytes(), &way.bytes]);
-        self.held.store(false, Ordering::Relaxed);
+        self.out.held.store(false, Ordering::Relaxed);
         let Err(error) = sent else {
             way.sequence = way.sequence.wrapping_add(1);
             return true;
@@ -352,7 +415,7 @@ impl Output {
         }
         way.retry_at = Some(Instant::now() + if gone { RETRY } else { RETRY_FULL });
         way.held = Some(OutputLine { lost: 0, ..line });
-        self.held.store(true, Ordering::Relaxed);
+        self.out.held.store(true, Ordering::Relaxed);
         false
     }
 }

@@ -120,7 +120,8 @@ impl Followings {
     }
 
     /// Notes a package's number.
-    pub(crate) fn note(&mut self, from: Name, id: u16, head: &DataHead) {
+    /// `latest`: a gap is what the newer replaced, and no loss.
+    pub(crate) fn note(&mut self, from: Name, id: u16, head: &DataHead, latest: bool) {
         let Some(followed) = self.list.get_mut(usize::from(id)).filter(|followed| followed.from == from.module())
         else {
             return;
@@ -128,7 +129,7 @@ impl Followings {
         if let Some(expected) = followed.expected {
             // A publisher that was restarted begins at 0 again; that is no gap.
             let gap = head.sequence.wrapping_sub(expected);
-            if head.sequence != 0 && gap < u32::MAX / 2 {
+            if head.sequence != 0 && gap < u32::MAX / 2 && !latest {
                 self.lost += u64::from(gap);
             }
         }

@@ -18,6 +18,8 @@ const DATA_SLOTS: u16 = 128;
 /// Longest description that is asked for, bytes.
 const DESCRIPTION_MAX: usize = 1 << 20;
 
+/// Most parameters of a module that are asked for.
+const PARAMETERS_MAX: u16 = 1024;
 /// Times that parameters are read anew because they were set meanwhile.
 const READS_MAX: usize = 5;
 
@@ -211,6 +213,11 @@ impl ToolLink {
         loop {
             let from = found.len() as u16;
             let page: ParameterPage = self.common(module, common::PARAMETERS, &(from,))?;
+            // What it says of itself is a claim.
+            if page.total > PARAMETERS_MAX {
+                let text = format!("its {} parameters are more than {PARAMETERS_MAX}", page.total);
+                return Err(CallError::BadReply(module, text));
+            }
             // Somebody set some in between: values of one moment belong together.
             if changes.replace(page.changes).is_some_and(|before| before != page.changes) && reads < READS_MAX {
                 reads += 1;

@@ -9,7 +9,7 @@ use crate::common::{DataHead, Status};
 use crate::interface::Interfaces;
 use crate::module::{Module, ModuleError};
 use crate::output;
-use rohrpost_mailbox::{Kind, ModuleState, Participant, Receiver, Waiting, Watches, monotonic_ns, wait_any};
+use rohrpost_mailbox::{Full, Kind, ModuleState, Participant, Receiver, Waiting, Watches, monotonic_ns, wait_any};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -329,7 +329,7 @@ impl<M: Module> Running<M> {
 
 /// Hands out a burst of packages of one mailbox; false when there was none.
 fn take<M: Module>(mailbox: &mut Receiver, life: &mut Life<M>, context: &mut Context) -> bool {
-    let local = mailbox.name().local();
+    let (local, latest) = (mailbox.name().local(), mailbox.shape().full == Full::Latest);
     burst(|| {
         let Some(package) = mailbox.try_receive() else { return false };
         let head = package.head();
@@ -338,7 +338,7 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Life<M>, context: &mut Con
             return true;
         };
         if local == rohrpost_mailbox::local::DATA {
-            context.followings.note(head.from, head.id, &data);
+            context.followings.note(head.from, head.id, &data, latest);
         }
         if life.state == ModuleState::On {
             let received = Received { from: head.from, number, mailbox: local, id: head.id, head: data, value };

@@ -54,9 +54,9 @@ pub enum StartError {
     /// The node.
     #[error(transparent)]
     Node(#[from] NodeError),
-    /// A mailbox.
-    #[error(transparent)]
-    Mailbox(#[from] CreateError),
+    /// A mailbox, which the text names as the configuration does.
+    #[error("{0}")]
+    Mailbox(String),
     /// A face without an interface.
     #[error("`{0}` is a face of `{1}`, but that program has no interface of class `{2}`")]
     Face(String, String, String),
@@ -156,6 +156,13 @@ impl Start {
         let stop = stop_on_signals(&participant, module.stop_within)?;
         output::install(&participant, &installation, self.name, self.launcher.is_some());
         schedule(installation.scheduling(self.name.class()));
+        // The mailboxes themselves know numbers only.
+        let receiver = |name: Name, spec: &MailboxSpec| {
+            participant.clone().receiver(name, shape(spec)).map_err(|error: CreateError| {
+                let text = error.to_string().replace(&name.to_string(), &installation.classes.format(name));
+                StartError::Mailbox(text)
+            })
+        };
         let mut served = served::<M>();
         let mut faces = Vec::new();
         for name in module.names() {
@@ -164,11 +171,11 @@ impl Start {
             if at.is_none() && name != module.name {
                 return Err(StartError::Face(installation.classes.format(name), text, class));
             }
-            let commands = participant.receiver(name.with_local(local::COMMANDS), shape(&module.mailboxes.commands))?;
+            let commands = receiver(name.with_local(local::COMMANDS), &module.mailboxes.commands)?;
             faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)))?);
         }
-        let data = participant.receiver(self.name.with_local(local::DATA), shape(&module.mailboxes.data))?;
-        let replies = participant.receiver(self.name.with_local(local::REPLIES), shape(&module.mailboxes.replies))?;
+        let data = receiver(self.name.with_local(local::DATA), &module.mailboxes.data)?;
+        let replies = receiver(self.name.with_local(local::REPLIES), &module.mailboxes.replies)?;
         let link = Link::new(&participant, self.name, replies);
         let clock = SystemClock::open(&node);
         let names = faces.iter().map(|face: &Face<M>| face.name).collect();

@@ -51,6 +51,7 @@ pub(super) fn installation(installation: &Installation, only: Option<&str>, miss
             "system": { "id": system.id, "name": system.name },
             "time": time(installation.time),
             "digest": installation.digest().to_string(),
+            "parameters": installation.parameters,
             "classes": class_entries.collect::<Vec<_>>(),
             "nodes": nodes.collect::<Vec<_>>(),
             "output": {

@@ -11,7 +11,9 @@ use super::output::Output;
 use super::palette::Palette;
 use super::sample::{self, Children, by_name};
 use ratatui::DefaultTerminal;
+use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
+use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
 use ratatui::crossterm::{cursor, execute};
 use rohrpost::Name;
 use rohrpost::launch::{Event as Told, events};
@@ -33,7 +35,9 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
         let typed = keyboard()?;
         live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(Told::Stop)))
     };
-    live.calls.map(Calls::close);
+    if let Some(calls) = live.calls {
+        calls.close();
+    }
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
@@ -52,23 +56,40 @@ fn keyboard() -> Result<Receiver<Event>, Failure> {
     Ok(receiver)
 }
 
-/// The terminal while it is ours; given back as it was, whatever ends us. (Of a panic, `ratatui` says what it was after that.)
+/// The terminal while it is ours; given back as it was, whatever ends us.
 struct Opened(DefaultTerminal);
 
 impl Opened {
     fn new() -> Result<Self, Failure> {
-        ratatui::try_init().map(Self).map_err(|error| {
-            ratatui::restore();
+        let hook = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            // First, so that what it says is to be read.
+            give_back();
+            hook(panic);
+        }));
+        Self::draw().map_err(|error| {
+            give_back();
             format!("this terminal cannot be drawn on: {error}; say `top --once`").into()
         })
+    }
+
+    fn draw() -> std::io::Result<Self> {
+        enable_raw_mode()?;
+        execute!(std::io::stdout(), EnterAlternateScreen)?;
+        ratatui::Terminal::new(CrosstermBackend::new(std::io::stdout())).map(Self)
     }
 }
 
 impl Drop for Opened {
     fn drop(&mut self) {
-        ratatui::restore();
-        let _ = execute!(std::io::stdout(), cursor::Show);
+        give_back();
     }
+}
+
+/// A terminal that is gone cannot be given back, and that is no error.
+fn give_back() {
+    let _ = disable_raw_mode();
+    let _ = execute!(std::io::stdout(), LeaveAlternateScreen, cursor::Show);
 }
 
 struct Live {
@@ -187,7 +208,9 @@ impl Live {
         if !now.launched {
             return;
         }
-        self.calls.take().map(Calls::close);
+        if let Some(calls) = self.calls.take() {
+            calls.close();
+        }
         (self.running, self.now, self.earlier) = (running, now, None);
         self.children.clear();
         self.absent.clear();

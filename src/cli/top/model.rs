@@ -222,7 +222,7 @@ fn peers(
             None => peers.push(Peer { module, packages: flow.packages, per_s }),
         }
     }
-    peers.sort_by(|a, b| b.packages.cmp(&a.packages));
+    peers.sort_by_key(|peer| std::cmp::Reverse(peer.packages));
     peers
 }
 

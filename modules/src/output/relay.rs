@@ -1,0 +1,68 @@
+//! Lines that one process says in the names of others: launch passes on what its modules print.
+
+use super::layer::cut;
+use super::way::{Lane, Out, Output, Print};
+use crate::common::OutputLevel;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Name, Participant};
+use std::sync::{Arc, Weak};
+use std::time::Instant;
+
+/// The way to the collector, shared by all for whom this process speaks.
+pub(crate) struct Relay {
+    participant: Arc<Participant>,
+    out: Arc<Out>,
+}
+
+/// Speaks for one module, within the same allowance as the module has itself.
+pub(crate) struct Voice(Arc<Output>);
+
+/// The same for a thread that nobody waits for: silent when all else has ended.
+pub(crate) struct Whisper(Weak<Output>);
+
+impl Relay {
+    pub(crate) fn new(participant: &Arc<Participant>) -> Self {
+        Self { participant: participant.clone(), out: Arc::default() }
+    }
+
+    /// None: the configuration knows no collector.
+    pub(crate) fn voice(&self, installation: &Installation, module: Name) -> Option<Voice> {
+        let output = Output::new(&self.participant, installation, module, self.out.clone(), Print::Nothing)?;
+        Some(Voice(Arc::new(output)))
+    }
+}
+
+impl Voice {
+    /// Says a line as of this system time, unless the module says too much already, or its configuration wants to hear only
+    /// of more important things.
+    pub(crate) fn say(&self, level: OutputLevel, time_ns: u64, text: String) {
+        if level <= self.0.level() && self.0.allows(Lane::of(level)) {
+            self.0.say(level, time_ns, cut(text));
+        }
+    }
+
+    /// System time, as lines carry it.
+    pub(crate) fn now_ns(&self) -> u64 {
+        self.0.now_ns()
+    }
+
+    /// Sends what waits, and tells of what was suppressed when it is time.
+    pub(crate) fn attend(&self) {
+        self.0.attend();
+    }
+
+    /// When to attend to it again.
+    pub(crate) fn retry_at(&self) -> Option<Instant> {
+        self.0.retry_at()
+    }
+
+    pub(crate) fn whisper(&self) -> Whisper {
+        Whisper(Arc::downgrade(&self.0))
+    }
+}
+
+impl Whisper {
+    pub(crate) fn voice(&self) -> Option<Voice> {
+        self.0.upgrade().map(Voice)
+    }
+}

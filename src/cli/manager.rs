@@ -1,0 +1,153 @@
+//! What launch tells the service manager that started it (systemd), and how its words stand in the journal. Started by hand,
+//! it tells nobody.
+//!
+//! The protocol is sd_notify(3): lines in a datagram. The crate for it waits when the manager does not read, and knows no
+//! abstract socket; launch must never wait, and containers have such sockets.
+
+use rohrpost::launch::{Launch, Phase};
+use std::collections::VecDeque;
+use std::ffi::OsStr;
+use std::io::{self, ErrorKind};
+use std::os::fd::AsFd;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::MetadataExt;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
+use std::time::{Duration, Instant};
+
+/// Words that wait for a manager that does not read; the oldest go first.
+const WAITING_MAX: usize = 8;
+
+/// One who waits for word from launch.
+pub(super) struct Manager {
+    socket: Option<(UnixDatagram, SocketAddr)>,
+    waiting: VecDeque<String>,
+    /// It wants to hear from us twice in this time.
+    watchdog: Option<Duration>,
+    ping_at: Instant,
+    status: String,
+}
+
+impl Manager {
+    /// The one that the environment names, if there is one.
+    pub(super) fn from_environment() -> io::Result<Self> {
+        let socket = match std::env::var_os("NOTIFY_SOCKET") {
+            Some(name) => {
+                let socket = UnixDatagram::unbound()?;
+                socket.set_nonblocking(true)?;
+                Some((socket, address(&name)?))
+            }
+            None => None,
+        };
+        let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+        let ours = number("WATCHDOG_PID").is_none_or(|pid| pid == u64::from(std::process::id()));
+        let watchdog = number("WATCHDOG_USEC").filter(|us| ours && *us > 0).map(Duration::from_micros);
+        Ok(Self { socket, waiting: VecDeque::new(), watchdog, ping_at: Instant::now(), status: String::new() })
+    }
+
+    /// The modules are being started.
+    pub(super) fn starting(&mut self, node: &str) {
+        self.say(format!("STATUS=starts the modules of node {node}"));
+    }
+
+    /// All modules are on.
+    pub(super) fn ready(&mut self, launch: &Launch) {
+        self.status = status(launch);
+        self.say(format!("READY=1\nSTATUS={}", self.status));
+    }
+
+    /// Launch has gone round once: its loop lives. Says so when it is time, and what has changed.
+    pub(super) fn alive(&mut self, launch: &Launch) {
+        if self.socket.is_none() {
+            return;
+        }
+        let status = status(launch);
+        if status != self.status {
+            self.say(format!("STATUS={status}"));
+            self.status = status;
+        }
+        if let Some(period) = self.watchdog
+            && Instant::now() >= self.ping_at
+        {
+            self.ping_at = Instant::now() + period / 2;
+            self.say("WATCHDOG=1".into());
+        }
+        self.send();
+    }
+
+    /// How long launch may sleep until it has to go round again.
+    pub(super) fn wait(&self) -> Duration {
+        match (&self.socket, self.watchdog) {
+            (Some(_), Some(_)) => self.ping_at.saturating_duration_since(Instant::now()),
+            _ => Duration::MAX,
+        }
+    }
+
+    /// All modules are being stopped. The watchdog is off from here on: their time is bounded by `TimeoutStopSec`.
+    pub(super) fn stopping(&mut self) {
+        self.say("STOPPING=1\nSTATUS=stops the modules, the last first\nWATCHDOG_USEC=0".into());
+    }
+
+    fn say(&mut self, words: String) {
+        if self.waiting.len() == WAITING_MAX {
+            self.waiting.pop_front();
+        }
+        self.waiting.push_back(words);
+        self.send();
+    }
+
+    fn send(&mut self) {
+        let Some((socket, address)) = &self.socket else { return self.waiting.clear() };
+        while let Some(words) = self.waiting.front() {
+            match socket.send_to_addr(words.as_bytes(), address) {
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return,
+                // A manager that went away hears nothing; that is no reason to stop a robot.
+                Ok(_) | Err(_) => self.waiting.pop_front(),
+            };
+        }
+    }
+}
+
+/// A path, or a name behind an `@`.
+fn address(name: &OsStr) -> io::Result<SocketAddr> {
+    match name.as_bytes() {
+        [b'@', name @ ..] => SocketAddr::from_abstract_name(name),
+        _ => SocketAddr::from_pathname(name),
+    }
+}
+
+/// One line: how many modules run, and which do not.
+fn status(launch: &Launch) -> String {
+    let (mut running, mut others) = (0, String::new());
+    for (module, phase) in launch.phases() {
+        if phase == Phase::Running {
+            running += 1;
+        } else {
+            others.push_str(&format!(", {module} {}", phase.name()));
+        }
+    }
+    format!("{running} modules run{others}")
+}
+
+/// How urgent a line of launch's is.
+#[derive(Clone, Copy)]
+pub(super) enum Urgency {
+    Error = 3,
+    Notice = 5,
+}
+
+/// A line as this stream takes it: the journal wants each to begin with its urgency.
+pub(super) fn for_journal(stream: impl AsFd, urgency: Urgency, line: &str) -> String {
+    if !is_journal(stream) {
+        return line.to_owned();
+    }
+    let mark = format!("<{}>", urgency as u8);
+    format!("{mark}{}", line.replace('\n', &format!("\n{mark}")))
+}
+
+/// Whether it is the stream that systemd has connected to its journal: `JOURNAL_STREAM` has its device and number.
+fn is_journal(stream: impl AsFd) -> bool {
+    let Ok(wanted) = std::env::var("JOURNAL_STREAM") else { return false };
+    let own = stream.as_fd().try_clone_to_owned().and_then(|stream| std::fs::File::from(stream).metadata());
+    own.is_ok_and(|own| wanted == format!("{}:{}", own.dev(), own.ino()))
+}

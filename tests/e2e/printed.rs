@@ -1,0 +1,105 @@
+//! What modules print becomes output, as far as they did not say it themselves.
+
+use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use crate::output::{call, lines};
+use crate::process::Running;
+use nix::sys::signal::Signal;
+use serde_json::Value;
+
+fn texts(lines: &[Value], level: &str) -> Vec<String> {
+    let of_level = lines.iter().filter(|line| line["level"] == level);
+    of_level.map(|line| line["text"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn what_a_module_prints_is_a_line_of_its_own() {
+    let place = Place::new();
+    let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    call(&place, &["probe.0", "print", "stdout", "a greeting", "1"]);
+    call(&place, &["probe.0", "print", "stderr", "a complaint", "1"]);
+    // Printed by its own output layer too, for launch to repeat; it must not come twice.
+    call(&place, &["probe.0", "say", "error", "said and printed"]);
+    call(&place, &["probe.0", "print", "stdout", "the end", "1"]);
+    let all = wait("the last line", || {
+        let all = lines(&place, "probe.0");
+        texts(&all, "info").contains(&"the end 0".into()).then_some(all)
+    });
+    let info = texts(&all, "info");
+    assert!(info.contains(&"a greeting 0".into()), "{all:#?}");
+    assert_eq!(texts(&all, "warn"), ["a complaint 0"], "{all:#?}");
+    assert_eq!(texts(&all, "error"), ["said and printed"], "{all:#?}");
+}
+
+#[test]
+fn last_words_are_errors_and_above_them_stands_how_it_ended() {
+    let place = Place::new();
+    let restart = "restart = { backoff = \"50 ms\" }";
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
+    let pid = robot.pid("probe.0");
+    let dying = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "last_words", "no more oil"]));
+    robot.wait_restarted("probe.0", pid);
+    drop(dying);
+    let all = wait("how it ended", || {
+        let errors = texts(&lines(&place, "probe.0"), "error");
+        errors.iter().any(|text| text.contains("was killed by signal 6; starts again in 50ms")).then_some(errors)
+    });
+    assert_eq!(all[0], "no more oil", "{all:?}");
+    assert_eq!(all.len(), 2, "{all:?}");
+    let out = launch.stop();
+    assert!(out.contains("probe.0 was killed by signal 6; starts again in 50ms\n"), "{out}");
+    assert!(out.contains("\n    no more oil\n"), "{out}");
+}
+
+#[test]
+fn a_panic_comes_once_and_its_back_trace_with_it() {
+    let place = Place::new();
+    let config = place.config(&[OUTPUT, &probe("probe.0", "", "restart = { backoff = \"50 ms\" }")]);
+    let mut command = place.command(&["launch", config.to_str().unwrap()]);
+    command.env("RUST_BACKTRACE", "1");
+    let mut launch = Running::start(command);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    let pid = robot.pid("probe.0");
+    let panicking = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "panic", "here"]));
+    robot.wait_restarted("probe.0", pid);
+    drop(panicking);
+    let errors = wait("how it ended", || {
+        let errors = texts(&lines(&place, "probe.0"), "error");
+        errors.iter().any(|text| text.contains("starts again in 50ms")).then_some(errors)
+    });
+    let panics = errors.iter().filter(|text| text.contains("two lines"));
+    assert_eq!(panics.count(), 1, "{errors:#?}");
+    assert!(
+        errors.iter().any(|text| text.contains("tests/e2e/probe.rs:") && !text.contains("panicked")),
+        "{errors:#?}"
+    );
+    let out = launch.stop();
+    assert!(out.contains("error thread `probe::module` panicked at tests/e2e/probe.rs:"), "{out}");
+    assert!(!out.contains('\u{1e}'), "marks are for launch only: {out:?}");
+}
+
+#[test]
+fn a_module_that_prints_without_end_floods_nobody() {
+    let place = Place::new();
+    let (_launch, robot) = place.launched(&[
+        OUTPUT,
+        &probe("probe.0", "", ""),
+        &probe("probe.1", "", "restart = { backoff = \"50 ms\" }"),
+    ]);
+    let flood =
+        Running::start(place.command(&["call", "--timeout", "60", "probe.0", "print", "stdout", "flood", "100000"]));
+    let pid = robot.pid("probe.1");
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("probe.1", pid);
+    call(&place, &["probe.1", "say", "error", "help"]);
+    wait("another's error", || texts(&lines(&place, "probe.1"), "error").contains(&"help".into()).then_some(()));
+    flood.said().ok();
+    // Not one is missing from the account.
+    let sum = |all: &[Value], key: &str| all.iter().map(|line| line[key].as_u64().unwrap()).sum::<u64>();
+    wait("all are accounted for", || {
+        let all = lines(&place, "probe.0");
+        let printed = texts(&all, "info").iter().filter(|text| text.starts_with("flood ")).count() as u64;
+        assert!(printed < 5_000, "{printed} of 100000 at 100 a second");
+        (printed + sum(&all, "suppressed") + sum(&all, "lost_before") == 100_000).then_some(())
+    });
+}
