@@ -61,7 +61,7 @@ mod watch;
 mod word;
 
 pub use clock::{monotonic_ns, realtime_ns};
-pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss};
+pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss, saturating_sum};
 pub use flows::{FlowInfo, FlowSecond, Publications};
 pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};

@@ -3,9 +3,12 @@
 //! ```text
 //! /dev/shm/rohrpost-UID/INSTALLATION.NODE/     mode 0700
 //!     node           this page: epochs, participants (their bells, states, process ids)
+//!     config         the configuration that launch runs (written by it; this crate does not know what it says)
 //!     time           system time (see `system_time`)
 //!     traffic.3      what participant 3 sends (see `traffic`)
+//!     bell.3         a pipe that wakes participant 3, while it watches descriptors (see `doorbell`)
 //!     01c80000.mbx   a mailbox: its name in hexadecimal (see `layout`)
+//!     01c80000.about what its owner says of it (see `about`)
 //! ```
 //!
 //! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the file
@@ -279,10 +282,12 @@ impl Node {
 
     /// The same, with their places in the table.
     pub(crate) fn living(&self) -> impl Iterator<Item = (Claimant, ParticipantInfo)> + '_ {
+        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group. Asked
+        // first, and once more with the lock seen held: the lock is a system call, and most places are empty.
+        let used = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
         let alive = |index: &u16| lock::is_locked(&self.file, u64::from(*index)).unwrap_or(false);
-        let all = (0..PARTICIPANTS_MAX as u16).filter(alive).map(|index| (index, self.entry(index).read()));
-        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group.
-        let here = all.filter(|(_, participant)| participant.pid != 0);
+        let all = (0..PARTICIPANTS_MAX as u16).filter(used).filter(alive);
+        let here = all.map(|index| (index, self.entry(index).read())).filter(|(_, participant)| participant.pid != 0);
         here.map(|(index, found)| (Claimant { participant: index, incarnation: found.incarnation }, found))
     }
 
