@@ -1,8 +1,9 @@
 //! What everybody on a node sends, read from their tables (see `traffic`). Reading changes nothing.
 
 use crate::clock::monotonic_ns;
+use crate::entry::ParticipantInfo;
 use crate::name::Name;
-use crate::node::{Node, ParticipantInfo};
+use crate::node::Node;
 use crate::package::Type;
 use crate::participant::Participant;
 use crate::traffic::{Key, Row, SECONDS_KEPT, TableView, Writer};
