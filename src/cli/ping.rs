@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 #[command(after_help = "Examples:
   rohrpost ping motor.0               once a second; Ctrl-C ends it
   rohrpost ping motor.0 -c 100 --interval 0.01
-It calls `status`. The time is that of the whole round: a module answers between its own work, and so what it does just
+It calls `status`. The time is that of the whole round: a module answers between its own work, and so what it does just \
 then is in it, as is being waited for behind more important classes. The exit code is 1 if nothing was answered.")]
 pub(super) struct Arguments {
     /// Module or face, such as motor.0.
