@@ -93,7 +93,7 @@ enum Command {
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
-    /// Print the versions of this program and of what it shares with others.
+    /// Print versions, of this program and of what nodes share.
     Version(version::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),

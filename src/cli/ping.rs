@@ -104,12 +104,7 @@ fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
             process.state.map_or("unknown", ModuleState::name),
             found.depth
         ),
-        None if found.is_some() => {
-            format!(
-                "{name} answered nothing: it does not run; see `rohrpost log --module {name}`, then launch it again"
-            )
-        }
-        None => format!("{name} answered nothing: there is no such module on this node; see `rohrpost list`"),
+        None => running.absent(module).to_string(),
     })
 }
 

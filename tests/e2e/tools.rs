@@ -221,7 +221,7 @@ fn without_a_collector_there_is_no_log() {
     let place = Place::new();
     let (_launch, _robot) = place.launched(&[&probe("probe.0", "", "")]);
     let told = place.say(&["log"]).fails();
-    assert!(told.contains("is its module launched?"), "{told}");
+    assert!(told.contains("output.0 does not run, and the configuration has no such module"), "{told}");
 }
 
 #[test]
