@@ -63,7 +63,13 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let arguments: &[&str] =
             if log { &["demo", "--no-gui", "--log", LOG, "--speed", "0.01"] } else { &["demo", "--no-gui"] };
         let mut demo = Running::start(place.command(arguments));
-        wait("the demo can be seen", || place.say(&["status"]).code.filter(|code| *code == 0));
+        // Told to end before all are on, it would be a start that failed.
+        wait("the demo is on", || {
+            let list = place.say(&["list", "--json"]);
+            let all_on =
+                |list: serde_json::Value| list["modules"].as_array().unwrap().iter().all(|m| m["state"] == "on");
+            (list.code == Some(0) && all_on(list.json())).then_some(())
+        });
         let list = place.say(&["list", "--json"]).json();
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
         assert!(pids.len() >= 3, "{list}");

@@ -75,6 +75,7 @@ fn figures_agree_with_a_known_source() {
     let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 600_000 };
     tool.data().unwrap();
     let write = |body: &mut Vec<u8>| append(body, &wish);
+    wait("probe.0 is ready", || (robot.state("probe.0") == "off").then_some(()));
     tool.call(robot.name("probe.0"), SUBSCRIBE, ProbingInterface::hash(), write, |_| Ok(())).unwrap();
     let me = robot.installation.classes.format(tool.link.me());
     let start =

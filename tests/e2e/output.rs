@@ -81,13 +81,16 @@ fn a_collector_that_is_flooded_takes_errors_of_others() {
     call(&place, &["probe.1", "say", "error", "help"]);
     wait("another's error", || texts(&lines(&place, "probe.1")).contains(&"help").then_some(()));
     flood.said().ok();
-    call(&place, &["probe.0", "say", "info", "the last"]);
+    // The first may find the module's own queue full of the flood still.
+    let mut tries = 0;
     let all = wait("the last", || {
+        tries += 1;
+        call(&place, &["probe.0", "say", "info", "the last"]);
         let all = lines(&place, "probe.0");
         texts(&all).contains(&"the last").then_some(all)
     });
-    let said = texts(&all).iter().filter(|text| text.starts_with("flood ")).count() as u64;
-    assert_eq!(said + sum(&all, "lost_before"), 20_000, "{said} said");
+    let said = texts(&all).iter().filter(|text| text.starts_with("flood ") || **text == "the last").count() as u64;
+    assert_eq!(said + sum(&all, "lost_before"), 20_000 + tries, "{said} said");
 }
 
 #[test]

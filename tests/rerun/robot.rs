@@ -172,7 +172,7 @@ impl Module for Source {
 fn patch(number: u64) -> OccupancyGrid {
     let (column, row) = (number % 8, number / 8 % 8);
     let origin = Pose { x_m: column as f64 * 3.2, y_m: row as f64 * 3.2, heading_rad: 0.0 };
-    let cells = (0..64 * 64).map(|cell| if (cell + number) % 7 == 0 { 100 } else { 0 }).collect();
+    let cells = (0..64 * 64).map(|cell| if (cell + number).is_multiple_of(7) { 100 } else { 0 }).collect();
     OccupancyGrid { origin, resolution_m: 0.05, columns: 64, rows: 64, cells }
 }
 
