@@ -286,7 +286,7 @@ fn ping_counts_answers_and_ends_at_its_deadline() {
     signal(pid, Signal::SIGCONT);
     place.say(&["ping", "probe.0", "-c", "1"]).ok();
     let error = place.say(&["ping", "probe.3", "-c", "1"]).fails();
-    assert!(error.contains("there is no such module on this node; see `rohrpost list`"), "{error}");
+    assert!(error.contains("the configuration has no module `probe.3`; there are probe.0"), "{error}");
 }
 
 #[test]

@@ -14,7 +14,8 @@ fn log(place: &Place, arguments: &[&str]) -> crate::process::Said {
 /// What was said, without time and node, and without the modules' own words.
 fn shown(place: &Place, arguments: &[&str]) -> Vec<String> {
     let text = log(place, arguments).ok();
-    let lines = text.lines().filter(|line| !line.ends_with("is on"));
+    // The probe is a test binary, and says so.
+    let lines = text.lines().filter(|line| !line.ends_with("is on") && !line.ends_with("running 1 test"));
     lines.map(|line| line.split_once("main/").unwrap().1.to_owned()).collect()
 }
 
