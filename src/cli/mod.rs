@@ -39,7 +39,7 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Prioritised mailboxes for robots: configure, launch, look, call.
 #[derive(Parser)]
-#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost top`. Each command explains itself: `rohrpost log --help`.")]
+#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

@@ -66,7 +66,10 @@ fn mistakes_are_told_with_what_would_be_right() {
         (&["call", "probe"], &["probe"]),
         (&["call", "probe.x", "count", "1"], &["probe.x"]),
         (&["call", "probe.999", "count", "1"], &["999"]),
-        (&["call", "probe.1", "count", "1"], &["the configuration has no module `probe.1`; there are output.0, probe.0"]),
+        (
+            &["call", "probe.1", "count", "1"],
+            &["the configuration has no module `probe.1`; there are output.0, probe.0"],
+        ),
         (&["call", "probe.0", "cuont", "1"], &["no function `cuont`", "count, count_again", "on, off, status"]),
         (&["call", "probe.0", "count"], &["count <number: u32> takes 1 arguments, not 0"]),
         (&["call", "probe.0", "count", "1", "2"], &["takes 1 arguments, not 2"]),
