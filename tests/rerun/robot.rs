@@ -399,7 +399,6 @@ settings = {{ viewer = "rerun+http://127.0.0.1:{port}/proxy" }}
 [module.mailbox.data]
 slots = 256
 size = "20 KiB"
-full = "latest"
 [gui]
 show = [
     {{ from = "source.0", data = "scan" }},
