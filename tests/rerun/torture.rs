@@ -48,7 +48,8 @@ struct Test {
 impl Test {
     fn new(settings: impl FnOnce(u16) -> String) -> Self {
         let port = free_port();
-        let robot = Robot::start(port, &settings(port));
+        let drawing = format!("viewer = \"rerun+http://127.0.0.1:{port}/proxy\"");
+        let robot = Robot::start(&drawing, &settings(port));
         Self { robot, port, viewer: None, most_mib: 0 }
     }
 
