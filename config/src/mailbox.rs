@@ -74,7 +74,7 @@ impl Mailboxes {
         for ((key, spec), line) in ["commands", "replies", "data"].into_iter().zip(specs).zip(&mut lines) {
             if let Some(section) = section.section(key, &format!("{module}, mailbox `{key}`")) {
                 *line = SpecLines { slots: section.line, size: section.line };
-                spec.read(section, line);
+                spec.read(section, line, key == "data");
             }
         }
         section.finish();
@@ -83,8 +83,8 @@ impl Mailboxes {
 }
 
 impl MailboxSpec {
-    /// Changes what the section says and keeps the rest.
-    fn read(&mut self, section: Section<'_>, line: &mut SpecLines) {
+    /// Changes what the section says and keeps the rest. `latest`: whether a newer package may make an older one useless here.
+    fn read(&mut self, section: Section<'_>, line: &mut SpecLines, latest: bool) {
         if let Some(item) = section.get("slots") {
             line.slots = item.line;
             self.slots = item.whole(1..=SLOTS_MAX.into(), self.slots.into()).map_or(self.slots, |slots| slots as u16);
@@ -93,7 +93,16 @@ impl MailboxSpec {
             line.size = item.line;
             self.size = item.size(1..=BODY_BYTES_MAX as u64, "1 KiB").map_or(self.size, |size| size as u32);
         }
-        let full = section.get("full").and_then(|item| item.choice(&Full::ALL.map(|full| (full.name(), full))));
+        let full = section.get("full").and_then(|item| {
+            if !latest && item.is(Full::Latest.name()) {
+                item.report(
+                    "`full` is \"latest\"; write \"displace\" or \"reject\": each command has an id of its own, so none replaces another",
+                );
+                return None;
+            }
+            let all = Full::ALL.into_iter().filter(|full| latest || *full != Full::Latest);
+            item.choice(&all.map(|full| (full.name(), full)).collect::<Vec<_>>())
+        });
         self.full = full.unwrap_or(self.full);
         self.max_age = section.get("max-age").and_then(|item| item.duration_above_zero("2 s"));
         let claims = section.get("claims").and_then(|item| item.whole(1..=CLAIMS_MAX.into(), 1));

@@ -146,9 +146,11 @@ impl Counters {
 
     /// Packages that were accepted and are no longer there: received, or lost and counted.
     pub(crate) fn accepted(&self) -> u64 {
-        let accepted = || Loss::ALL.into_iter().filter(|cause| cause.was_accepted());
-        let of = |row: ClassTraffic| row.received + accepted().map(|cause| row.lost(cause)).sum::<u64>();
-        self.0.iter().filter_map(Row::read).map(of).sum()
+        let accepted = |row: &ClassTraffic| {
+            let lost = Loss::ALL.into_iter().filter(|cause| cause.was_accepted()).map(|cause| row.lost(cause));
+            saturating_sum(lost.chain([row.received]))
+        };
+        saturating_sum(self.0.iter().filter_map(Row::read).map(|row| accepted(&row)))
     }
 
     /// The rows in use, by class as it stands in the names of their senders; the rest last.
@@ -178,6 +180,11 @@ impl Row {
             },
         })
     }
+}
+
+/// Adds up counts that other processes wrote, and which therefore may be anything.
+pub fn saturating_sum(counts: impl IntoIterator<Item = u64>) -> u64 {
+    counts.into_iter().fold(0, u64::saturating_add)
 }
 
 fn bucket(ns: u64) -> usize {
@@ -218,14 +225,14 @@ impl ClassTraffic {
 
     /// Lost for any cause for which somebody misses them ([`Loss::is_missed`]).
     pub fn lost_in_all(&self) -> u64 {
-        Loss::ALL.into_iter().filter(|cause| cause.is_missed()).map(|cause| self.lost(cause)).sum()
+        saturating_sum(Loss::ALL.into_iter().filter(|cause| cause.is_missed()).map(|cause| self.lost(cause)))
     }
 
     /// Adds what the same class did in another mailbox.
     pub fn add(&mut self, other: &Self) {
-        self.received += other.received;
-        self.body_bytes += other.body_bytes;
-        self.losses.iter_mut().zip(&other.losses).for_each(|(a, b)| *a += b);
+        self.received = self.received.saturating_add(other.received);
+        self.body_bytes = self.body_bytes.saturating_add(other.body_bytes);
+        self.losses.iter_mut().zip(&other.losses).for_each(|(a, b)| *a = a.saturating_add(*b));
         self.latency.add(&other.latency);
     }
 }
@@ -251,7 +258,7 @@ impl Latency {
     /// Adds another histogram.
     pub fn add(&mut self, other: &Self) {
         self.max = self.max.max(other.max);
-        self.sum += other.sum;
+        self.sum = self.sum.saturating_add(other.sum);
         self.buckets.iter_mut().zip(&other.buckets).for_each(|(a, b)| *a = a.saturating_add(*b));
     }
 
@@ -326,6 +333,21 @@ mod tests {
         assert_eq!((rows[0].received, rows[0].lost(Loss::Refused)), (1, 1));
         let rest = rows.last().unwrap();
         assert_eq!((rest.class, rest.received), (None, 256 - ROWS as u64 + 1));
+    }
+
+    #[test]
+    fn damaged_counts_add_up_to_the_most_and_not_to_a_panic() {
+        let counters = counters();
+        for class in [3, 4] {
+            counters.received(Priority(class), Duration::MAX, 1);
+            counters.row(Class(class)).received.store(u64::MAX - 1, Ordering::Relaxed);
+            counters.row(Class(class)).losses.iter().for_each(|losses| losses.store(u64::MAX, Ordering::Relaxed));
+        }
+        assert_eq!(counters.accepted(), u64::MAX);
+        let [mut all, other] = counters.read().try_into().unwrap();
+        all.add(&other);
+        assert_eq!((all.received, all.lost(Loss::Stale), all.lost_in_all()), (u64::MAX, u64::MAX, u64::MAX));
+        assert_eq!(all.latency.count(), 2);
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! What everybody on a node sends, read from their tables (see `traffic`). Reading changes nothing.
 
 use crate::clock::monotonic_ns;
+use crate::entry::ParticipantInfo;
 use crate::name::Name;
-use crate::node::{Node, ParticipantInfo};
+use crate::node::Node;
 use crate::package::Type;
 use crate::participant::Participant;
 use crate::traffic::{Key, Row, SECONDS_KEPT, TableView, Writer};
@@ -10,10 +11,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// A row is changed within nanoseconds, unless its writer was just put aside: then it gets time to go on.
-const TRIES: usize = 32;
+/// A row is changed within nanoseconds, unless its writer was just put aside: then it gets time to go on. So many naps are for
+/// all rows of all participants together, since launch looks too and must not be held up by those who were stopped in there, nor
+/// by a damaged table.
 const TRIES_AT_ONCE: usize = 8;
-const PATIENCE: Duration = Duration::from_micros(100);
+const NAPS: u32 = 24;
+const NAP: Duration = Duration::from_micros(100);
 
 /// Packages of one type that one participant sends from one name to one mailbox, or values of one kind that it publishes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,13 +31,14 @@ pub struct FlowInfo {
     pub from: Name,
     /// The mailbox; [`Name::NONE`] for what is published (see [`FlowInfo::is_publication`]) and for the rest.
     pub to: Name,
-    /// Type of the packages; type 0 is the rest: what found no row of its own.
+    /// Type of the packages. Type 0 to no mailbox is the rest: packages that found no row of their own.
     pub kind: Type,
     /// Packages that were accepted, or values published.
     pub packages: u64,
     /// Bytes of their bodies. Of a published value, its own bytes, counted once however many subscribe.
     pub bytes: u64,
-    /// Packages that were not accepted; their sender was told.
+    /// Packages that were not accepted; their sender was told. Not a slot that was asked for and not lent
+    /// ([`Sender::loan`](crate::Sender::loan)): it had no type yet, and only its mailbox counts it.
     pub refused: u64,
     /// When the first was sent, monotonic clock, ns; 0 in the rest.
     pub first_ns: u64,
@@ -65,32 +69,39 @@ impl FlowInfo {
         self.to == Name::NONE && self.kind != Type(0)
     }
 
-    /// Whether `other` is the same flow at another time.
+    /// Whether `other` is the same flow at another time, so that counts can be subtracted. One that lost its row to others and came
+    /// back is not: it counts from 0 again, and its first package is another.
     pub fn is_same(&self, other: &Self) -> bool {
+        let none_yet = self.packages == 0 || other.packages == 0;
+        self.is_like(other) && (none_yet || self.first_ns == other.first_ns)
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
         (self.incarnation, self.to, self.from, self.kind) == (other.incarnation, other.to, other.from, other.kind)
     }
 
     /// Packages a second between the last package that `earlier` saw and the last of all: exact, whenever one looks. None
-    /// when there was no package since. Without `earlier`, since the first.
+    /// when there was no package since. Without `earlier`, or with one of another first package, since the first.
     pub fn rate_since(&self, earlier: Option<&Self>) -> Option<f64> {
-        let (packages, from_ns) = match earlier.filter(|earlier| earlier.packages > 0) {
-            Some(earlier) => (self.packages.checked_sub(earlier.packages)?, earlier.last_ns),
-            None => (self.packages.checked_sub(1)?, self.first_ns),
-        };
+        let (packages, from_ns) =
+            match earlier.filter(|earlier| earlier.packages > 0 && earlier.first_ns == self.first_ns) {
+                Some(earlier) => (self.packages.checked_sub(earlier.packages)?, earlier.last_ns),
+                None => (self.packages.checked_sub(1)?, self.first_ns),
+            };
         let ns = self.last_ns.checked_sub(from_ns)?;
         (packages > 0 && ns > 0).then(|| packages as f64 * 1e9 / ns as f64)
     }
 
-    /// Adds what another sender of the same participant sends to the same place.
+    /// Adds what another sender of the same participant sends to the same place. Another process wrote it, so it may be anything.
     fn add(&mut self, other: Self) {
-        self.packages += other.packages;
-        self.bytes += other.bytes;
-        self.refused += other.refused;
+        self.packages = self.packages.saturating_add(other.packages);
+        self.bytes = self.bytes.saturating_add(other.bytes);
+        self.refused = self.refused.saturating_add(other.refused);
         let first = [self.first_ns, other.first_ns].into_iter().filter(|first| *first > 0);
         self.first_ns = first.min().unwrap_or(0);
         self.last_ns = self.last_ns.max(other.last_ns);
-        self.interval_squares_ns2 += other.interval_squares_ns2;
-        self.age_sum_ns += other.age_sum_ns;
+        self.interval_squares_ns2 = self.interval_squares_ns2.saturating_add(other.interval_squares_ns2);
+        self.age_sum_ns = self.age_sum_ns.saturating_add(other.age_sum_ns);
         for more in other.seconds {
             match self.seconds.iter_mut().find(|second| second.second == more.second) {
                 Some(second) => second.add(&more),
@@ -112,11 +123,12 @@ impl Node {
     /// What all participants that live send: each flow once. A package that is sent just now may be missing.
     pub fn traffic(&self) -> Vec<FlowInfo> {
         let mut flows = Vec::new();
+        let mut naps = NAPS;
         for (claimant, participant) in self.living() {
             let Some(table) = TableView::open(self.path(), claimant) else { continue };
             let first = flows.len();
-            for flow in table.rows().iter().filter_map(|row| look(row, &participant)) {
-                match flows[first..].iter_mut().find(|known: &&mut FlowInfo| known.is_same(&flow)) {
+            for flow in table.rows().iter().filter_map(|row| look(row, &participant, &mut naps)) {
+                match flows[first..].iter_mut().find(|known: &&mut FlowInfo| known.is_like(&flow)) {
                     Some(known) => known.add(flow),
                     None => flows.push(flow),
                 }
@@ -126,14 +138,17 @@ impl Node {
     }
 }
 
-/// A row as it stands, if anything was counted there.
-fn look(row: &Row, participant: &ParticipantInfo) -> Option<FlowInfo> {
-    for again in 0..TRIES {
+/// A row as it stands, if anything was counted there. Takes from `naps` what it needs.
+fn look(row: &Row, participant: &ParticipantInfo, naps: &mut u32) -> Option<FlowInfo> {
+    let mut tries = 0;
+    while tries < TRIES_AT_ONCE || *naps > 0 {
         if let Some(flow) = row.read(|row| read(row, participant)) {
             return flow;
         }
-        if again >= TRIES_AT_ONCE {
-            std::thread::sleep(PATIENCE);
+        tries += 1;
+        if tries >= TRIES_AT_ONCE && *naps > 0 {
+            *naps -= 1;
+            std::thread::sleep(NAP);
         }
     }
     // Its writer was stopped in there: its last package may be counted in half of the fields.

@@ -34,6 +34,7 @@ mod bell;
 mod clock;
 mod counters;
 mod doorbell;
+mod entry;
 mod flows;
 mod latest;
 mod layout;
@@ -61,14 +62,12 @@ mod watch;
 mod word;
 
 pub use clock::{monotonic_ns, realtime_ns};
-pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss};
+pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss, saturating_sum};
+pub use entry::{ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 pub use flows::{FlowInfo, FlowSecond, Publications};
 pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
-pub use node::{
-    LaunchLock, ModuleState, Node, NodeError, PARTICIPANTS_MAX, ParticipantInfo, base_directory, node_directory,
-    remove_base_if_empty,
-};
+pub use node::{LaunchLock, Node, NodeError, base_directory, node_directory, remove_base_if_empty};
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;
 pub use receiver::{Package, Receiver};

@@ -3,20 +3,22 @@
 //! ```text
 //! /dev/shm/rohrpost-UID/INSTALLATION.NODE/     mode 0700
 //!     node           this page: epochs, participants (their bells, states, process ids)
+//!     config         where the configuration is that launch runs (launch writes it, not this crate)
 //!     time           system time (see `system_time`)
 //!     traffic.3      what participant 3 sends (see `traffic`)
+//!     bell.3         a pipe that wakes participant 3, while it watches descriptors (see `doorbell`)
 //!     01c80000.mbx   a mailbox: its name in hexadecimal (see `layout`)
+//!     01c80000.about what its owner says of it (see `about`)
 //! ```
 //!
 //! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the file
 //! `node`: the kernel drops that lock with the process, whatever killed it.
 
-use crate::bell::Bell;
 use crate::doorbell;
+use crate::entry::{Entry, PARTICIPANTS_MAX, ParticipantInfo};
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, Held};
 use crate::memory::Mapping;
-use crate::name::Name;
 use crate::step::step;
 use crate::word::Claimant;
 use std::fs::{self, File, OpenOptions};
@@ -27,63 +29,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Most participants of a node at a time.
-pub const PARTICIPANTS_MAX: usize = 256;
 /// Lock bytes above the participants': whoever launched the node, and whoever changes the registry.
 const LAUNCH_BYTE: u64 = 1 << 20;
 const REGISTRY_BYTE: u64 = LAUNCH_BYTE + 1;
 /// Changing the registry takes microseconds; who holds it longer is stopped.
 const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
-
-/// What a module is doing, as its node's table says.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u32)]
-pub enum ModuleState {
-    /// Not ready for commands yet.
-    Starting = 1,
-    /// Ready, and switched off.
-    Off = 2,
-    /// Working.
-    On = 3,
-    /// It has stopped working and says why in its status.
-    Error = 4,
-    /// About to end.
-    Stopping = 5,
-}
-
-impl ModuleState {
-    /// One word for tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Starting => "starting",
-            Self::Off => "off",
-            Self::On => "on",
-            Self::Error => "error",
-            Self::Stopping => "stopping",
-        }
-    }
-
-    fn from_code(code: u32) -> Option<Self> {
-        [Self::Starting, Self::Off, Self::On, Self::Error, Self::Stopping].into_iter().find(|s| *s as u32 == code)
-    }
-}
-
-/// One participant's line.
-#[repr(C, align(64))]
-pub(crate) struct Entry {
-    /// Of its present or last user; 0: never used.
-    pub(crate) incarnation: AtomicU32,
-    pub(crate) pid: AtomicU32,
-    /// The futex word it sleeps on.
-    pub(crate) bell: AtomicU32,
-    pub(crate) module: AtomicU32,
-    pub(crate) state: AtomicU32,
-    /// Times that launch has started this module again.
-    pub(crate) restarts: AtomicU32,
-    pub(crate) joined_ns: AtomicU64,
-    /// Not 0: it sleeps in `poll`; ring it through its pipe too.
-    pub(crate) polling: AtomicU32,
-}
 
 /// The file `node`.
 #[repr(C)]
@@ -279,10 +229,12 @@ impl Node {
 
     /// The same, with their places in the table.
     pub(crate) fn living(&self) -> impl Iterator<Item = (Claimant, ParticipantInfo)> + '_ {
+        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group. Asked
+        // first, and once more with the lock seen held: the lock is a system call, and most places are empty.
+        let used = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
         let alive = |index: &u16| lock::is_locked(&self.file, u64::from(*index)).unwrap_or(false);
-        let all = (0..PARTICIPANTS_MAX as u16).filter(alive).map(|index| (index, self.entry(index).read()));
-        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group.
-        let here = all.filter(|(_, participant)| participant.pid != 0);
+        let all = (0..PARTICIPANTS_MAX as u16).filter(used).filter(alive);
+        let here = all.map(|index| (index, self.entry(index).read())).filter(|(_, participant)| participant.pid != 0);
         here.map(|(index, found)| (Claimant { participant: index, incarnation: found.incarnation }, found))
     }
 
@@ -334,40 +286,6 @@ impl Node {
 /// Held by the launch of a node.
 pub struct LaunchLock {
     _held: Held,
-}
-
-/// One participant, as the table has it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ParticipantInfo {
-    /// The module it is, local id 0; [`Name::NONE`] for one without a name.
-    pub module: Name,
-    /// Its process.
-    pub pid: u32,
-    /// Tells this use of the name from earlier ones.
-    pub incarnation: u32,
-    /// What the module is doing; none for participants that are no modules.
-    pub state: Option<ModuleState>,
-    /// Times that launch has started it again.
-    pub restarts: u32,
-    /// When it joined, on the monotonic clock.
-    pub joined_ns: u64,
-}
-
-impl Entry {
-    pub(crate) fn bell(&self) -> Bell<'_> {
-        Bell { rings: &self.bell, polling: &self.polling }
-    }
-
-    fn read(&self) -> ParticipantInfo {
-        ParticipantInfo {
-            module: Name::from_raw(self.module.load(Ordering::Acquire)),
-            pid: self.pid.load(Ordering::Relaxed),
-            incarnation: self.incarnation.load(Ordering::Relaxed),
-            state: ModuleState::from_code(self.state.load(Ordering::Acquire)),
-            restarts: self.restarts.load(Ordering::Relaxed),
-            joined_ns: self.joined_ns.load(Ordering::Relaxed),
-        }
-    }
 }
 
 /// Held while mailboxes are made, adopted, replaced or removed. Dropped by the kernel with its holder.

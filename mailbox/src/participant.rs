@@ -1,9 +1,10 @@
 //! A participant: one user of mailboxes on a node, mostly a process.
 
 use crate::doorbell;
+use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX};
 use crate::lock;
 use crate::name::Name;
-use crate::node::{Entry, ModuleState, Node, NodeError, PARTICIPANTS_MAX, open_shared};
+use crate::node::{Node, NodeError, open_shared};
 use crate::step::step;
 use crate::traffic::Table;
 use crate::word::Claimant;

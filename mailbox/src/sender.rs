@@ -144,8 +144,8 @@ impl Sender {
     /// # Errors
     /// [`SendError::Full`], or what reopening a replaced mailbox brings.
     pub fn loan(&mut self, priority: Priority) -> Result<Loan<'_>, SendError> {
-        // What it would have been was not said yet.
-        let claim = self.claim(priority, None, 0).map_err(|error| self.refused(&Label::default(), error))?;
+        // Refused, it is counted in the mailbox alone: what it would have been was not said yet.
+        let claim = self.claim(priority, None, 0)?;
         Ok(Loan { sender: self, claim: Some(claim), priority })
     }
 

@@ -101,8 +101,10 @@ impl Claim {
     }
 }
 
-/// A published package, as its sender remembers it. Whether it still waits, only a compare-and-swap tells: a word is not
-/// used twice for different packages, since no two senders have the same ticket.
+/// A published package, as its sender remembers it. Whether it still waits, only a compare-and-swap tells. No two senders have the
+/// same ticket, so no other sender's package has this word. This sender's may have it once more: A, then B in another slot, then
+/// C where A was, all in A's place of the order. C is of the same state as A and newer, and its word is swapped in after its body
+/// was written; so whoever remembers A's word, and comes late, gets C whole (loom: `a_word_comes_back_with_the_newer_package`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Posted {
     pub(crate) slot: usize,

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! A row has one writer, which loads and stores: sending to where it sent before costs no read-modify-write, no lock and no
-//! search. The last row takes whatever finds no other, from all of the participant's senders; it counts, and tells no times.
+//! search. The last row takes packages that find no other, from all of the participant's senders; it counts, and tells no times.
+//! A value published that finds none is not counted, since it is no package; those that carry it to subscribers are.
 //! A new participant of the same index makes a new file: readers of the old one are not confused.
 
 use crate::layout::{MAGIC, VERSION};
@@ -99,6 +100,13 @@ pub(crate) struct Key {
     pub(crate) kind: Type,
 }
 
+impl Key {
+    /// Published values are sent to nobody by themselves.
+    fn is_publication(&self) -> bool {
+        self.to == Name::NONE
+    }
+}
+
 /// A participant's table, which only it writes.
 pub(crate) struct Table {
     mapping: Mapping,
@@ -181,17 +189,25 @@ impl Table {
         let idle = rows.iter().enumerate().filter(|(_, row)| row.writer() == IDLE);
         match idle.min_by_key(|(_, row)| row.last_ns.load(Ordering::Relaxed)).map(|(at, _)| at) {
             Some(at) if take(&rows[at], IDLE) => {
-                // What it has counted goes to the rest, so that sums stay what they are.
-                let counted = [&rows[at].packages, &rows[at].bytes, &rows[at].refused];
-                let counted = counted.map(|count| count.load(Ordering::Relaxed));
-                rows[at].write(|row| row.set_key(key));
-                let rest = &self.rows()[REST];
-                for (to, count) in [&rest.packages, &rest.bytes, &rest.refused].into_iter().zip(counted) {
-                    to.fetch_add(count, Ordering::Relaxed);
-                }
+                rows[at].write(|row| {
+                    if !row.key().is_publication() {
+                        self.add_to_rest(row);
+                    }
+                    row.set_key(key);
+                });
                 at
             }
             _ => REST,
+        }
+    }
+
+    /// What a row has counted goes to the rest, so that sums stay what they are. While the row is being written, so that who sees
+    /// it empty, and then looks at the rest, finds it there; who saw it full a moment before sees it twice, never not at all.
+    fn add_to_rest(&self, row: &Row) {
+        let rest = &self.rows()[REST];
+        let pairs = [(&row.packages, &rest.packages), (&row.bytes, &rest.bytes), (&row.refused, &rest.refused)];
+        for (from, to) in pairs {
+            to.fetch_add(from.load(Ordering::Relaxed), Ordering::Relaxed);
         }
     }
 }
@@ -230,6 +246,9 @@ impl Writer {
     pub(crate) fn accepted(&mut self, table: &Table, key: Key, bytes: usize, at_ns: u64, age_ns: u64) {
         let at = self.row(table, key);
         let row = &table.rows()[at];
+        if at == REST && key.is_publication() {
+            return;
+        }
         if at == REST {
             // Shared by all writers of the participant, and rare.
             row.packages.fetch_add(1, Ordering::Relaxed);

@@ -67,6 +67,9 @@ impl Waiting {
 ///
 /// Whoever makes `other` true from outside calls [`Participant::ring`] afterwards.
 ///
+/// Without a mailbox there is no bell to sleep on: then this returns at once, whatever `waiting` and `other` say, and a loop
+/// around it would spin. Who has no mailbox waits by other means.
+///
 /// # Panics
 /// When the mailboxes are of different participants: their bells are different words.
 pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, other: impl Fn() -> bool) -> Duration {

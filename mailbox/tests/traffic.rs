@@ -181,6 +181,96 @@ fn two_senders_of_one_participant_do_not_share_a_row() {
 }
 
 #[test]
+fn a_flow_that_lost_its_row_and_comes_back_is_another() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let me = ground.join();
+    let mut receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
+    let mut send = |numbers: std::ops::Range<u16>| {
+        let mut sender = me.sender(MAILBOX).unwrap();
+        for number in numbers {
+            sender.send(&Label { kind: Type::command(number), ..label(LOW, 0) }, &[b"x"]).unwrap();
+            receiver.receive();
+        }
+    };
+    let first = || one(node.traffic().into_iter().filter(|flow| flow.kind == Type::command(1)).collect());
+    let sum = || node.traffic().iter().map(|flow| flow.packages).sum::<u64>();
+    (0..3).for_each(|_| send(1..2));
+    let seen = first();
+    send(1..2);
+    assert!(
+        first().is_same(&seen) && first().rate_since(Some(&seen)) < first().rate_since(None).map(|rate| rate * 1e9)
+    );
+    // All rows go to others.
+    send(2..129);
+    assert_eq!(sum(), 4 + 127);
+    (0..5).for_each(|_| send(1..2));
+    assert_eq!(sum(), 4 + 127 + 5, "nothing is forgotten");
+    assert_eq!(first().packages, 5);
+    assert!(!first().is_same(&seen));
+    assert_eq!(first().rate_since(Some(&seen)), first().rate_since(None), "counts of another life are not subtracted");
+}
+
+#[test]
+fn a_slot_not_lent_is_counted_where_it_was_asked_for() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let _receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
+    let mut sender = ground.sender();
+    sender.send(&label(LOW, 0), &[]).unwrap();
+    assert!(sender.loan(LOW).is_err());
+    assert_eq!(one(node.traffic()).refused, 0, "no flow of a type that nobody sends");
+    assert_eq!(lost(&ground.look(), Loss::Refused), 1);
+}
+
+/// Documented in docs/src/shared-memory.md.
+const ROWS: usize = 64;
+const ROW: usize = 256;
+
+#[test]
+fn a_damaged_table_takes_neither_time_nor_the_reader_down() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let _participants = [ground.join(), ground.join()];
+    for participant in ["traffic.0", "traffic.1"] {
+        let path = ground.path().join(participant);
+        let mut table = std::fs::read(&path).unwrap();
+        for row in table[ROWS..].chunks_mut(ROW) {
+            // All of one flow, as often as can be, and being changed for ever.
+            row[24..].fill(0xff);
+            row[4..8].copy_from_slice(&1u32.to_ne_bytes());
+        }
+        std::fs::write(&path, table).unwrap();
+    }
+    let most = |flow: &FlowInfo| (flow.packages, flow.bytes, flow.refused, flow.interval_squares_ns2);
+    assert!(node.traffic().iter().all(|flow| most(flow) == (u64::MAX, u64::MAX, u64::MAX, u128::MAX)));
+    assert_eq!(node.traffic().len(), 2);
+    // Patience for each of the rows would be no less than this.
+    until("a look is short", || {
+        let began = std::time::Instant::now();
+        node.traffic();
+        began.elapsed() < 2 * 128 * 24 * Duration::from_micros(100)
+    });
+}
+
+#[test]
+fn values_that_find_no_row_do_not_count_as_packages() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let me = Participant::join(&node, ME).unwrap();
+    for kinds in [1..128, 128..140] {
+        let mut publications = Publications::new(&me);
+        for kind in kinds.clone() {
+            publications.published(ME, Type::data(kind), 8, Duration::from_nanos(1));
+        }
+        let mut late = Publications::new(&me);
+        late.published(ME, Type::data(200), 8, Duration::from_nanos(1));
+        let flows = node.traffic();
+        assert!(flows.len() >= 127 && flows.iter().all(FlowInfo::is_publication), "{kinds:?}");
+    }
+}
+
+#[test]
 fn values_published_are_told_from_packages() {
     let ground = Ground::new();
     let node = ground.node();

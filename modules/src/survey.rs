@@ -2,7 +2,7 @@
 
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
-    ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, Name, Node, NodeError, ParticipantInfo, local,
+    ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, Name, Node, NodeError, ParticipantInfo, local, saturating_sum,
 };
 use std::time::Instant;
 
@@ -101,14 +101,14 @@ fn survey(
         name,
         faces,
         process,
-        received: classes().map(|class| class.received).sum(),
-        bytes_in: classes().map(|class| class.body_bytes).sum(),
-        lost: classes().map(ClassTraffic::lost_in_all).sum(),
-        losses: Loss::ALL.map(|cause| classes().map(|class| class.lost(cause)).sum()),
+        received: saturating_sum(classes().map(|class| class.received)),
+        bytes_in: saturating_sum(classes().map(|class| class.body_bytes)),
+        lost: saturating_sum(classes().map(ClassTraffic::lost_in_all)),
+        losses: Loss::ALL.map(|cause| saturating_sum(classes().map(|class| class.lost(cause)))),
         waited,
-        sent: flows.iter().filter(sends).map(|flow| flow.packages).sum(),
-        bytes_out: flows.iter().filter(sends).map(|flow| flow.bytes).sum(),
-        depth: own.iter().map(|mailbox| mailbox.depth).sum(),
+        sent: saturating_sum(flows.iter().filter(sends).map(|flow| flow.packages)),
+        bytes_out: saturating_sum(flows.iter().filter(sends).map(|flow| flow.bytes)),
+        depth: own.iter().fold(0, |depth, mailbox| depth.saturating_add(mailbox.depth)),
     }
 }
 

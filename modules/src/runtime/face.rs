@@ -4,7 +4,7 @@ use super::server::Desk;
 use crate::call::Fault;
 use crate::description::Description;
 use crate::interface::{ServeFunction, Served};
-use rohrpost_mailbox::{Name, NodeError, Receiver};
+use rohrpost_mailbox::{Name, Receiver};
 
 /// One face. A module without further faces has this one.
 pub(crate) struct Face<M> {
@@ -27,12 +27,7 @@ pub(crate) struct Offer<M> {
 }
 
 impl<M> Face<M> {
-    pub(crate) fn new(
-        name: Name,
-        class: &str,
-        commands: Receiver,
-        served: Option<Served<M>>,
-    ) -> Result<Self, NodeError> {
+    pub(crate) fn new(name: Name, class: &str, commands: Receiver, served: Option<Served<M>>) -> Self {
         let (serve, description) = match served {
             Some(Served { description, serve, .. }) => (Some(serve), description),
             None => (None, bare(class)),
@@ -43,9 +38,12 @@ impl<M> Face<M> {
         // Writing to a growing vector does not fail.
         let description = postcard::to_stdvec(&description).unwrap_or_default();
         // For tools that must not ask: a question would be one more package.
-        commands.set_about(&description)?;
+        if let Err(error) = commands.set_about(&description) {
+            // On a full /dev/shm, say: a module that could take its mailboxes over goes on all the same.
+            tracing::warn!("{name}: tools cannot describe it: {error}");
+        }
         let offer = Offer { idempotent, data, serve, hash, description };
-        Ok(Self { name, desk: Desk::new(commands), offer })
+        Self { name, desk: Desk::new(commands), offer }
     }
 }
 

@@ -172,7 +172,7 @@ impl Start {
                 return Err(StartError::Face(installation.classes.format(name), text, class));
             }
             let commands = receiver(name.with_local(local::COMMANDS), &module.mailboxes.commands)?;
-            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at)))?);
+            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at))));
         }
         let data = receiver(self.name.with_local(local::DATA), &module.mailboxes.data)?;
         let replies = receiver(self.name.with_local(local::REPLIES), &module.mailboxes.replies)?;

@@ -1,0 +1,92 @@
+//! One participant's line in its node's table.
+
+use crate::bell::Bell;
+use crate::name::Name;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+/// Most participants of a node at a time.
+pub const PARTICIPANTS_MAX: usize = 256;
+
+/// What a module is doing, as its node's table says.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u32)]
+pub enum ModuleState {
+    /// Not ready for commands yet.
+    Starting = 1,
+    /// Ready, and switched off.
+    Off = 2,
+    /// Working.
+    On = 3,
+    /// It has stopped working and says why in its status.
+    Error = 4,
+    /// About to end.
+    Stopping = 5,
+}
+
+impl ModuleState {
+    /// One word for tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Off => "off",
+            Self::On => "on",
+            Self::Error => "error",
+            Self::Stopping => "stopping",
+        }
+    }
+
+    fn from_code(code: u32) -> Option<Self> {
+        [Self::Starting, Self::Off, Self::On, Self::Error, Self::Stopping].into_iter().find(|s| *s as u32 == code)
+    }
+}
+
+/// One participant's line.
+#[repr(C, align(64))]
+pub(crate) struct Entry {
+    /// Of its present or last user; 0: never used.
+    pub(crate) incarnation: AtomicU32,
+    pub(crate) pid: AtomicU32,
+    /// The futex word it sleeps on.
+    pub(crate) bell: AtomicU32,
+    pub(crate) module: AtomicU32,
+    pub(crate) state: AtomicU32,
+    /// Times that launch has started this module again.
+    pub(crate) restarts: AtomicU32,
+    pub(crate) joined_ns: AtomicU64,
+    /// Not 0: it sleeps in `poll`; ring it through its pipe too.
+    pub(crate) polling: AtomicU32,
+}
+
+/// One participant, as the table has it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ParticipantInfo {
+    /// The module it is, local id 0; [`Name::NONE`] for one without a name.
+    pub module: Name,
+    /// Its process.
+    pub pid: u32,
+    /// Tells this use of the name from earlier ones.
+    pub incarnation: u32,
+    /// What the module is doing; none for participants that are no modules.
+    pub state: Option<ModuleState>,
+    /// Times that launch has started it again.
+    pub restarts: u32,
+    /// When it joined, on the monotonic clock.
+    pub joined_ns: u64,
+}
+
+impl Entry {
+    pub(crate) fn bell(&self) -> Bell<'_> {
+        Bell { rings: &self.bell, polling: &self.polling }
+    }
+
+    pub(crate) fn read(&self) -> ParticipantInfo {
+        ParticipantInfo {
+            module: Name::from_raw(self.module.load(Ordering::Acquire)),
+            pid: self.pid.load(Ordering::Relaxed),
+            incarnation: self.incarnation.load(Ordering::Relaxed),
+            state: ModuleState::from_code(self.state.load(Ordering::Acquire)),
+            restarts: self.restarts.load(Ordering::Relaxed),
+            joined_ns: self.joined_ns.load(Ordering::Relaxed),
+        }
+    }
+}
