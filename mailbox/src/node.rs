@@ -33,7 +33,7 @@ use std::time::{Duration, Instant};
 const LAUNCH_BYTE: u64 = 1 << 20;
 const REGISTRY_BYTE: u64 = LAUNCH_BYTE + 1;
 /// Changing the registry takes microseconds; who holds it longer is stopped.
-const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
+pub(crate) const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
 
 /// The file `node`.
 #[repr(C)]
@@ -238,6 +238,15 @@ impl Node {
         here.map(|(index, found)| (Claimant { participant: index, incarnation: found.incarnation }, found))
     }
 
+    /// The last that this process said of what it does as this module, also if it has died since; none when it has left in
+    /// order, or another has taken its place in the table.
+    pub fn state_of(&self, module: Name, pid: u32) -> Option<ModuleState> {
+        let all = self.page().entries.iter().map(Entry::read);
+        // An earlier process may have had the number.
+        let last = all.filter(|p| p.module == module && p.pid == pid).max_by_key(|p| p.joined_ns);
+        last?.state
+    }
+
     /// Process id of the launch that runs this node now.
     pub fn launcher(&self) -> Option<u32> {
         let held = lock::is_locked(&self.file, LAUNCH_BYTE).unwrap_or(false);
@@ -295,11 +304,16 @@ pub(crate) struct RegistryLock {
 
 impl RegistryLock {
     pub(crate) fn take(path: &Path) -> Result<Self, NodeError> {
+        Self::take_within(path, REGISTRY_PATIENCE)
+    }
+
+    /// The same, with less patience; with none it is tried once.
+    pub(crate) fn take_within(path: &Path, patience: Duration) -> Result<Self, NodeError> {
         let failed = |error| NodeError::Io(path.into(), error);
         let file = open_shared(&path.join("node"), false).map_err(failed)?;
         let start = Instant::now();
         while !lock::try_lock(&file, REGISTRY_BYTE).map_err(failed)? {
-            if start.elapsed() > REGISTRY_PATIENCE {
+            if patience.is_zero() || start.elapsed() > patience {
                 return Err(NodeError::Busy(path.into()));
             }
             std::thread::sleep(Duration::from_micros(200));

@@ -8,7 +8,7 @@ use crate::counters::{ClassTraffic, Loss};
 use crate::layout::{Shape, ShapeError};
 use crate::lock::{self, Held};
 use crate::name::Name;
-use crate::node::{Node, NodeError, RegistryLock, allocate, open_shared};
+use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock, allocate, open_shared};
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;
@@ -18,6 +18,7 @@ use std::fs;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// The byte of a segment's file that its owner locks.
 const OWNER_BYTE: u64 = 0;
@@ -243,9 +244,21 @@ impl Node {
     /// # Errors
     /// When the node's directory cannot be changed.
     pub fn remove_orphan(&self, name: Name) -> Result<bool, NodeError> {
+        self.remove_orphan_within(name, REGISTRY_PATIENCE)
+    }
+
+    /// The same for who must not wait: [`NodeError::Busy`] at once while somebody else changes the registry.
+    ///
+    /// # Errors
+    /// When the registry is busy, or the node's directory cannot be changed.
+    pub fn try_remove_orphan(&self, name: Name) -> Result<bool, NodeError> {
+        self.remove_orphan_within(name, Duration::ZERO)
+    }
+
+    fn remove_orphan_within(&self, name: Name, patience: Duration) -> Result<bool, NodeError> {
         let path = path_of(self.path(), name);
         let failed = |error| NodeError::Io(path.clone(), error);
-        let registry = RegistryLock::take(self.path())?;
+        let registry = RegistryLock::take_within(self.path(), patience)?;
         let Ok(file) = open_shared(&path, false) else { return Ok(false) };
         let old = Segment::check(&file, name);
         let Some(_owner) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else { return Ok(false) };

@@ -5,23 +5,26 @@ use super::control::{ChildState, Phase};
 use super::leftovers::KILL_TIME;
 use super::policy::{Next, Policy};
 use super::printed::Printed;
+use super::program::Program;
 use crate::output::Relay;
-use crate::runtime::{StartError, environment};
+use crate::runtime::StartError;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost_config::{Installation, Module, Program, Restart, Start, find_program};
+use rohrpost_config::{Installation, Module, Restart, Start};
 use rohrpost_mailbox::{ModuleState, Name, Node};
 use std::io;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Child as Process, ExitStatus};
 use std::time::{Duration, Instant};
 
-/// While a module starts or ends it is looked after so often.
+/// While a module starts it is looked after so often, and when it has ended, until all that it printed is there.
 const LOOK: Duration = Duration::from_millis(5);
 /// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes behind
 /// that hold its pipe.
 const PRINTED_WAIT: Duration = Duration::from_millis(100);
+/// What somebody else may keep waiting for long is looked at so often: a registry that is locked, a process that was killed.
+const LOOK_KEPT: Duration = Duration::from_millis(100);
 /// Bytes of a text that are told to tools.
 const TOLD_MAX: usize = 1000;
 
@@ -47,21 +50,43 @@ struct Ending {
     left_behind: bool,
 }
 
+impl Ending {
+    /// When there is something to do about it, if it has not ended by then.
+    fn press_at(&self, stop_within: Duration) -> Option<Instant> {
+        match self.killed {
+            _ if self.left_behind => None,
+            Some(at) => Some(at + KILL_TIME),
+            None => Some(self.since + stop_within),
+        }
+    }
+}
+
+/// Where a module's mailboxes are. They outlive its process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mailboxes {
+    None,
+    /// In use, or kept for its next process.
+    Used,
+    /// To be removed: senders are to be told that nobody reads there.
+    Left,
+}
+
 /// A module and its process.
 pub(super) struct Child {
     name: Name,
     text: String,
-    arguments: Vec<String>,
-    config: PathBuf,
-    program: PathBuf,
+    program: Program,
     policy: Policy,
-    /// Whether it is switched on when it is ready.
+    /// Whether it is switched on when it is ready: as configured, or as somebody has switched it since.
     turn_on: bool,
+    /// This process was on, or was in error on its way there: if it is off now, somebody wants it so.
+    was_on: bool,
     configured_on: bool,
     ready_within: Duration,
     stop_within: Duration,
     phase: Phase,
-    process: Option<std::process::Child>,
+    process: Option<Process>,
+    mailboxes: Mailboxes,
     /// Its process has ended so, then; what it printed last may still come.
     over: Option<(ExitStatus, Instant)>,
     ending: Option<Ending>,
@@ -80,29 +105,20 @@ pub(super) struct Child {
 
 impl Child {
     pub(super) fn new(module: &Module, installation: &Installation, executable: &Path, relay: &Relay) -> Self {
-        let beside = executable.parent().unwrap_or(Path::new("."));
-        let (program, arguments) = match &module.program {
-            Program::Builtin(name) => (executable.to_owned(), vec!["run".to_owned(), name.clone()]),
-            Program::Command(words) => {
-                let program = words.first().map_or("", String::as_str);
-                let found = find_program(program, &installation.folder, beside);
-                (found.unwrap_or_else(|| program.into()), words.iter().skip(1).cloned().collect())
-            }
-        };
         let configured_on = module.start == Start::On;
         Self {
             name: module.name,
             text: installation.classes.format(module.name),
-            arguments,
-            config: installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone()),
-            program,
+            program: Program::new(module, installation, executable),
             policy: Policy::new(module.restart),
             turn_on: configured_on,
+            was_on: false,
             configured_on,
             ready_within: module.ready_within,
             stop_within: module.stop_within,
             phase: Phase::Waiting,
             process: None,
+            mailboxes: Mailboxes::None,
             over: None,
             ending: None,
             since: Instant::now(),
@@ -150,9 +166,10 @@ impl Child {
         self.turn_on
     }
 
-    /// It has been switched on, or is not meant to be.
-    pub(super) fn runs(&mut self) {
+    /// It has been switched on, or is not meant to be; or it could not be switched on.
+    pub(super) fn runs(&mut self, as_meant: bool) {
         self.phase = Phase::Running;
+        self.was_on |= as_meant && self.turn_on;
     }
 
     /// As tools are told.
@@ -179,59 +196,52 @@ impl Child {
     fn look_at_phase(&self, now: Instant) -> Option<Duration> {
         match self.phase {
             _ if self.over.is_some() => Some(LOOK),
-            Phase::Starting | Phase::Stopping => Some(LOOK),
+            _ if self.has_left_mailboxes() => Some(LOOK_KEPT),
+            Phase::Starting => Some(LOOK),
+            // Its end comes with a signal.
+            Phase::Stopping => {
+                self.ending.as_ref()?.press_at(self.stop_within)?.checked_duration_since(now).or(Some(LOOK))
+            }
             // Killed, since it did not get ready.
-            Phase::Waiting if self.process.is_some() => Some(LOOK),
+            Phase::Waiting if self.process.is_some() => Some(LOOK_KEPT),
             Phase::Waiting if !self.last_life => Some(self.since.saturating_duration_since(now)),
             _ => None,
         }
     }
 
-    /// Starts the process, in a process group of its own so that a Ctrl-C is launch's to handle.
-    pub(super) fn spawn(&mut self) {
-        self.since = Instant::now();
+    /// Starts the process; what there is to say if that fails. That is an end without success: the program may be replaced just
+    /// now, or the computer be short of something for moments.
+    pub(super) fn spawn(&mut self, now: Instant) -> Option<String> {
         match self.try_spawn() {
             Ok(process) => {
                 self.process = Some(process);
                 self.phase = Phase::Starting;
+                self.since = now;
+                self.was_on = false;
+                self.mailboxes = Mailboxes::Used;
                 self.lives += 1;
+                None
             }
             Err(error) => {
-                self.last_end = format!("{}: {error}", self.program.display());
-                self.phase = Phase::Failed;
+                let how = format!("could not be started: {}: {error}", self.program.path().display());
+                let next = self.policy.ended(false, now);
+                Some(self.follow(next, false, &how, "", now))
             }
         }
     }
 
-    fn try_spawn(&mut self) -> io::Result<std::process::Child> {
+    fn try_spawn(&mut self) -> io::Result<Process> {
         // First: a process whose words nobody reads would be stuck at the first of them too many.
-        let [stdout, stderr] = self.printed.begin()?;
-        let mut command = Command::new(&self.program);
+        let pipes = self.printed.begin()?;
         // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes before any
         // word of launch's: so it switches itself on. At the first start launch does, when all are ready.
-        if self.lives == 0 || !self.turn_on {
-            command.env(environment::OFF, "1");
-        }
-        // Launch alone speaks to the service manager.
-        for variable in ["NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "JOURNAL_STREAM"] {
-            command.env_remove(variable);
-        }
-        command
-            .args(&self.arguments)
-            .env(environment::CONFIG, &self.config)
-            .env(environment::MODULE, &self.text)
-            .env(environment::LAUNCHER, std::process::id().to_string())
-            .env(environment::RESTARTS, self.restarts.to_string())
-            .stdin(Stdio::null())
-            .stdout(stdout)
-            .stderr(stderr)
-            .process_group(0)
-            .spawn()
+        self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, pipes)
     }
 
     /// Looks after it; what there is to say.
     pub(super) fn step(&mut self, node: &Node, now: Instant) -> Option<String> {
         self.printed.attend(now);
+        self.note_switch(node);
         if let Some(process) = &mut self.process {
             match process.try_wait() {
                 Ok(Some(status)) => {
@@ -260,7 +270,7 @@ impl Child {
                 self.phase = Phase::Waiting;
                 return Some(format!("{} was not ready within {within:?}; killed", self.text));
             }
-            Phase::Waiting if self.process.is_none() && now >= self.since && !self.last_life => self.spawn(),
+            Phase::Waiting if self.may_spawn(now) => return self.spawn(now),
             Phase::Stopping => return self.press(now),
             _ => {}
         }
@@ -269,8 +279,25 @@ impl Child {
 
     /// What its process says of itself in the node's table.
     fn state_of(&self, node: &Node) -> Option<ModuleState> {
-        let pid = self.process.as_ref()?.id();
-        node.participants().iter().find(|p| p.module == self.name && p.pid == pid)?.state
+        node.state_of(self.name, self.process.as_ref()?.id())
+    }
+
+    fn may_spawn(&self, now: Instant) -> bool {
+        self.process.is_none() && now >= self.since && !self.last_life && !self.has_left_mailboxes()
+    }
+
+    /// Notes whether somebody has switched it on or off.
+    fn note_switch(&mut self, node: &Node) {
+        if self.phase != Phase::Running {
+            return;
+        }
+        match self.state_of(node) {
+            Some(ModuleState::On) => (self.was_on, self.turn_on) = (true, true),
+            // Also of one that was off, and panicked.
+            Some(ModuleState::Error) => self.was_on = true,
+            Some(ModuleState::Off) if self.was_on => self.turn_on = false,
+            _ => {}
+        }
     }
 
     /// It has ended: again, or not, as was asked for, or as its policy has it.
@@ -284,21 +311,27 @@ impl Child {
             self.printed.pass_on(None);
             return self.ended_as_told(&ending, &how, now);
         }
-        // Whoever waits for its work expects it to go on as configured.
-        self.turn_on = self.configured_on;
+        // Whoever waits for its work expects it to go on as configured; but what a person has switched off stays off.
+        self.turn_on &= self.configured_on;
         let printed = self.printed.below();
-        self.last_end = format!("{how}{printed}");
         // Started again, it would find the same configuration.
         let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
-        let next = if misconfigured || self.last_life { Next::Stay } else { self.policy.ended(status.success(), now) };
+        let success = status.success();
+        let next = if misconfigured || self.last_life { Next::Stay } else { self.policy.ended(success, now) };
+        Some(self.follow(next, success, &how, &printed, now))
+    }
+
+    /// What follows an end of its own accord; what there is to say about it.
+    fn follow(&mut self, next: Next, success: bool, how: &str, printed: &str, now: Instant) -> String {
+        self.last_end = format!("{how}{printed}");
         let told = match next {
             Next::Stay => {
-                self.phase = if status.success() { Phase::Ended } else { Phase::Failed };
-                how
+                self.rest(if success { Phase::Ended } else { Phase::Failed });
+                how.to_owned()
             }
             Next::GivenUp => {
                 let Restart { at_most, within, .. } = self.policy.restart();
-                self.phase = Phase::Failed;
+                self.rest(Phase::Failed);
                 let told = format!("{how}; given up after {at_most} restarts within {within:?}");
                 self.last_end = format!("{told}{printed}");
                 told
@@ -310,8 +343,27 @@ impl Child {
                 format!("{how}; starts again in {pause:?}")
             }
         };
-        self.printed.pass_on((!status.success()).then_some(&told));
-        Some(format!("{} {told}{printed}", self.text))
+        self.printed.pass_on((!success).then_some(&told));
+        format!("{} {told}{printed}", self.text)
+    }
+
+    /// It is not started again unless somebody asks for it, and then finds empty mailboxes: what was meant for this run must
+    /// not drive that one.
+    fn rest(&mut self, phase: Phase) {
+        self.phase = phase;
+        if self.mailboxes == Mailboxes::Used {
+            self.mailboxes = Mailboxes::Left;
+        }
+    }
+
+    /// Whether its mailboxes are to be removed. Until they are, it is not started.
+    pub(super) fn has_left_mailboxes(&self) -> bool {
+        self.mailboxes == Mailboxes::Left
+    }
+
+    /// They are.
+    pub(super) fn mailboxes_are_gone(&mut self) {
+        self.mailboxes = Mailboxes::None;
     }
 
     fn ended_as_told(&mut self, ending: &Ending, how: &str, now: Instant) -> Option<String> {
@@ -319,11 +371,11 @@ impl Child {
         self.last_end = format!("{how} {obeyed}");
         match ending.then {
             Then::End => {
-                self.phase = Phase::Ended;
+                self.rest(Phase::Ended);
                 None
             }
             Then::Stay => {
-                self.phase = Phase::Stopped;
+                self.rest(Phase::Stopped);
                 Some(format!("{} is stopped, as asked", self.text))
             }
             Then::Start => {
@@ -344,11 +396,9 @@ impl Child {
             ending.then = then;
             return;
         }
-        match self.phase {
-            // Somebody has switched it off, and wants it so.
-            Phase::Running => self.turn_on = self.state_of(node) != Some(ModuleState::Off),
-            _ if self.phase.is_over() => self.turn_on = self.configured_on,
-            _ => {}
+        self.note_switch(node);
+        if self.phase.is_over() {
+            self.turn_on = self.configured_on;
         }
         if self.process.is_some() || self.over.is_some() {
             self.kill(Signal::SIGTERM);
@@ -357,7 +407,7 @@ impl Child {
         } else if then == Then::Start {
             (self.phase, self.since) = (Phase::Waiting, now);
         } else if !self.phase.is_over() {
-            self.phase = if then == Then::Stay { Phase::Stopped } else { Phase::Ended };
+            self.rest(if then == Then::Stay { Phase::Stopped } else { Phase::Ended });
         }
     }
 
@@ -366,11 +416,11 @@ impl Child {
         let (within, pid) = (self.stop_within, self.process.as_ref()?.id());
         let ending = self.ending.as_mut()?;
         match ending.killed {
-            None if now >= ending.since + within => {
+            None if now >= ending.press_at(within)? => {
                 self.force(now);
                 Some(format!("{} did not stop within {within:?}; killed", self.text))
             }
-            Some(at) if now >= at + KILL_TIME && !ending.left_behind => {
+            Some(_) if now >= ending.press_at(within)? => {
                 // It waits for broken hardware, say. The others still have to be looked after.
                 ending.left_behind = true;
                 Some(format!("{} (process {pid}) cannot even be killed; left behind", self.text))

@@ -60,12 +60,20 @@ fn send(pid: u32, signal: Signal) {
     }
 }
 
-/// Removes the mailboxes of a module that is not started again: whoever sends there is told so, instead of filling them.
+/// Removes the mailboxes of a module that is not started again: whoever sends there is told so, instead of filling them. One
+/// that cannot be removed does not keep the others.
+///
+/// Never waits: [`NodeError::Busy`] while somebody else holds the registry.
 pub(super) fn remove_mailboxes(node: &Node, module: &Module) -> Result<(), NodeError> {
+    let mut result = Ok(());
     for name in node.mailboxes()?.into_iter().filter(|name| module.names().any(|own| own == name.module())) {
-        node.remove_orphan(name)?;
+        match node.try_remove_orphan(name) {
+            Err(busy @ NodeError::Busy(_)) => return Err(busy),
+            Err(error) => result = Err(error),
+            Ok(_) => {}
+        }
     }
-    Ok(())
+    result
 }
 
 /// Says in the node's directory which configuration runs.

@@ -18,13 +18,16 @@
 mod child;
 mod control;
 mod end;
+mod error;
 mod events;
 mod leftovers;
 mod policy;
 mod printed;
+mod program;
 mod serve;
 
 pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase};
+pub use error::LaunchError;
 pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
 
@@ -61,35 +64,6 @@ const NOTES_MAX: usize = 1000;
 
 /// A node that somebody else removes just now is taken at the next try, or the next but one.
 const TAKE_MAX: usize = 20;
-
-/// Why a node could not be launched.
-#[derive(Debug, thiserror::Error)]
-pub enum LaunchError {
-    /// Several nodes, or another one.
-    #[error("which node? the configuration has {0}; say --node NAME")]
-    WhichNode(String),
-    /// One that is not there.
-    #[error("the configuration has no node `{0}`; it has {1}")]
-    NoNode(String, String),
-    /// The node.
-    #[error(transparent)]
-    Node(#[from] NodeError),
-    /// Launch's own mailboxes.
-    #[error(transparent)]
-    Client(#[from] ClientError),
-    /// Signals.
-    #[error("signal handlers: {0}")]
-    Signals(std::io::Error),
-    /// Programs that are not there.
-    #[error("{0}")]
-    Programs(String),
-    /// A module of an earlier launch.
-    #[error("module {0} of an earlier launch, process {1}, cannot be killed; end it by hand (is it another user's?)")]
-    Leftover(String, u32),
-    /// A module that would not start.
-    #[error("module {0} did not become ready: {1}")]
-    NotReady(String, String),
-}
 
 /// A node that is launched. The thread that begins it must live as long as its modules: the kernel takes that thread's end
 /// for launch's, and tells them so.
@@ -164,10 +138,7 @@ impl Launch {
             Self { installation, node_name, node, children, switching, tool, counter, bell, lock, _time: time, notes };
         match launch.start_all() {
             Ok(()) => Ok(launch),
-            Err(error) => {
-                launch.stop();
-                Err(error)
-            }
+            Err(error) => Err(error.with(launch.stop())),
         }
     }
 
@@ -175,18 +146,18 @@ impl Launch {
         for index in 0..self.children.len() {
             // Unless somebody wants it stopped already.
             if self.children[index].phase() == Phase::Waiting {
-                self.children[index].spawn();
+                let note = self.children[index].spawn(Instant::now());
+                self.note(note);
             }
+            // Looked at before each sleep: nothing may be left that would end it.
             loop {
-                self.turn(0..index + 1, Duration::MAX, index)?;
                 let child = &self.children[index];
                 match child.phase() {
-                    Phase::Failed => {
-                        return Err(LaunchError::NotReady(child.text().into(), child.last_end().into()));
-                    }
+                    Phase::Failed => return Err(not_ready(child, child.last_end())),
                     Phase::Starting | Phase::Waiting | Phase::Stopping => {}
                     Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => break,
                 }
+                self.turn(0..index + 1, Duration::MAX, index)?;
             }
             // At once: switched off, the collector would drop what the others say while they start.
             if Some(self.children[index].name().class()) == self.installation.classes.id(crate::output::CLASS) {
@@ -208,7 +179,7 @@ impl Launch {
     fn turn(&mut self, started: Range<usize>, period: Duration, index: usize) -> Result<(), LaunchError> {
         self.sleep(started.clone(), period);
         if self.bell.words() > 0 {
-            return Err(LaunchError::NotReady(self.children[index].text().into(), "told to stop".into()));
+            return Err(not_ready(&self.children[index], "told to stop"));
         }
         // Those that were started before may end meanwhile.
         started.for_each(|index| self.step(index));
@@ -218,27 +189,34 @@ impl Launch {
 
     /// Moves one module on.
     fn step(&mut self, index: usize) {
-        let child = &mut self.children[index];
-        let was_over = child.phase().is_over();
-        let note = child.step(&self.node, Instant::now());
-        if !was_over && child.phase().is_over() {
-            self.give_up(index);
-        }
+        let note = self.children[index].step(&self.node, Instant::now());
         self.note(note);
     }
 
-    /// Answers tools.
+    /// Answers tools, and removes what those leave that have ended, or were told to stay so.
     fn serve(&mut self, ending: bool) {
         let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
         self.counter.serve(Orders { children, installation, node, ending }, &mut self.tool.link);
+        // At the end all goes at once, with the node.
+        if !ending {
+            (0..self.children.len()).for_each(|index| self.remove_left_mailboxes(index));
+        }
     }
 
-    /// A module is not started again: its mailboxes go.
-    fn give_up(&mut self, index: usize) {
-        let Some(module) = self.installation.module(self.children[index].name()) else { return };
-        if let Err(error) = leftovers::remove_mailboxes(&self.node, module) {
-            self.note(Some(error.to_string()));
+    /// A module is not started again: its mailboxes go. While somebody else holds the registry, that is tried again later.
+    fn remove_left_mailboxes(&mut self, index: usize) {
+        let child = &mut self.children[index];
+        if !child.has_left_mailboxes() {
+            return;
         }
+        let Some(module) = self.installation.module(child.name()) else { return };
+        let removed = leftovers::remove_mailboxes(&self.node, module);
+        if matches!(removed, Err(NodeError::Busy(_))) {
+            return;
+        }
+        child.mailboxes_are_gone();
+        let note = removed.err().map(|error| format!("mailboxes of {} are left: {error}", child.text()));
+        self.note(note);
     }
 
     fn note(&mut self, note: Option<String>) {
@@ -271,7 +249,7 @@ impl Launch {
             }
         };
         let Some(answer) = answer else { return };
-        child.runs();
+        child.runs(answer.is_ok());
         // The lower layers know numbers only.
         let told = |error: CallError| error.to_string().replace(&child.name().to_string(), child.text());
         let note = answer.err().map(|error| format!("{} could not be switched on: {}", child.text(), told(error)));
@@ -384,6 +362,10 @@ impl Launch {
         }
         notes
     }
+}
+
+fn not_ready(child: &Child, why: &str) -> LaunchError {
+    LaunchError::NotReady { module: child.text().into(), why: why.into(), notes: Vec::new() }
 }
 
 /// Makes a node and becomes its launch.

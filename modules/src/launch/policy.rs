@@ -4,7 +4,7 @@ use rohrpost_config::{Restart, RestartPolicy};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Longest pause before a restart.
+/// Longest pause before a restart, unless the configured one is longer.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
 
 /// What follows an end.
@@ -21,14 +21,14 @@ pub(super) enum Next {
 /// A module's restart policy, and how often it was needed lately.
 pub(super) struct Policy {
     restart: Restart,
-    /// When it was started again, the last times.
-    restarted: VecDeque<Instant>,
+    /// When it ended, of the times it was to be started again; the last of them, in which restarts are counted.
+    ends: VecDeque<Instant>,
     backoff: Duration,
 }
 
 impl Policy {
     pub(super) fn new(restart: Restart) -> Self {
-        Self { restart, restarted: VecDeque::new(), backoff: restart.backoff }
+        Self { restart, ends: VecDeque::new(), backoff: restart.backoff }
     }
 
     pub(super) fn restart(&self) -> Restart {
@@ -45,23 +45,23 @@ impl Policy {
         if !again {
             return Next::Stay;
         }
-        self.restarted.push_back(now);
-        self.restarted.retain(|at| now - *at <= self.restart.within);
-        if self.restarted.len() > self.restart.at_most as usize {
+        self.ends.push_back(now);
+        self.ends.retain(|at| now - *at <= self.restart.within);
+        if self.ends.len() > self.restart.at_most as usize {
             return Next::GivenUp;
         }
         // Alone for a while, it begins with the short pause again.
-        if self.restarted.len() == 1 {
+        if self.ends.len() == 1 {
             self.backoff = self.restart.backoff;
         }
         let pause = self.backoff;
-        self.backoff = (self.backoff * 2).min(BACKOFF_MAX);
+        self.backoff = (self.backoff * 2).min(BACKOFF_MAX.max(self.restart.backoff));
         Next::Again(pause)
     }
 
     /// A person has started it: what was before counts no more.
     pub(super) fn begin_anew(&mut self) {
-        self.restarted.clear();
+        self.ends.clear();
     }
 }
 
@@ -89,5 +89,9 @@ mod tests {
         }
         policy.begin_anew();
         assert_eq!(policy.ended(false, start + Duration::from_secs(72)), Next::Again(ms(4000)));
+        let mut policy = Policy::new(Restart { backoff: minute, within: minute * 10, ..restart });
+        for at_s in [0, 61, 122] {
+            assert_eq!(policy.ended(false, start + Duration::from_secs(at_s)), Next::Again(minute), "never shorter");
+        }
     }
 }

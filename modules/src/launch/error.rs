@@ -1,0 +1,57 @@
+//! Why a node could not be launched.
+
+use crate::runtime::ClientError;
+use rohrpost_mailbox::NodeError;
+
+/// Why a node could not be launched.
+#[derive(Debug, thiserror::Error)]
+pub enum LaunchError {
+    /// Several nodes, or another one.
+    #[error("which node? the configuration has {0}; say --node NAME")]
+    WhichNode(String),
+    /// One that is not there.
+    #[error("the configuration has no node `{0}`; it has {1}")]
+    NoNode(String, String),
+    /// The node.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// Launch's own mailboxes.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// Signals.
+    #[error("signal handlers: {0}")]
+    Signals(std::io::Error),
+    /// Programs that are not there.
+    #[error("{0}")]
+    Programs(String),
+    /// A module of an earlier launch.
+    #[error("module {0} of an earlier launch, process {1}, cannot be killed; end it by hand (is it another user's?)")]
+    Leftover(String, u32),
+    /// A module that would not start.
+    #[error("module {module} did not become ready: {why}{}", below(notes))]
+    NotReady {
+        /// Which.
+        module: String,
+        /// How it ended, and what it had printed.
+        why: String,
+        /// What else there is to say: of its earlier tries, of the others, and of their end.
+        notes: Vec<String>,
+    },
+}
+
+/// Each note on a line of its own, below what was said before.
+fn below(notes: &[String]) -> String {
+    notes.iter().map(|note| format!("\n  {note}")).collect()
+}
+
+impl LaunchError {
+    /// The same, with what else is to be told of a start that failed.
+    pub(super) fn with(mut self, told: Vec<String>) -> Self {
+        if let Self::NotReady { module, why, notes } = &mut self {
+            // Its last end is the error.
+            let same = format!("{module} {why}");
+            notes.extend(told.into_iter().filter(|note| *note != same));
+        }
+        self
+    }
+}
