@@ -13,6 +13,7 @@ mod allowance;
 #[cfg(feature = "builtin")]
 mod format;
 mod layer;
+mod out;
 mod print;
 mod relay;
 mod way;

@@ -1,25 +1,20 @@
 //! The way of a line out of this process: allowances, queues, and whoever finds the way free sends.
 
 use super::allowance::{Bucket, Excess, Told};
+use super::out::{Out, Way};
 use super::print::Print;
 use super::{CLASS, LINES, OutputLine, layer};
 use crate::common::{DataHead, OutputLevel};
 use crossbeam_queue::ArrayQueue;
 use rohrpost_config::{Installation, Level};
-use rohrpost_mailbox::{
-    Label, Name, Options, Participant, Priority, SendError, Sender, SystemClock, Type, monotonic_ns,
-};
+use rohrpost_mailbox::{Label, Name, Options, Participant, Priority, SendError, SystemClock, Type, monotonic_ns};
 use std::cell::Cell;
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, TryLockError};
+use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Lines that wait in this process while the collector is not there or has no room: panics, errors, others.
 const WAITING_MAX: [usize; 3] = [16, 64, 256];
-/// When a collector that was not there is looked for again: first after this time, then after twice as long as before,
-const RETRY: Duration = Duration::from_millis(200);
-/// at last so often. What it costs a module that it never comes is one look in that time.
-const RETRY_MAX: Duration = Duration::from_secs(3);
 /// How soon one that had no room is tried again.
 const RETRY_FULL: Duration = Duration::from_millis(20);
 /// How long a process that ends gives its last lines to find the collector.
@@ -85,37 +80,6 @@ pub(super) struct Output {
     /// Whether the configuration has a collector on this node. Where there is none, nothing waits for it: what is said is
     /// counted as lost, and errors are printed.
     collected: bool,
-}
-
-/// The one way out of a process, however many modules it speaks for.
-#[derive(Default)]
-pub(super) struct Out {
-    way: Mutex<Way>,
-    /// Whether `way` holds a line back.
-    held: AtomicBool,
-}
-
-impl Out {
-    /// None: another thread has it.
-    fn way(&self) -> Option<MutexGuard<'_, Way>> {
-        match self.way.try_lock() {
-            Ok(way) => Some(way),
-            Err(TryLockError::Poisoned(way)) => Some(way.into_inner()),
-            Err(TryLockError::WouldBlock) => None,
-        }
-    }
-}
-
-#[derive(Default)]
-struct Way {
-    sender: Option<Sender>,
-    retry_at: Option<Instant>,
-    /// How often in a row it was not there.
-    failures: u32,
-    /// The line that found no room; it goes before all that wait.
-    held: Option<OutputLine>,
-    bytes: Vec<u8>,
-    sequence: u32,
 }
 
 /// Makes this process's `tracing` events and panics lines of this module. The first caller in a process decides.
@@ -447,25 +411,5 @@ impl Output {
         way.held = Some(OutputLine { lost: 0, ..line });
         self.out.held.store(true, Ordering::Relaxed);
         false
-    }
-}
-
-impl Way {
-    fn open(&mut self, participant: &Arc<Participant>, to: Name) -> bool {
-        if self.retry_at.is_some_and(|at| Instant::now() < at) {
-            return false;
-        }
-        if self.sender.is_none() {
-            self.sender = participant.sender(to).ok();
-            self.retry_at = self.sender.is_none().then(|| Instant::now() + self.away());
-        }
-        self.sender.is_some()
-    }
-
-    /// The collector is not there: when it is looked for again.
-    fn away(&mut self) -> Duration {
-        let wait = RETRY.saturating_mul(1 << self.failures.min(16)).min(RETRY_MAX);
-        self.failures += 1;
-        wait
     }
 }
