@@ -34,6 +34,8 @@ builtin = "output"
 const ME: Name = Name::new(1, 200, 0, 0);
 const COLLECTOR: Name = Name::new(1, 32, 0, LINES);
 const PATIENCE: Duration = Duration::from_secs(30);
+/// The shortest time for which lines that wait let the module sleep.
+const PAUSE: Duration = Duration::from_millis(20);
 /// Of the queue in each process.
 const WAITING: u32 = 256;
 
@@ -68,7 +70,8 @@ fn lines_arrive_whole_or_are_counted() {
         tracing::info!("line {n}");
     }
     assert_eq!(lost(), 44);
-    assert!(retry_at().is_some_and(|at| at > Instant::now()), "a time that has passed would keep the module awake");
+    let before = Instant::now();
+    assert!(retry_at().is_some_and(|at| at >= before + PAUSE), "a time that has passed would keep the module awake");
 
     // Errors and panics have queues of their own: what waits already takes no room from them.
     tracing::error!("an error behind the flood");
@@ -137,6 +140,31 @@ fn lines_arrive_whole_or_are_counted() {
     assert!(there, "it ended without its last words");
     while collector.try_receive().is_some() {}
 
+    // At the end of its patience, what is left is lost, and counted.
+    std::mem::replace(&mut collector, elsewhere(&node)).close();
+    let before = lost();
+    for _ in 0..3 {
+        tracing::info!("too late");
+    }
+    flush();
+    assert_eq!((lost() - before, retry_at()), (3, None));
+    collector = Participant::join(&node, Name::NONE).unwrap().receiver(COLLECTOR, Shape::default()).unwrap();
+    tracing::info!("in time");
+    let line = next(&mut collector);
+    assert_eq!((line.text.as_str(), line.lost), ("in time", 3));
+
+    // Panics that a thread survives, one after the other: none of them waits for a collector, as its last one would.
+    collector.close();
+    for _ in 0..10 {
+        assert!(std::panic::catch_unwind(|| panic!("caught")).is_err());
+        drain();
+    }
+    assert_eq!(lost() - before, 3, "none was given up");
+    let mut collector = Participant::join(&node, Name::NONE).unwrap().receiver(COLLECTOR, Shape::default()).unwrap();
+    for _ in 0..10 {
+        assert!(next(&mut collector).text.ends_with("caught"));
+    }
+
     // A flood beyond the allowance, and no collector: a queue full of lines, many lost, the rest suppressed.
     collector.close();
     let (lost_before, flood) = (lost(), 200_000);
@@ -149,7 +177,8 @@ fn lines_arrive_whole_or_are_counted() {
         std::thread::sleep(Duration::from_millis(20));
     }
     // It is time to tell of it, but there is no room: that must not keep the module awake.
-    assert!(retry_at().is_some_and(|at| at > Instant::now()));
+    let before = Instant::now();
+    assert!(retry_at().is_some_and(|at| at >= before + PAUSE));
     let mut collector = Participant::join(&node, Name::NONE).unwrap().receiver(COLLECTOR, Shape::default()).unwrap();
     let (mut said, mut told) = (0, 0);
     while told == 0 {

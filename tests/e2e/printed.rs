@@ -103,3 +103,34 @@ fn a_module_that_prints_without_end_floods_nobody() {
         (printed + sum(&all, "suppressed") + sum(&all, "lost_before") == 100_000).then_some(())
     });
 }
+
+#[test]
+fn a_panic_while_there_is_no_collector_arrives_when_there_is_one() {
+    let place = Place::new();
+    let restart = "restart = { backoff = \"50 ms\", at-most = 9 }";
+    let (_launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
+    place.say(&["stop", "output.0", "--timeout", "60"]).ok();
+    let pid = robot.pid("probe.0");
+    let panicking = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "panic", "here"]));
+    robot.wait_restarted("probe.0", pid);
+    drop(panicking);
+    place.say(&["start", "output.0", "--timeout", "60"]).ok();
+    wait("the panic", || {
+        let all = lines(&place, "probe.0");
+        all.iter().any(|line| line["text"].as_str().unwrap().contains("of a panic")).then_some(())
+    });
+}
+
+#[test]
+fn without_a_collector_launch_repeats_errors() {
+    let place = Place::new();
+    let restart = "restart = { backoff = \"50 ms\", at-most = 9 }";
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", restart)]);
+    call(&place, &["probe.0", "say", "error", "nobody collects this"]);
+    let pid = robot.pid("probe.0");
+    let dying = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "last_words", "no more oil"]));
+    robot.wait_restarted("probe.0", pid);
+    drop(dying);
+    let out = launch.stop();
+    assert!(out.contains("\n    error nobody collects this\n    no more oil\n"), "{out}");
+}

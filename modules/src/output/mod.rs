@@ -13,11 +13,14 @@ mod allowance;
 #[cfg(feature = "builtin")]
 mod format;
 mod layer;
+mod out;
+mod print;
 mod relay;
 mod way;
 
 #[cfg(feature = "builtin")]
 pub use format::{Format, iso};
+pub(crate) use print::print;
 pub(crate) use relay::{Relay, Voice, Whisper};
 pub(crate) use way::is_installed;
 pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
@@ -34,21 +37,8 @@ pub const CLASS: &str = "output";
 /// Longest text of a line, bytes; what is longer is cut.
 pub const TEXT_MAX: usize = 900;
 
-/// Begins each line that a launched module prints although it sends it, too: launch repeats it, and does not send it again.
+/// Begins each line that a launched module prints although it has sent it, too: launch repeats it, and does not send it again.
 pub(crate) const SENT: char = '\u{1e}';
-
-/// Prints a line to standard error, if that takes it at once: whoever reads it may be gone, or stopped, and neither is a
-/// reason to panic or to wait.
-pub(crate) fn print(line: &dyn std::fmt::Display) {
-    use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-    use std::io::Write;
-    use std::os::fd::AsFd;
-    let stderr = std::io::stderr();
-    let mut room = [PollFd::new(stderr.as_fd(), PollFlags::POLLOUT)];
-    if poll(&mut room, PollTimeout::ZERO).is_ok_and(|ready| ready > 0) {
-        let _ = writeln!(stderr.lock(), "{line}");
-    }
-}
 
 /// One line of output.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]

@@ -1,7 +1,9 @@
 //! Lines that one process says in the names of others: launch passes on what its modules print.
 
 use super::layer::cut;
-use super::way::{Lane, Out, Output, Print};
+use super::out::Out;
+use super::print::Print;
+use super::way::{Lane, Output};
 use crate::common::OutputLevel;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Participant};

@@ -1,23 +1,20 @@
 //! The way of a line out of this process: allowances, queues, and whoever finds the way free sends.
 
 use super::allowance::{Bucket, Excess, Told};
-use super::{CLASS, LINES, OutputLine, SENT, layer};
+use super::out::{Out, Way};
+use super::print::Print;
+use super::{CLASS, LINES, OutputLine, layer};
 use crate::common::{DataHead, OutputLevel};
 use crossbeam_queue::ArrayQueue;
 use rohrpost_config::{Installation, Level};
-use rohrpost_mailbox::{
-    Label, Name, Options, Participant, Priority, SendError, Sender, SystemClock, Type, monotonic_ns,
-};
+use rohrpost_mailbox::{Label, Name, Options, Participant, Priority, SendError, SystemClock, Type, monotonic_ns};
 use std::cell::Cell;
-use std::fmt::Display;
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, TryLockError};
+use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Lines that wait in this process while the collector is not there or has no room: panics, errors, others.
 const WAITING_MAX: [usize; 3] = [16, 64, 256];
-/// How often a collector that was not there is looked for again.
-const RETRY: Duration = Duration::from_millis(200);
 /// How soon one that had no room is tried again.
 const RETRY_FULL: Duration = Duration::from_millis(20);
 /// How long a process that ends gives its last lines to find the collector.
@@ -28,7 +25,7 @@ const LAST_LOOK: Duration = Duration::from_millis(5);
 static OUTPUT: OnceLock<Output> = OnceLock::new();
 
 thread_local! {
-    /// Panics of this thread so far.
+    /// Panics of this thread since it was last seen not to unwind.
     static PANICS: Cell<u32> = const { Cell::new(0) };
 }
 
@@ -80,51 +77,9 @@ pub(super) struct Output {
     suppressed: AtomicU64,
     out: Arc<Out>,
     print: Print,
-    /// Whether the configuration has a collector to wait for.
+    /// Whether the configuration has a collector on this node. Where there is none, nothing waits for it: what is said is
+    /// counted as lost, and errors are printed.
     collected: bool,
-}
-
-/// Which lines are printed as well.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Print {
-    /// All: a person at the terminal started it.
-    All,
-    /// What launch may have to repeat, marked as sent.
-    Errors,
-    /// None.
-    Nothing,
-}
-
-impl Print {
-    fn line(self, level: OutputLevel, text: &dyn Display) {
-        match self {
-            Self::All => super::print(&format_args!("{:5} {text}", level.name())),
-            Self::Errors if level == OutputLevel::Error => {
-                // Each line of it: launch reads line by line.
-                let marked = format!("{SENT}{:5} {text}", level.name()).replace('\n', &format!("\n{SENT}"));
-                super::print(&marked);
-            }
-            Self::Errors | Self::Nothing => {}
-        }
-    }
-}
-
-/// The one way out of a process, however many modules it speaks for.
-#[derive(Default)]
-pub(super) struct Out {
-    way: Mutex<Way>,
-    /// Whether `way` holds a line back.
-    held: AtomicBool,
-}
-
-#[derive(Default)]
-struct Way {
-    sender: Option<Sender>,
-    retry_at: Option<Instant>,
-    /// The line that found no room; it goes before all that wait.
-    held: Option<OutputLine>,
-    bytes: Vec<u8>,
-    sequence: u32,
 }
 
 /// Makes this process's `tracing` events and panics lines of this module. The first caller in a process decides.
@@ -167,8 +122,17 @@ impl Output {
             suppressed: AtomicU64::new(0),
             out,
             print,
-            collected: installation.module(to).is_some(),
+            collected: installation.module(to).is_some_and(|to| Some(to.node.as_str()) == installation.node_of(me)),
         })
+    }
+}
+
+/// A panic that this thread survived does not make the next one its last. (In the hook itself a thread always panics, so that
+/// it cannot be told there whether one was unwinding already.)
+fn forget_panics() {
+    if !std::thread::panicking() {
+        // Fails only while the thread ends.
+        let _ = PANICS.try_with(|panics| panics.set(0));
     }
 }
 
@@ -219,13 +183,14 @@ pub fn suppressed() -> u64 {
 
 /// Sends the lines that wait, as far as there is room, and tells of suppressed ones when it is time.
 pub fn drain() {
+    forget_panics();
     if let Some(output) = installed() {
         output.attend();
     }
 }
 
 /// Sends the lines that wait. For a process that ends: it tells of all that was suppressed, and gives a collector that is not
-/// there or has no room a moment, at most half a second.
+/// there or has no room a moment, at most half a second. What is left then is lost; errors are printed for launch to pass on.
 pub fn flush() {
     if let Some(output) = installed() {
         output.tell(|excess, _| excess.tell_all());
@@ -282,6 +247,7 @@ impl Output {
 
     /// Says a line that is allowed, and was true at this system time.
     pub(super) fn say(&self, level: OutputLevel, time_ns: u64, text: String) {
+        forget_panics();
         self.tell(|excess, now_ns| excess.tell(now_ns));
         self.push(Lane::of(level), level, time_ns, 0, text);
         self.drain();
@@ -308,10 +274,12 @@ impl Output {
 
     /// Puts a line into its queue.
     fn push(&self, lane: Lane, level: OutputLevel, time_ns: u64, suppressed: u32, text: String) {
-        self.print.line(level, &text);
+        self.print.said(level, &text);
         let line = OutputLine { time_ns, module: self.me.raw(), level, lost: 0, suppressed, text };
-        if self.lanes[lane as usize].queue.push(line).is_err() {
-            self.lose_one();
+        if !self.collected {
+            self.lose(&line);
+        } else if let Err(line) = self.lanes[lane as usize].queue.push(line) {
+            self.lose(&line);
         }
     }
 
@@ -330,7 +298,9 @@ impl Output {
         }
     }
 
-    fn lose_one(&self) {
+    /// Counts it; one that launch is to repeat, launch may yet bring to the collector.
+    fn lose(&self, line: &OutputLine) {
+        self.print.lost(line.level, &line.text);
         self.lost_now.fetch_add(1, Ordering::Relaxed);
         self.lost.fetch_add(1, Ordering::Relaxed);
     }
@@ -340,18 +310,42 @@ impl Output {
     }
 
     fn patience(&self) -> Duration {
-        match self.out.way.try_lock() {
-            Ok(way) => way.retry_at.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now())),
-            Err(_) => Duration::ZERO,
-        }
+        let retry_at = self.out.way().and_then(|way| way.retry_at);
+        retry_at.map_or(Duration::ZERO, |at| at.saturating_duration_since(Instant::now()))
     }
 
     fn flush(&self) {
         let until = Instant::now() + LAST_LINES;
         self.drain();
-        while self.collected && !self.is_idle() && Instant::now() < until {
+        while !self.is_done() && Instant::now() < until {
             std::thread::sleep(LAST_LOOK);
+            self.hurry();
             self.drain();
+        }
+        self.give_up();
+    }
+
+    /// Whether nothing waits, and no other thread has a line in hand: it has taken it from its queue already.
+    fn is_done(&self) -> bool {
+        self.out.way().is_some_and(|way| way.held.is_none() && self.lanes.iter().all(|lane| lane.queue.is_empty()))
+    }
+
+    /// There is no time left for patience.
+    fn hurry(&self) {
+        if let Some(mut way) = self.out.way() {
+            way.retry_at = way.retry_at.map(|at| at.min(Instant::now() + LAST_LOOK));
+        }
+    }
+
+    /// What is left by now is lost, and said to be.
+    fn give_up(&self) {
+        let held = self.out.way().and_then(|mut way| way.held.take_if(|line| line.module() == self.me));
+        if let Some(line) = held {
+            self.out.held.store(false, Ordering::Relaxed);
+            self.lose(&line);
+        }
+        for lane in &self.lanes {
+            std::iter::from_fn(|| lane.queue.pop()).take(lane.queue.capacity()).for_each(|line| self.lose(&line));
         }
     }
 
@@ -362,11 +356,7 @@ impl Output {
             if self.is_idle() {
                 return;
             }
-            let mut way = match self.out.way.try_lock() {
-                Ok(way) => way,
-                Err(TryLockError::Poisoned(way)) => way.into_inner(),
-                Err(TryLockError::WouldBlock) => return,
-            };
+            let Some(mut way) = self.out.way() else { return };
             if !way.open(&self.participant, self.to) {
                 return;
             }
@@ -401,34 +391,25 @@ impl Output {
         self.out.held.store(false, Ordering::Relaxed);
         let Err(error) = sent else {
             way.sequence = way.sequence.wrapping_add(1);
+            way.failures = 0;
+            if own {
+                self.print.sent(line.level, &line.text);
+            }
             return true;
         };
         self.lost_now.fetch_add(line.lost, Ordering::Relaxed);
         if let SendError::TooLarge { .. } = error {
             // It never will fit, and those behind it may.
-            self.lose_one();
+            self.lose(&line);
             return true;
         }
         let gone = matches!(error, SendError::NoMailbox(_));
         if gone {
             way.sender = None;
         }
-        way.retry_at = Some(Instant::now() + if gone { RETRY } else { RETRY_FULL });
+        way.retry_at = Some(Instant::now() + if gone { way.away() } else { RETRY_FULL });
         way.held = Some(OutputLine { lost: 0, ..line });
         self.out.held.store(true, Ordering::Relaxed);
         false
-    }
-}
-
-impl Way {
-    fn open(&mut self, participant: &Arc<Participant>, to: Name) -> bool {
-        if self.retry_at.is_some_and(|at| Instant::now() < at) {
-            return false;
-        }
-        if self.sender.is_none() {
-            self.sender = participant.sender(to).ok();
-            self.retry_at = self.sender.is_none().then(|| Instant::now() + RETRY);
-        }
-        self.sender.is_some()
     }
 }

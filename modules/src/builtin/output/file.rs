@@ -4,8 +4,12 @@ use super::sink::{Change, Health};
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// So often it looks whether its file still has its name: somebody may have moved or removed it.
+const LOOK: Duration = Duration::from_secs(1);
 
 pub(super) struct LogFile {
     path: PathBuf,
@@ -14,6 +18,8 @@ pub(super) struct LogFile {
     /// Files put aside that are kept.
     kept: u32,
     open: Option<Open>,
+    /// When it is looked at again.
+    look_at: Option<Instant>,
     health: Health,
 }
 
@@ -28,7 +34,7 @@ impl LogFile {
     /// Opens a file, or begins one.
     pub(super) fn open(path: &Path, size_max: u64, kept: u32) -> io::Result<Self> {
         let open = Some(Open::at(path)?);
-        Ok(Self { path: path.to_owned(), size_max, kept, open, health: Health::default() })
+        Ok(Self { path: path.to_owned(), size_max, kept, open, look_at: None, health: Health::default() })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -37,16 +43,23 @@ impl LogFile {
 
     /// Writes a line, which has no end yet. When there is no room it goes on without, and tries again every second.
     pub(super) fn write(&mut self, line: &str, now: Instant) -> Option<Change> {
-        let Self { path, size_max, kept, open, health } = self;
+        let Self { path, size_max, kept, open, look_at, health } = self;
+        if look_at.is_none_or(|at| now >= at) {
+            *look_at = Some(now + LOOK);
+            open.take_if(|file| !file.is_at(path));
+        }
         health.put(now, || {
-            // Opened anew after a failure: it may have been moved out of the way.
+            // Opened anew also after a failure: it may have been moved out of the way.
             let mut file = match open.take() {
                 Some(file) => file,
                 None => Open::at(path)?,
             };
             let len = line.len() as u64 + 1;
             if file.len > 0 && file.len + len > *size_max {
-                put_aside(path, *kept)?;
+                // Else it was moved or removed a moment ago, and those put aside must not move up for nothing.
+                if file.is_at(path) {
+                    put_aside(path, *kept)?;
+                }
                 file = Open::at(path)?;
             }
             file.append(line)?;
@@ -66,6 +79,12 @@ impl Open {
             file.read_exact(&mut last)?;
         }
         Ok(Self { file, len, torn: last != [b'\n'] })
+    }
+
+    /// Whether it is what stands at this path.
+    fn is_at(&self, path: &Path) -> bool {
+        let there = fs::metadata(path).and_then(|there| Ok((there, self.file.metadata()?)));
+        there.is_ok_and(|(there, own)| (there.dev(), there.ino()) == (own.dev(), own.ino()))
     }
 
     /// One write for the whole line: what is killed leaves all of it or none.
@@ -150,6 +169,32 @@ mod tests {
         file.write(&"x".repeat(20), Instant::now());
         file.write("y", Instant::now());
         assert_eq!(read(&path), "y\n");
+    }
+
+    #[test]
+    fn a_file_that_was_moved_or_removed_is_begun_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("robot.log");
+        let aside = |number: u32| folder.path().join(format!("robot.log.{number}"));
+        let mut file = LogFile::open(&path, 30, 2).unwrap();
+        let start = Instant::now();
+        assert!(file.write("first", start).is_none());
+
+        fs::rename(&path, aside(1)).unwrap();
+        assert!(file.write("meanwhile", start + LOOK / 2).is_none());
+        assert!(file.write("second", start + LOOK).is_none());
+        assert_eq!((read(&aside(1)).as_str(), read(&path).as_str()), ("first\nmeanwhile\n", "second\n"));
+
+        fs::remove_file(&path).unwrap();
+        assert!(file.write("third", start + 2 * LOOK).is_none());
+        assert_eq!(read(&path), "third\n");
+
+        // Full before it is noticed: what was put aside stays where it is.
+        fs::remove_file(&path).unwrap();
+        assert!(file.write("a line that fills the file", start + 2 * LOOK).is_none());
+        assert_eq!(read(&path), "a line that fills the file\n");
+        assert_eq!(read(&aside(1)), "first\nmeanwhile\n");
+        assert!(!aside(2).exists());
     }
 
     #[test]
