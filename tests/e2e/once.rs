@@ -33,7 +33,11 @@ impl Raw {
         CallEnvelope { interface: ProbingInterface::hash(), incarnation, sequence, valid_for_us: 60_000_000, age_us }
     }
 
-    fn send(&mut self, function: u16, envelope: CallEnvelope, argument: impl Serialize) {
+    fn send(&mut self, function: u16, envelope: CallEnvelope, number: u32) {
+        self.send_with(function, envelope, number);
+    }
+
+    fn send_with(&mut self, function: u16, envelope: CallEnvelope, argument: impl Serialize) {
         let mut body = envelope.to_bytes().to_vec();
         rohrpost::macro_support::append(&mut body, &(argument,)).unwrap();
         let label = Label {
@@ -100,12 +104,12 @@ fn duplicates_of_an_order_to_launch_restart_a_module_once() {
     let pid = robot.pid("probe.0");
     let order = |age_us| CallEnvelope { interface: LauncherInterface::hash(), ..Raw::envelope(7, 1, age_us) };
     for age_us in [0, 0, 1] {
-        raw.send(RESTART, order(age_us), "probe.0");
+        raw.send_with(RESTART, order(age_us), "probe.0");
         assert_eq!(raw.answer_as::<Result<u32, ControlError>>().1, Ok(Ok(2)), "its second process");
     }
     wait("it runs again", || robot.process("probe.0").filter(|process| process.pid != pid));
     // Also when the first order has been carried out long since.
-    raw.send(RESTART, order(1000), "probe.0");
+    raw.send_with(RESTART, order(1000), "probe.0");
     assert_eq!(raw.answer_as::<Result<u32, ControlError>>().1, Ok(Ok(2)));
     let mut tool = robot.tool(PATIENCE);
     assert_eq!(tool.children().unwrap()[0].lives, 2);
