@@ -40,7 +40,7 @@ pub(crate) const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
 pub(crate) struct NodePage {
     magic: AtomicU64,
     version: AtomicU32,
-    /// Raised with every new and every gone mailbox.
+    /// Raised with every new, every taken over and every gone mailbox, when its file is there or gone.
     pub(crate) registry_epoch: AtomicU32,
     /// Raised whenever somebody's death was noticed: receivers then look for what the dead left.
     pub(crate) deaths: AtomicU32,
@@ -220,6 +220,17 @@ impl Node {
         self.page().deaths.fetch_add(1, Ordering::AcqRel);
         let there = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
         (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| doorbell::ring(self, index));
+    }
+
+    /// Changes with every new, taken over and gone mailbox. One that was not there when the number, read *before* looking,
+    /// was this is still not there while it is the same: one load, and no system call.
+    pub fn registry_epoch(&self) -> u32 {
+        // ORDERING: Acquire; who sees the number raised finds the file. Pairs with the raise after it was renamed or unlinked.
+        self.page().registry_epoch.load(Ordering::Acquire)
+    }
+
+    pub(crate) fn raise_registry_epoch(&self) {
+        self.page().registry_epoch.fetch_add(1, Ordering::AcqRel);
     }
 
     /// All participants alive, but for those that are joining or leaving just now.

@@ -70,6 +70,8 @@ impl Participant {
             Predecessor::Other(old) => self.make(name, shape, Some(&old))?,
             Predecessor::None => self.make(name, shape, None)?,
         };
+        // Also of one that is taken over: its maker may have died before it could.
+        self.node().raise_registry_epoch();
         step!("create: owned");
         let owner = &segment.page().owner;
         owner.pid.store(std::process::id(), Ordering::Relaxed);
@@ -137,12 +139,10 @@ impl Participant {
             step!("create: named");
             Ok((segment, lock))
         };
-        let result = made().map_err(|source| {
+        made().map_err(|source| {
             let _ = fs::remove_file(&unfinished);
             CreateError::Memory { name, bytes: shape.segment_bytes(), source }
-        })?;
-        node.page().registry_epoch.fetch_add(1, Ordering::AcqRel);
-        Ok(result)
+        })
     }
 }
 
@@ -179,7 +179,7 @@ fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeE
     about::remove(node, name);
     fs::remove_file(path_of(node.path(), name)).map_err(|error| NodeError::Io(path_of(node.path(), name), error))?;
     step!("unlink: gone");
-    node.page().registry_epoch.fetch_add(1, Ordering::AcqRel);
+    node.raise_registry_epoch();
     Ok(())
 }
 

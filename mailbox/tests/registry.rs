@@ -46,6 +46,31 @@ fn file_of(ground: &Ground, name: Name) -> PathBuf {
 }
 
 #[test]
+fn whatever_comes_and_goes_raises_the_epoch() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let mut last = node.registry_epoch();
+    let mut raised = |what: &str| {
+        assert_ne!(node.registry_epoch(), last, "{what}");
+        last = node.registry_epoch();
+    };
+    let receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
+    raised("new");
+    drop(receiver);
+    let receiver = ground.join().receiver(MAILBOX, shape(4)).unwrap();
+    raised("taken over: its maker may have died before it could say so");
+    drop(receiver);
+    let receiver = ground.join().receiver(MAILBOX, shape(8)).unwrap();
+    raised("replaced");
+    receiver.close();
+    raised("gone");
+    drop(ground.join().receiver(OTHER, shape(4)).unwrap());
+    raised("new");
+    node.remove_orphan(OTHER).unwrap();
+    raised("removed");
+}
+
+#[test]
 fn a_second_owner_is_refused_and_told_who_the_first_is() {
     let ground = Ground::new();
     let first = ground.start("own");

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
-use rohrpost_mailbox::{Head, Label, Name, Node, Options, Participant, Receiver, Sender, Shape, Type};
+use rohrpost_mailbox::{Head, Label, Name, Node, Options, Participant, Receiver, SendError, Sender, Shape, Type};
 use rohrpost_modules::call::{CallEnvelope, CallError, Fault, Link, Pending, REPLIES_KEPT, ReplyEnvelope};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -22,7 +22,7 @@ struct Ground {
     server: Receiver,
     other: Receiver,
     answers: Sender,
-    _node: Arc<Node>,
+    node: Arc<Node>,
     _directory: TempDir,
 }
 
@@ -35,7 +35,7 @@ fn ground() -> Ground {
     let other = join(OTHER).receiver(OTHER, Shape::default()).unwrap();
     let replies = caller.receiver(CALLER.with_local(1), Shape::default()).unwrap();
     let answers = join(Name::NONE).sender(CALLER.with_local(1)).unwrap();
-    Ground { link: Link::new(&caller, CALLER, replies), server, other, answers, _node: node, _directory: directory }
+    Ground { link: Link::new(&caller, CALLER, replies), server, other, answers, node, _directory: directory }
 }
 
 /// A command as the server sees it.
@@ -207,4 +207,24 @@ fn pendings_are_waited_for_in_any_order_and_dropped_ones_are_given_up() {
     drop(second);
     assert_eq!(first.wait_result().unwrap(), 0);
     assert!(link.borrow_mut().poll(calls[1]).is_none(), "given up");
+}
+
+#[test]
+fn a_missing_mailbox_is_looked_for_again_only_when_something_came_or_went() {
+    let mut ground = ground();
+    let node = ground.node.clone();
+    let (file, hidden) = (node.path().join(format!("{:08x}.mbx", SERVER.raw())), node.path().join("hidden"));
+    std::fs::rename(&file, &hidden).unwrap();
+    let send = |ground: &mut Ground| ground.link.send(SERVER, &Label::default(), &[b"x"]);
+    assert!(matches!(send(&mut ground), Err(SendError::NoMailbox(SERVER))));
+    // Back without a word to the registry, which only a test does: who looks finds it.
+    std::fs::rename(&hidden, &file).unwrap();
+    assert!(matches!(send(&mut ground), Err(SendError::NoMailbox(SERVER))), "it did not look");
+    let third = Name::new(1, 202, 1, 0);
+    let late = Participant::join(&node, third).unwrap();
+    assert!(matches!(ground.link.send(third, &Label::default(), &[]), Err(SendError::NoMailbox(_))));
+    let mut late = late.receiver(third, Shape::default()).unwrap();
+    send(&mut ground).unwrap();
+    ground.link.send(third, &Label::default(), &[b"first"]).unwrap();
+    assert_eq!(late.try_receive().unwrap().body(), b"first");
 }

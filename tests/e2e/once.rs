@@ -3,11 +3,16 @@
 use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::{COUNT, COUNT_AGAIN, ProbingInterface};
 use nix::sys::signal::Signal;
+use rohrpost::launch::{ControlError, LauncherInterface};
 use rohrpost::mailbox::{Full, Label, Name, Options, Participant, Receiver, Sender, Shape, Type, local};
+use rohrpost::serde::{Serialize, de::DeserializeOwned};
 use rohrpost::{CallError, Class, Fault};
 use rohrpost_modules::call::{CallEnvelope, Link, ReplyEnvelope};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
+
+/// Of launch.
+const RESTART: u16 = 17;
 
 /// Packages as a caller would send them, with every field in the test's hand.
 struct Raw {
@@ -29,8 +34,12 @@ impl Raw {
     }
 
     fn send(&mut self, function: u16, envelope: CallEnvelope, number: u32) {
+        self.send_with(function, envelope, number);
+    }
+
+    fn send_with(&mut self, function: u16, envelope: CallEnvelope, argument: impl Serialize) {
         let mut body = envelope.to_bytes().to_vec();
-        rohrpost::macro_support::append(&mut body, &(number,)).unwrap();
+        rohrpost::macro_support::append(&mut body, &(argument,)).unwrap();
         let label = Label {
             from: self.replies.name(),
             kind: Type::command(function),
@@ -54,6 +63,10 @@ impl Raw {
 
     /// The next answer: what it answers, and the result or the fault.
     fn answer(&mut self) -> (ReplyEnvelope, Result<u64, Fault>) {
+        self.answer_as()
+    }
+
+    fn answer_as<T: DeserializeOwned>(&mut self) -> (ReplyEnvelope, Result<T, Fault>) {
         let package = self.replies.receive_timeout(PATIENCE).expect("no answer");
         let (envelope, result) = ReplyEnvelope::split(package.body()).unwrap();
         let result = if package.head().options.has(Options::ERROR) {
@@ -81,6 +94,29 @@ fn duplicates_of_one_envelope_run_once_and_have_the_same_answer() {
     assert_eq!(place.counted(), [1, 2]);
     raw.replies.close();
     launch.stop();
+}
+
+#[test]
+fn duplicates_of_an_order_to_launch_restart_a_module_once() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let mut raw = Raw::new(&robot, "tool.0");
+    let pid = robot.pid("probe.0");
+    let order = |age_us| CallEnvelope { interface: LauncherInterface::hash(), ..Raw::envelope(7, 1, age_us) };
+    for age_us in [0, 0, 1] {
+        raw.send_with(RESTART, order(age_us), "probe.0");
+        assert_eq!(raw.answer_as::<Result<u32, ControlError>>().1, Ok(Ok(2)), "its second process");
+    }
+    wait("it runs again", || robot.process("probe.0").filter(|process| process.pid != pid));
+    // Also when the first order has been carried out long since.
+    raw.send_with(RESTART, order(1000), "probe.0");
+    assert_eq!(raw.answer_as::<Result<u32, ControlError>>().1, Ok(Ok(2)));
+    let mut tool = robot.tool(PATIENCE);
+    assert_eq!(tool.children().unwrap()[0].lives, 2);
+    tool.close();
+    raw.replies.close();
+    let out = launch.stop();
+    assert_eq!(out.matches("probe.0 is started again, as asked").count(), 1, "{out}");
 }
 
 #[test]

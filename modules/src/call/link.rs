@@ -1,5 +1,6 @@
 //! The caller's side: one reply mailbox, the ways into other mailboxes, and the calls under way.
 
+use super::absent::Absent;
 use super::envelope::micros;
 use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope};
 use rohrpost_mailbox::{Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type};
@@ -25,6 +26,7 @@ pub struct Link {
     me: Name,
     replies: Receiver,
     senders: Vec<Sender>,
+    absent: Absent,
     calls: Vec<Call>,
     /// Buffers of calls that are over, to be used again.
     spare: Vec<Vec<u8>>,
@@ -56,6 +58,7 @@ impl Link {
             me,
             replies,
             senders: Vec::new(),
+            absent: Absent::default(),
             calls: Vec::new(),
             spare: Vec::new(),
             // Sequence numbers may begin anywhere; from 1 they are easier to read.
@@ -94,24 +97,35 @@ impl Link {
     /// # Errors
     /// When it was not accepted.
     pub fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
-        let sender = match self.senders.iter().position(|sender| sender.name() == to) {
-            Some(at) => &mut self.senders[at],
-            None => {
-                let sender = self.participant.sender(to)?;
-                if self.senders.len() >= SENDERS_MAX {
-                    self.senders.remove(0);
-                }
-                self.senders.push(sender);
-                let last = self.senders.len() - 1;
-                &mut self.senders[last]
-            }
+        let at = match self.senders.iter().position(|sender| sender.name() == to) {
+            Some(at) => at,
+            None => self.open(to)?,
         };
-        let sent = sender.send(label, parts);
+        let sent = self.senders[at].send(label, parts);
         if let Err(SendError::NoMailbox(_)) = sent {
             // Gone for good or to come again: either way this map leads nowhere.
             self.senders.retain(|sender| sender.name() != to);
         }
         sent
+    }
+
+    /// Opens a way into a mailbox; where it is in the list.
+    fn open(&mut self, to: Name) -> Result<usize, SendError> {
+        // Before it is looked for: what comes in between makes this number an old one.
+        let epoch = self.participant.node().registry_epoch();
+        if self.absent.has(to, epoch) {
+            return Err(SendError::NoMailbox(to));
+        }
+        let sender = self.participant.sender(to).inspect_err(|error| {
+            if matches!(error, SendError::NoMailbox(_)) {
+                self.absent.note(to, epoch);
+            }
+        })?;
+        if self.senders.len() >= SENDERS_MAX {
+            self.senders.remove(0);
+        }
+        self.senders.push(sender);
+        Ok(self.senders.len() - 1)
     }
 
     /// Sends a command and returns at once; [`Link::wait`] fetches the answer. `arguments` are postcard.

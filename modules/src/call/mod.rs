@@ -2,6 +2,7 @@
 //!
 //! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side.
 
+mod absent;
 mod envelope;
 mod error;
 mod link;
