@@ -24,7 +24,7 @@ pub(crate) struct Newest {
 pub(crate) struct Subscription {
     pub(crate) face: usize,
     pub(crate) wish: Subscribe,
-    /// Data mailbox that it goes to.
+    /// Mailbox that it goes to.
     pub(crate) to: Name,
     /// Of the request that asked for it; the data carry the same.
     pub(crate) priority: Priority,
@@ -184,7 +184,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     fn wish(period_ms: u32) -> Subscribe {
-        Subscribe { number: 1, id: 7, period_us: period_ms * 1000, lease_ms: 1000 }
+        Subscribe { number: 1, id: 7, period_us: period_ms * 1000, lease_ms: 1000, mailbox: 2 }
     }
 
     fn subscribed(period_ms: u32) -> Subscriptions {
@@ -251,6 +251,16 @@ mod tests {
         assert_eq!(all.len(), 1);
         tick(&mut all, 2000 * MS);
         assert_eq!(all.len(), 0);
+    }
+
+    #[test]
+    fn mailboxes_of_one_subscriber_have_ids_of_their_own() {
+        let mut all = subscribed(0);
+        let own = Name::new(1, 9, 0, 3);
+        assert!(all.subscribe(0, own, Priority(9), Subscribe { mailbox: 3, ..wish(0) }, 1));
+        assert_eq!((all.len(), publish(&mut all, || Delivery::Sent)), (2, 2));
+        all.unsubscribe(own, 7);
+        assert_eq!((all.len(), all.list[0].to.local()), (1, 2));
     }
 
     #[test]

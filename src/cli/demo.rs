@@ -3,6 +3,7 @@
 mod copy;
 
 use super::launch::{View, end};
+use super::speech::Speech;
 use super::summary::print_classes;
 use super::{Failure, say};
 use rohrpost::common::State;
@@ -57,10 +58,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let node = choose_node(&installation, None)?.name.clone();
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
+    let speech = Speech::begin()?;
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
-    let outcome = watch(arguments, &mut launch);
+    let outcome = watch(arguments, &mut launch, &speech);
     let summary = summary(&mut launch);
-    let code = end(launch);
+    let code = end(launch, &speech);
+    speech.settle();
     outcome?;
     let (text, well) = summary?;
     say(text.trim_end());
@@ -83,12 +86,12 @@ fn drawing(installation: &Installation) -> Option<PathBuf> {
 }
 
 /// Until the time is over, the log is over, or it is told to stop.
-fn watch(arguments: &Arguments, launch: &mut Launch) -> Result<(), Failure> {
+fn watch(arguments: &Arguments, launch: &mut Launch, speech: &Speech) -> Result<(), Failure> {
     let mut deadline = match arguments.seconds {
         Some(seconds) => Some(Instant::now() + super::call::seconds(seconds)?),
         None => None,
     };
-    let mut view = View::new(arguments.quiet);
+    let mut view = View::new(arguments.quiet, speech);
     let mut ask_at = Instant::now();
     let mut over = false;
     while launch.watch(view.wait()) {

@@ -22,6 +22,7 @@ mod param;
 mod ping;
 mod run;
 mod send;
+mod speech;
 mod status;
 mod summary;
 mod table;

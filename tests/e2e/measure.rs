@@ -6,7 +6,7 @@ use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::common::{SUBSCRIBE, Subscribe};
 use rohrpost::macro_support::append;
-use rohrpost::mailbox::{Receiver, monotonic_ns};
+use rohrpost::mailbox::{Receiver, local, monotonic_ns};
 use serde_json::Value;
 use std::time::Duration;
 
@@ -72,7 +72,7 @@ fn figures_agree_with_a_known_source() {
     let place = Place::new();
     let (_launch, robot) = place.launched(&[&probe("probe.0", "blob-hz = 150.0", "start = \"off\"")]);
     let mut tool = robot.tool(PATIENCE);
-    let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 600_000 };
+    let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 600_000, mailbox: local::DATA };
     tool.data().unwrap();
     let write = |body: &mut Vec<u8>| append(body, &wish);
     wait("probe.0 is ready", || (robot.state("probe.0") == "off").then_some(()));

@@ -39,6 +39,9 @@ pub enum ContextError {
         /// The interface's class.
         wanted: &'static str,
     },
+    /// A subscription into a mailbox that this module has not opened.
+    #[error("this module has no mailbox {0} for data; make it with `open_mailbox` before it is subscribed into")]
+    NoMailbox(u8),
     /// Data that no face of this module publishes.
     #[error("this module has no face of class `{0}`; add one to `faces` in the configuration, or to its `Interfaces`")]
     NoFace(&'static str),
@@ -61,6 +64,8 @@ pub struct Context {
     pub(crate) clock: SystemClock,
     /// Mailboxes of the module's own, besides commands, replies and data.
     pub(crate) own: Vec<Receiver>,
+    /// Their local ids.
+    opened: Vec<u8>,
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
     pub(crate) period: Option<Duration>,
@@ -88,6 +93,7 @@ impl Context {
             followings: Followings::default(),
             clock,
             own: Vec::new(),
+            opened: Vec::new(),
             watches: None,
             period: None,
             next_tick: None,
@@ -151,23 +157,64 @@ impl Context {
         module: &str,
         rate: Rate,
     ) -> Result<Subscription<T>, ContextError> {
+        self.subscribe_in(local::DATA, port, module, rate)
+    }
+
+    /// The same, but the data come to a mailbox of the module's own, which [`Context::open_mailbox`] has made: one with
+    /// another policy than the data mailbox has, or one that others cannot fill.
+    ///
+    /// # Errors
+    /// [`ContextError::NoMailbox`] too, when there is no such mailbox.
+    pub fn subscribe_in<T: Data>(
+        &mut self,
+        mailbox: u8,
+        port: DataPort<T>,
+        module: &str,
+        rate: Rate,
+    ) -> Result<Subscription<T>, ContextError> {
         let from = self.named(module, port.class)?;
-        Ok(Subscription::new(self.followings.follow(from, port.number, (port.hash)(), rate)))
+        self.follow(mailbox, from, port.number, (port.hash)(), rate)
     }
 
-    /// Subscribes to data whose type is known by its description alone.
-    pub fn subscribe_untyped(&mut self, from: Name, number: u16, interface: u32, rate: Rate) -> Subscription<()> {
-        Subscription::new(self.followings.follow(from, number, interface, rate))
+    /// Subscribes to data whose type is known by its description alone. They come to `mailbox`: [`local::DATA`], or one of the
+    /// module's own.
+    ///
+    /// # Errors
+    /// [`ContextError::NoMailbox`], when there is no such mailbox.
+    pub fn subscribe_untyped(
+        &mut self,
+        mailbox: u8,
+        from: Name,
+        number: u16,
+        interface: u32,
+        rate: Rate,
+    ) -> Result<Subscription<()>, ContextError> {
+        self.follow(mailbox, from, number, interface, rate)
     }
 
-    /// Makes a mailbox of the module's own, local id 3 or more. What it brings comes to [`crate::Module::received`]; bodies
-    /// begin as those of subscribed data do.
+    fn follow<T>(
+        &mut self,
+        mailbox: u8,
+        from: Name,
+        number: u16,
+        interface: u32,
+        rate: Rate,
+    ) -> Result<Subscription<T>, ContextError> {
+        if mailbox != local::DATA && !self.opened.contains(&mailbox) {
+            return Err(ContextError::NoMailbox(mailbox));
+        }
+        Ok(Subscription::new(self.followings.follow(mailbox, from, number, interface, rate), mailbox))
+    }
+
+    /// Makes a mailbox of the module's own, local id 3 or more. What it brings comes to [`crate::Module::received`]: data that
+    /// were subscribed to with [`Context::subscribe_in`], and packages of others whose bodies begin as those of data do.
     ///
     /// # Errors
     /// When it cannot be made.
     pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
         let participant = self.link.borrow().participant().clone();
         self.own.push(participant.receiver(self.me.with_local(local), shape)?);
+        self.opened.push(local);
         Ok(())
     }
 
@@ -334,6 +381,6 @@ impl Received<'_> {
 
     /// Whether it belongs to this subscription.
     pub fn is_of<T>(&self, subscription: &Subscription<T>) -> bool {
-        self.mailbox == local::DATA && self.id == subscription.id
+        (self.mailbox, self.id) == (subscription.mailbox, subscription.id)
     }
 }
