@@ -17,7 +17,7 @@ use crate::sink::{self, Address, Canvas, CloseError, Sink, Surface};
 use crate::store::Store;
 use rerun::ApplicationId;
 use rerun::external::re_log_types::RecordingId;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -79,7 +79,7 @@ impl Pen {
             Sink::Window => Some(Address::of_window()),
             Sink::File { path, .. } => {
                 // Before anything else, so that a wrong path is told to whoever wrote it.
-                let made = std::fs::File::create(path);
+                let made = put_aside(path).and_then(|()| std::fs::File::create(path));
                 made.map_err(|cause| sink::OpenError::File { path: path.clone(), cause })?;
                 None
             }
@@ -126,6 +126,21 @@ impl Pen {
     }
 }
 
+/// Where a drawing goes when another begins in its place.
+fn old(path: &Path) -> PathBuf {
+    path.with_extension("old.rrd")
+}
+
+/// Keeps the drawing of an earlier run: a bridge that is started again must not destroy what it drew before.
+fn put_aside(path: &Path) -> std::io::Result<()> {
+    // Devices and pipes stay where they are, and an empty file is no loss.
+    if path.metadata().is_ok_and(|file| file.is_file() && file.len() > 0) {
+        std::fs::rename(path, old(path))?;
+        tracing::info!("the drawing before is {} now", old(path).display());
+    }
+    Ok(())
+}
+
 /// What the thread has.
 struct Work {
     shared: Arc<Shared>,
@@ -159,7 +174,7 @@ impl Work {
                     return Ok(());
                 }
                 (End::Full, None) => {
-                    let old = path.with_extension("old.rrd");
+                    let old = old(path);
                     if let Err(error) = std::fs::rename(path, &old) {
                         self.fail(&format_args!("cannot rename {} to {}: {error}", path.display(), old.display()));
                         return Ok(());

@@ -205,6 +205,16 @@ mod tests {
     }
 
     #[test]
+    fn a_drawing_that_is_there_is_put_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.rrd");
+        std::fs::write(&path, "hours of work").unwrap();
+        Scene::open("lab", Sink::file(&path), 0.0, 0).unwrap().close().unwrap();
+        assert_eq!(std::fs::read(folder.path().join("scene.old.rrd")).unwrap(), b"hours of work");
+        assert!(std::fs::read(path).unwrap().starts_with(b"RRF2"));
+    }
+
+    #[test]
     fn sinks_that_cannot_be_say_why() {
         for (sink, why) in [
             (Sink::file("/no/such/folder/scene.rrd"), "cannot write the drawing to /no/such/folder/scene.rrd: "),

@@ -86,7 +86,8 @@ pub(super) fn short(seconds: f64) -> String {
 fn fine(seconds: f64) -> String {
     let us = seconds * 1e6;
     match us {
-        us if us < 9_999.5 => format!("{us:.1} µs"),
+        us if us < 999.95 => format!("{us:.1} µs"),
+        us if us < 9_999.5 => format!("{:.3} ms", us / 1e3),
         us if us < 9_999_500.0 => format!("{:.2} ms", us / 1e3),
         us => format!("{:.2} s", us / 1e6),
     }
