@@ -1,13 +1,13 @@
 //! `rohrpost call`: a function of any module, by the module's own description.
 
 use super::target::Target;
+use super::units::seconds;
 use super::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::description::{Description, Function};
 use rohrpost::value::{Value, decode, describe_result, describe_type, encode, parse_argument};
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
-use std::time::Duration;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -51,11 +51,6 @@ fn usage_of_common(name: &str) -> Option<&'static str> {
         "output-level" => "one level (error, warn, info, debug or trace)",
         _ => return None,
     })
-}
-
-/// A time that a user gave in seconds.
-pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
-    Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {

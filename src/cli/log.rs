@@ -76,7 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let settings: Vec<Setting> =
         settings.iter().map(|(name, level)| Setting::read(name, level, &running)).collect::<Result<_, _>>()?;
     let since = arguments.since.as_deref().map(rohrpost::config::parse_duration).transpose()?;
-    let mut tool = running.join(super::call::seconds(arguments.timeout)?)?;
+    let mut tool = running.join(super::units::seconds(arguments.timeout)?)?;
     if arguments.levels {
         let code = levels::list(&running, arguments.json, &mut tool);
         tool.close();

@@ -19,6 +19,7 @@ mod manager;
 mod new;
 mod param;
 mod ping;
+mod published;
 mod run;
 mod send;
 mod status;
@@ -26,6 +27,7 @@ mod summary;
 mod table;
 mod target;
 mod top;
+mod units;
 mod version;
 mod watch;
 

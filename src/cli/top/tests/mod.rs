@@ -70,6 +70,10 @@ fn json_says_what_the_screen_says() {
     assert_eq!(mapper["module"], "mapper.0");
     assert_eq!((&mapper["state"], &mapper["error"]), (&"error".into(), &"no scan has come for 5 s".into()));
     assert_eq!((&mapper["sent_per_s"], &mapper["cpu_percent"]), (&1.0.into(), &40.0.into()));
+    let motor = &json["modules"][1];
+    let nobodys = (&motor["lost"], &motor["lost_by_cause"], &motor["replaced"], &motor["lost_per_s"]);
+    assert_eq!(nobodys, (&0.into(), &serde_json::json!({}), &12.into(), &0.0.into()), "replaced is not lost");
+    assert_eq!(json["replaced"], 12);
     assert_eq!((&mapper["lost"], &mapper["lost_by_cause"]), (&9.into(), &serde_json::json!({ "refused": 9 })));
     let gui = &json["modules"][4];
     for key in ["pid", "sent_per_s", "cpu_percent", "memory_bytes", "waited_p99_ns", "uptime_s"] {
