@@ -128,7 +128,11 @@ fn postcard_u64(bytes: &[u8]) -> Option<(u64, &[u8])> {
 
 fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Result<Value, Failure> {
     let description = tool.describe(module)?;
-    let (function, body) = prepare(&description, name, texts)?;
+    let function = description.function(name).ok_or_else(|| {
+        let own: String = names(&description).iter().map(|name| format!("{name}, ")).collect();
+        format!("no function `{name}`; it has: {own}on, off, status, get DATA, output-level LEVEL")
+    })?;
+    let body = body_of(function, texts)?;
     let write = |to: &mut Vec<u8>| {
         to.extend_from_slice(&body);
         Ok(())
@@ -137,17 +141,13 @@ fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Resu
     Ok(decode(&function.result, &bytes)?)
 }
 
-/// A function by its name, and its arguments as they go into a package.
-pub(super) fn prepare<'a>(
-    description: &'a Description,
-    name: &str,
-    texts: &[String],
-) -> Result<(&'a Function, Vec<u8>), Failure> {
-    let function = description.function(name).ok_or_else(|| {
-        let names: Vec<&str> = description.functions.iter().map(|function| function.name.as_str()).collect();
-        let own = if names.is_empty() { String::new() } else { format!("{}, ", names.join(", ")) };
-        format!("no function `{name}`; it has: {own}on, off, status, get DATA, output-level LEVEL")
-    })?;
+/// Names of a module's own functions.
+pub(super) fn names(description: &Description) -> Vec<&str> {
+    description.functions.iter().map(|function| function.name.as_str()).collect()
+}
+
+/// Arguments as they go into a package.
+pub(super) fn body_of(function: &Function, texts: &[String]) -> Result<Vec<u8>, Failure> {
     if function.arguments.len() != texts.len() {
         return Err(
             format!("{} takes {} arguments, not {}", usage(function), function.arguments.len(), texts.len()).into()
@@ -163,7 +163,7 @@ pub(super) fn prepare<'a>(
         };
         body.extend(encode(&argument.ty, &value).map_err(|error| format!("{}: {error}", argument.name))?);
     }
-    Ok((function, body))
+    Ok(body)
 }
 
 /// A function with the names and types of its arguments.

@@ -1,11 +1,11 @@
 //! `rohrpost send`: a command over and over, as somebody at a keyboard would send it. Unlike `call` it waits for no answer
 //! before it sends the next; answers are counted.
 
-use super::call::prepare;
+use super::call::{COMMON, body_of, names};
 use super::target::{Running, Target};
 use super::units::{Stop, rate, seconds};
 use super::{Failure, say};
-use rohrpost::description::Function;
+use rohrpost::description::{Description, Function};
 use rohrpost::mailbox::wait_any;
 use rohrpost::value::{Value, decode};
 use rohrpost::{CallError, Name, ToolLink};
@@ -51,7 +51,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let period = Duration::from_secs_f64(1.0 / arguments.rate);
     let timeout = seconds(arguments.timeout)?;
     let description = running.noted(module)?;
-    let (function, body) = prepare(&description, &arguments.function, &arguments.arguments)?;
+    let function = description.function(&arguments.function).ok_or_else(|| no_function(arguments, &description))?;
+    let body = body_of(function, &arguments.arguments)?;
     let stop = Stop::new()?;
     let mut sending = Sending {
         running: &running,
@@ -86,6 +87,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         sending.collect_until(deadline.min(Instant::now() + LOOK));
     }
     sending.finish(arguments.json)
+}
+
+/// Why there is nothing to send. What every module has besides, such as `off`, nobody needs over and over.
+fn no_function(arguments: &Arguments, description: &Description) -> String {
+    let (name, function) = (&arguments.name, &arguments.function);
+    if COMMON.iter().any(|(common, _)| common == function) {
+        return format!("`{function}` is not for send, but for once: `rohrpost call {name} {function}`");
+    }
+    match &names(description)[..] {
+        [] => format!("no function `{function}`; {name} has none to send"),
+        own => format!("no function `{function}`; it has: {}", own.join(", ")),
+    }
 }
 
 /// A command that is sent again and again.

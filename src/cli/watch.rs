@@ -301,7 +301,7 @@ mod tests {
 
     #[test]
     fn what_has_stopped_is_slower_with_each_look() {
-        assert_eq!(rate(100, [99.0, 100.0, 104.0, 109.0]), (Some(10.0), true));
+        assert_eq!(rate(90, [100.0, 100.0, 104.0, 109.0]), (Some(10.0), true));
         // A burst of 0.1 s, and nothing for 0.9 s.
         assert_eq!(rate(100, [100.0, 100.0, 100.1, 101.0]), (Some(100.0), true));
         assert_eq!(rate(0, [50.0, 100.0, 50.0, 110.0]), (None, true));

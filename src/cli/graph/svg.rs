@@ -284,7 +284,7 @@ mod tests {
         Graph {
             installation: "test".into(),
             node: "main".into(),
-            seconds: 2.0,
+            interval_s: 2.0,
             modules: (0..modules).map(module).collect(),
             edges: edges.iter().map(edge).collect(),
         }
