@@ -5,12 +5,13 @@
 //! never a sender that waits.
 
 use crate::store::DrawingCounts;
-use crate::subjects::Subjects;
+use crate::subjects::{NEWEST, Subjects};
 use crate::view::Views;
 use crate::{RATE_HZ, Scene, Sink, views};
+use rohrpost::config::MailboxSpec;
 use rohrpost::interface::{Interface, Proxy};
 use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
-use rohrpost::mailbox::{ModuleState, Node};
+use rohrpost::mailbox::{Full, ModuleState, Node, Shape};
 use rohrpost::survey::Survey;
 use rohrpost::{Context, Module, ModuleError, Name, Received};
 use serde::Deserialize;
@@ -21,6 +22,8 @@ use std::time::Duration;
 
 /// States and charts are drawn so often.
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
+/// Data whose newest values may wait while the bridge stands still; of more, the least important go missing.
+const NEWEST_SLOTS: u16 = 64;
 /// The collector answers within this time, or its earlier lines are not drawn.
 const PATIENCE: Duration = Duration::from_millis(300);
 const MIB: u64 = 1024 * 1024;
@@ -91,7 +94,9 @@ impl<V: Views> Module for Bridge<V> {
         }
         let me = installation.module(context.me()).ok_or_else(|| ModuleError::new("it is not in the configuration"))?;
         let node_name = me.node.clone();
+        let newest = newest(&me.mailboxes.data);
         let node = context.link().borrow().participant().node().clone();
+        context.open_mailbox(NEWEST, newest)?;
         let subjects = Subjects::new(V::make(), context);
         context.set_period(SURVEY_PERIOD);
         Ok(Self { sink, rate_hz, subjects, scene: None, node, node_name, last: None, views: PhantomData })
@@ -102,8 +107,7 @@ impl<V: Views> Module for Bridge<V> {
         let scene = Scene::open(&context.installation().name, self.sink.clone(), self.rate_hz, now_ns)?;
         self.scene.insert(scene).arrange(self.subjects.layout());
         let survey = Survey::new(&self.node, context.installation(), &self.node_name)?;
-        self.find(context, &survey);
-        Ok(())
+        self.find(context, &survey)
     }
 
     fn off(&mut self, _: &mut Context) {
@@ -115,7 +119,7 @@ impl<V: Views> Module for Bridge<V> {
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let survey = Survey::new(&self.node, context.installation(), &self.node_name)?;
-        self.find(context, &survey);
+        self.find(context, &survey)?;
         self.subjects.repair(context);
         let now_ns = context.now().ns;
         let Some(scene) = &mut self.scene else { return Ok(()) };
@@ -147,7 +151,7 @@ impl<V: Views> Drawing for Bridge<V> {
 
 impl<V> Bridge<V> {
     /// Looks for what has begun to run since the last time.
-    fn find(&mut self, context: &mut Context, survey: &Survey) {
+    fn find(&mut self, context: &mut Context, survey: &Survey) -> Result<(), ModuleError> {
         let collector = context.installation().classes.id(CollectorInterface::CLASS);
         // One that starts or hangs would be waited for in vain.
         let runs = |name: Name| {
@@ -159,12 +163,24 @@ impl<V> Bridge<V> {
             if Some(name.class()) == collector {
                 spoken = Some(name);
             }
-        });
-        let Some(scene) = self.scene.as_mut().filter(|_| more) else { return };
+        })?;
+        let Some(scene) = self.scene.as_mut().filter(|_| more) else { return Ok(()) };
         scene.arrange(self.subjects.layout());
         if let Some(collector) = spoken {
             earlier_lines(scene, collector, context);
         }
+        Ok(())
+    }
+}
+
+/// The mailbox beside the data mailbox, as that is configured: what fits in one fits in the other.
+fn newest(data: &MailboxSpec) -> Shape {
+    Shape {
+        slots: NEWEST_SLOTS,
+        body_bytes_max: u16::try_from(data.size).unwrap_or(u16::MAX),
+        full: Full::Latest,
+        max_age: data.max_age,
+        ..Shape::default()
     }
 }
 

@@ -39,7 +39,7 @@ pub use scene::{DrawError, RATE_HZ, Scene, entity};
 pub use sink::{CloseError, OpenError, Sink};
 pub use states::Level;
 pub use store::{BYTES_MAX, DrawingCounts, ENTITIES_MAX, LINE_BYTES_MAX, LINES_MAX};
-pub use view::{Datum, View, Views};
+pub use view::{Datum, View, Views, Wish};
 pub use world::{MAP_CELLS_MAX, TILES_MAX};
 
 /// Runs a bridge with views of one's own, which are asked before those that are built in: the whole of its `main`.

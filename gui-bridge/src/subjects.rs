@@ -7,16 +7,20 @@ use rohrpost::config::Show;
 use rohrpost::description::{DataItem, Description};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
-use rohrpost::{Context, Name, Rate, Received, Subscription};
+use rohrpost::mailbox::local;
+use rohrpost::{Context, ContextError, Name, Rate, Received, Subscription};
 use std::time::{Duration, Instant};
 
+/// The mailbox for what tells how things are now: while the bridge stands still, a newer package takes an older one's place. Its
+/// data mailbox has all that must come in order and without gaps.
+pub(crate) const NEWEST: u8 = 3;
 /// A module whose description is wanted answers within this time, or is asked again later.
 const PATIENCE: Duration = Duration::from_millis(300);
 /// A module is asked at most so often to send everything once more.
 const REPAIR: Duration = Duration::from_secs(5);
 
-/// One entry of `[gui] show`.
-struct Wish {
+/// One of `[gui] show`.
+struct Entry {
     from: Name,
     module: String,
     /// None: all that its module has a view for.
@@ -50,7 +54,7 @@ struct Repair {
 /// See the module's text.
 pub(crate) struct Subjects {
     views: Vec<Box<dyn View>>,
-    wishes: Vec<Wish>,
+    entries: Vec<Entry>,
     subjects: Vec<Subject>,
 }
 
@@ -59,22 +63,28 @@ impl Subjects {
     pub(crate) fn new(own: Vec<Box<dyn View>>, context: &Context) -> Self {
         let installation = context.installation();
         let text = |name| installation.classes.format(name);
-        let wish = |show: &Show| Wish {
+        let entry = |show: &Show| Entry {
             from: show.from,
             module: text(show.from),
             data: show.data.clone(),
             rate: show.rate.map(Rate::hz),
             answered: false,
         };
-        let mut wishes: Vec<Wish> = installation.gui.show.iter().map(wish).collect();
+        let mut entries: Vec<Entry> = installation.gui.show.iter().map(entry).collect();
         if let Some(class) = installation.classes.id(CollectorInterface::CLASS) {
             let from = Name::new(installation.system.id, class.0, 0, 0);
             if installation.module(from).is_some() {
-                wishes.push(Wish { from, module: text(from), data: Some("line".into()), rate: None, answered: false });
+                entries.push(Entry {
+                    from,
+                    module: text(from),
+                    data: Some("line".into()),
+                    rate: None,
+                    answered: false,
+                });
             }
         }
         let views = own.into_iter().chain(views::built_in()).collect();
-        Self { views, wishes, subjects: Vec::new() }
+        Self { views, entries, subjects: Vec::new() }
     }
 
     /// Asks modules that run for descriptions that are missing, and subscribes to what they tell; arranges the views anew when
@@ -84,36 +94,38 @@ impl Subjects {
         context: &mut Context,
         runs: impl Fn(Name) -> bool,
         mut found: impl FnMut(Name),
-    ) -> bool {
+    ) -> Result<bool, ContextError> {
         let before = self.subjects.len();
-        for wish in self.wishes.iter_mut().filter(|wish| !wish.answered && runs(wish.from)) {
-            let description = match rohrpost::describe(&mut context.link().borrow_mut(), wish.from, PATIENCE) {
+        for entry in self.entries.iter_mut().filter(|entry| !entry.answered && runs(entry.from)) {
+            let description = match rohrpost::describe(&mut context.link().borrow_mut(), entry.from, PATIENCE) {
                 Ok(description) => description,
                 Err(error) => {
-                    tracing::debug!("{} does not describe itself yet: {error}", wish.module);
+                    tracing::debug!("{} does not describe itself yet: {error}", entry.module);
                     continue;
                 }
             };
-            wish.answered = true;
-            let items = wish.items(&description, &self.views);
+            entry.answered = true;
+            let items = entry.items(&description, &self.views);
             for item in items {
-                let known = |subject: &Subject| subject.from == wish.from && subject.item.number == item.number;
+                let known = |subject: &Subject| subject.from == entry.from && subject.item.number == item.number;
                 let Some(view) = self.views.iter().position(|view| view.wants(&description, &item)) else { continue };
                 if self.subjects.iter().any(known) {
                     continue;
                 }
-                found(wish.from);
-                let rate = wish.rate.unwrap_or_else(|| self.views[view].rate());
+                found(entry.from);
+                let wish = self.views[view].wish();
+                let mailbox = if wish.each { local::DATA } else { NEWEST };
+                let rate = entry.rate.unwrap_or(wish.rate);
                 let interface = description.hash();
-                let subscription = context.subscribe_untyped(wish.from, item.number, interface, rate);
-                let repair = self.views[view].repair(&description);
+                let subscription = context.subscribe_untyped(mailbox, entry.from, item.number, interface, rate)?;
+                let repair = self.views[view].repair(&description).filter(|_| wish.each);
                 // It may have sent much before anybody listened.
                 let repair = repair.map(|function| Repair { function, interface, wanted: true, asked: None });
-                let (from, module) = (wish.from, wish.module.clone());
+                let (from, module) = (entry.from, entry.module.clone());
                 self.subjects.push(Subject { from, module, item, subscription, view, expected: 0, repair });
             }
         }
-        self.subjects.len() > before
+        Ok(self.subjects.len() > before)
     }
 
     /// The tabs of all views that have something to draw, in the order of the views.
@@ -163,7 +175,7 @@ impl Subjects {
     }
 }
 
-impl Wish {
+impl Entry {
     /// The data of a module that are wanted; those that only the last view, which wants all, would draw are not worth it
     /// unless they are all that there is.
     fn items(&self, description: &Description, views: &[Box<dyn View>]) -> Vec<DataItem> {

@@ -14,10 +14,9 @@ pub trait View {
     /// Whether it draws this datum of a module that describes itself so.
     fn wants(&self, module: &Description, item: &DataItem) -> bool;
 
-    /// How often it wants values for which the configuration names no rate. [`Rate::Each`] for those that are parts of
-    /// something larger, such as the tiles of a map.
-    fn rate(&self) -> Rate {
-        Rate::hz(RATE_HZ)
+    /// Which of the values it wants: the newest, or each.
+    fn wish(&self) -> Wish {
+        Wish::newest()
     }
 
     /// Draws one value. The scene's time is the value's.
@@ -32,9 +31,36 @@ pub trait View {
     }
 
     /// The number of a function without arguments by which a module sends everything once more: it is called when a part was
-    /// lost on the way.
+    /// lost on the way, if the view wants each.
     fn repair(&self, _module: &Description) -> Option<u16> {
         None
+    }
+}
+
+/// Which values of a datum a view wants. A `rate` in the configuration says how often instead of this.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wish {
+    pub(crate) rate: Rate,
+    pub(crate) each: bool,
+}
+
+impl Wish {
+    /// The newest, [`RATE_HZ`] times a second: for all that tells how things are now, such as a pose, a scan, a number. A bridge
+    /// that stood still for a while goes on with what is true then.
+    pub fn newest() -> Self {
+        Self { rate: Rate::hz(RATE_HZ), each: false }
+    }
+
+    /// Each, in order: for what is a part of something larger, such as the patches of a map, and for what happens, such as lines
+    /// of text. They wait in the bridge's data mailbox; what finds no room there is lost.
+    pub fn each() -> Self {
+        Self { rate: Rate::Each, each: true }
+    }
+
+    /// The same, so often.
+    #[must_use]
+    pub fn at(self, rate: Rate) -> Self {
+        Self { rate, ..self }
     }
 }
 

@@ -3,8 +3,7 @@
 use crate::blueprint::Tab;
 use crate::scene::{DrawError, Scene};
 use crate::states::Level;
-use crate::view::{Datum, View};
-use rohrpost::Rate;
+use crate::view::{Datum, View, Wish};
 use rohrpost::description::{DataItem, Description};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CartographerInterface;
@@ -72,8 +71,8 @@ impl View for Mapper {
         is::<OccupancyGrid>(item)
     }
 
-    fn rate(&self) -> Rate {
-        Rate::Each
+    fn wish(&self) -> Wish {
+        Wish::each()
     }
 
     fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
@@ -113,8 +112,8 @@ impl View for Output {
         is::<OutputLine>(item)
     }
 
-    fn rate(&self) -> Rate {
-        Rate::Each
+    fn wish(&self) -> Wish {
+        Wish::each()
     }
 
     fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {

@@ -16,7 +16,7 @@ pub const STATUS: u16 = 3;
 pub const GET_DATA: u16 = 4;
 /// Subscribes: [`Subscribe`].
 pub const SUBSCRIBE: u16 = 5;
-/// Ends a subscription: its id (u16).
+/// Ends a subscription: [`Unsubscribe`].
 pub const UNSUBSCRIBE: u16 = 6;
 /// Sets which output lines the module sends: [`OutputLevel`]. The answer is the level before, as in [`Status`].
 pub const OUTPUT_LEVEL: u16 = 7;
@@ -29,8 +29,8 @@ pub const SET_PARAMETERS: u16 = 10;
 /// Numbers from here on are the interfaces' own.
 pub const FIRST_OWN: u16 = 16;
 
-/// Hash that commands to the common functions carry: they are of no interface and change with the layout version only.
-pub const HASH: u32 = 1;
+/// Hash that commands to the common functions carry, which are of no interface: raised whenever one of them changes.
+pub const HASH: u32 = 2;
 
 /// Bytes of a description that go into one reply, so that it fits every reply mailbox.
 pub const DESCRIPTION_PART: usize = 768;
@@ -102,6 +102,17 @@ pub struct Subscribe {
     pub period_us: u32,
     /// Without renewal it ends after this time, ms.
     pub lease_ms: u32,
+    /// To which of the subscriber's mailboxes the packages go: local id 2 (data) or above.
+    pub mailbox: u8,
+}
+
+/// Ends a subscription.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Unsubscribe {
+    /// As it was subscribed.
+    pub id: u16,
+    /// Likewise.
+    pub mailbox: u8,
 }
 
 /// Which output lines a module sends.
@@ -203,6 +214,7 @@ const fn _all_common_types_are_data() {
     const fn data<T: Data>() {}
     data::<Status>();
     data::<Subscribe>();
+    data::<Unsubscribe>();
     data::<OutputLevel>();
     data::<DescriptionPart>();
     data::<SetParameters>();

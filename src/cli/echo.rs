@@ -2,9 +2,9 @@
 
 use super::target::Target;
 use super::{Failure, say};
-use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE};
+use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use rohrpost::description::{DataItem, Description};
-use rohrpost::mailbox::Kind;
+use rohrpost::mailbox::{Kind, local};
 use rohrpost::value::decode;
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
@@ -54,10 +54,12 @@ fn echo(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(), 
     let item =
         choose(&description, arguments.data.as_deref()).map_err(|error| format!("{}: {error}", arguments.name))?;
     let rate_us = if arguments.rate > 0.0 { (1e6 / arguments.rate) as u32 } else { 0 };
-    let wish = Subscribe { number: item.number, id: 1, period_us: rate_us, lease_ms: LEASE.as_millis() as u32 };
+    let mailbox = local::DATA;
+    let wish =
+        Subscribe { number: item.number, id: 1, period_us: rate_us, lease_ms: LEASE.as_millis() as u32, mailbox };
     let result = follow(arguments, module, &description, item, wish, tool);
     // The module may have ended meanwhile; its lease would end anyway.
-    let _ = tool.common::<()>(module, UNSUBSCRIBE, &(wish.id,));
+    let _ = tool.common::<()>(module, UNSUBSCRIBE, &Unsubscribe { id: wish.id, mailbox });
     result
 }
 

@@ -31,6 +31,7 @@ mod readme;
 mod restart;
 mod screen;
 mod start;
+mod subscribe;
 mod terminal;
 mod tools;
 mod tools_data;

@@ -6,7 +6,7 @@ use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::common::{SUBSCRIBE, Subscribe};
 use rohrpost::macro_support::append;
-use rohrpost::mailbox::{Receiver, monotonic_ns};
+use rohrpost::mailbox::{Receiver, local, monotonic_ns};
 use serde_json::Value;
 use std::time::Duration;
 
@@ -72,7 +72,7 @@ fn figures_agree_with_a_known_source() {
     let place = Place::new();
     let (_launch, robot) = place.launched(&[&probe("probe.0", "blob-hz = 150.0", "start = \"off\"")]);
     let mut tool = robot.tool(PATIENCE);
-    let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 600_000 };
+    let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 600_000, mailbox: local::DATA };
     tool.data().unwrap();
     let write = |body: &mut Vec<u8>| append(body, &wish);
     wait("probe.0 is ready", || (robot.state("probe.0") == "off").then_some(()));
@@ -252,9 +252,9 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
     assert!(blob.starts_with("blob     "), "{text}");
     for (arguments, error) in [
         (&["hz", "probe.0", "bleat"][..], "probe.0 has no data `bleat`; it has: beat, silence, blob\n"),
-        (&["hz", "probe.7"], "probe.7 has no mailboxes here; `rohrpost list` shows those that run\n"),
-        (&["bw", "probe.7"], "probe.7 has no mailboxes here; `rohrpost list` shows those that run\n"),
-        (&["delay", "probe.7"], "probe.7 has no mailboxes here; `rohrpost list` shows those that run\n"),
+        (&["hz", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
+        (&["bw", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
+        (&["delay", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
         (&["hz", "probe.0", "--window", "0"], "a window of 0 s holds nothing; try --window 1\n"),
     ] {
         assert_eq!(place.say(arguments).fails(), error);
@@ -359,7 +359,7 @@ fn ping_counts_answers_and_ends_at_its_deadline() {
     signal(pid, Signal::SIGCONT);
     place.say(&["ping", "probe.0", "-c", "1"]).ok();
     let error = place.say(&["ping", "probe.3", "-c", "1"]).fails();
-    assert!(error.contains("there is no such module on this node; see `rohrpost list`"), "{error}");
+    assert!(error.contains("the configuration has no module `probe.3`; there are probe.0"), "{error}");
 }
 
 #[test]

@@ -4,8 +4,9 @@
 //! are, and no program for tests alone is ever installed.
 
 use nix::sys::signal::{SigHandler, Signal, raise, signal};
+use rohrpost::mailbox::{Full, Shape};
 use rohrpost::serde::Deserialize;
-use rohrpost::{Context, Module, ModuleError};
+use rohrpost::{Context, Module, ModuleError, Rate, Received, Subscription};
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,9 @@ pub(crate) const COUNT: u16 = 16;
 pub(crate) const COUNT_AGAIN: u16 = 17;
 pub(crate) const ABORT: u16 = 19;
 pub(crate) const WORK: u16 = 23;
+
+/// A mailbox of its own, of policy `latest`.
+pub(crate) const NEWEST: u8 = 3;
 
 /// Why a probe refuses.
 #[rohrpost::data]
@@ -131,6 +135,8 @@ pub(crate) struct Settings {
     refuse_on: bool,
     /// Stops itself as Ctrl-Z would, before it is ready.
     hang_at_start: bool,
+    /// Hears each beat of this probe twice: in its data mailbox, and in [`NEWEST`].
+    hears: Option<String>,
     /// Does nothing on any signal that asks it to end.
     ignore_stop: bool,
 }
@@ -150,6 +156,8 @@ pub(crate) struct Probe {
     counted: u64,
     beats: u64,
     leave: Option<i32>,
+    /// Each, and the newest.
+    hears: Option<[Subscription<u64>; 2]>,
 }
 
 impl Probe {
@@ -179,6 +187,16 @@ impl Probe {
     }
 }
 
+/// Follows another probe's beats in two mailboxes; one that nobody opened is refused.
+fn hear(from: &str, context: &mut Context) -> Result<[Subscription<u64>; 2], ModuleError> {
+    let beat = ProbingInterface::BEAT;
+    let refused = context.subscribe_in(NEWEST, beat, from, Rate::Each).err().unwrap().to_string();
+    assert!(refused.contains("no mailbox 3 for data; make it with `open_mailbox`"), "{refused}");
+    context.open_mailbox(NEWEST, Shape { slots: 8, full: Full::Latest, ..Shape::default() })?;
+    let newest = context.subscribe_in(NEWEST, beat, from, Rate::Each)?;
+    Ok([context.subscribe(beat, from, Rate::Each)?, newest])
+}
+
 impl Module for Probe {
     type Settings = Settings;
     type Interfaces = ProbingInterface;
@@ -188,7 +206,8 @@ impl Module for Probe {
         let record = settings.record.as_ref().map(|file| context.path(file));
         let rate_hz = [settings.blob_hz, settings.rate_hz].into_iter().find(|rate| *rate > 0.0).unwrap_or(100.0);
         context.set_period(Duration::from_secs_f64(1.0 / rate_hz));
-        let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None };
+        let hears = settings.hears.as_deref().map(|from| hear(from, context)).transpose()?;
+        let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None, hears };
         probe.note("start");
         if probe.settings.panic_at_start {
             panic!("a probe was asked to panic");
@@ -224,6 +243,15 @@ impl Module for Probe {
 
     fn off(&mut self, _: &mut Context) {
         self.note("off");
+    }
+
+    fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
+        for (which, subscription) in ["each", "newest"].iter().zip(self.hears.iter().flatten()) {
+            if let Some(beat) = data.read(subscription) {
+                self.note(&format!("{which} {beat}"));
+            }
+        }
+        Ok(())
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {

@@ -8,5 +8,6 @@ mod drawings;
 mod own_view;
 mod programs;
 mod robot;
+mod stopped;
 mod torture;
 mod viewer;

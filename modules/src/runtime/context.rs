@@ -6,7 +6,7 @@ use crate::common::DataHead;
 use crate::interface::{DataPort, Proxy, append};
 use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
-use rohrpost_config::{Installation, NameTextError};
+use rohrpost_config::{ClassTable, Installation, NameTextError};
 use rohrpost_mailbox::{
     CreateError, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime,
     Type, Watch, Watches, local,
@@ -39,6 +39,9 @@ pub enum ContextError {
         /// The interface's class.
         wanted: &'static str,
     },
+    /// A subscription into a mailbox that this module has not opened.
+    #[error("this module has no mailbox {0} for data; make it with `open_mailbox` before it is subscribed into")]
+    NoMailbox(u8),
     /// Data that no face of this module publishes.
     #[error("this module has no face of class `{0}`; add one to `faces` in the configuration, or to its `Interfaces`")]
     NoFace(&'static str),
@@ -61,6 +64,8 @@ pub struct Context {
     pub(crate) clock: SystemClock,
     /// Mailboxes of the module's own, besides commands, replies and data.
     pub(crate) own: Vec<Receiver>,
+    /// Their local ids.
+    opened: Vec<u8>,
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
     pub(crate) period: Option<Duration>,
@@ -88,6 +93,7 @@ impl Context {
             followings: Followings::default(),
             clock,
             own: Vec::new(),
+            opened: Vec::new(),
             watches: None,
             period: None,
             next_tick: None,
@@ -151,23 +157,64 @@ impl Context {
         module: &str,
         rate: Rate,
     ) -> Result<Subscription<T>, ContextError> {
+        self.subscribe_in(local::DATA, port, module, rate)
+    }
+
+    /// The same, but the data come to a mailbox of the module's own, which [`Context::open_mailbox`] has made: one with
+    /// another policy than the data mailbox has, or one that others cannot fill.
+    ///
+    /// # Errors
+    /// [`ContextError::NoMailbox`] too, when there is no such mailbox.
+    pub fn subscribe_in<T: Data>(
+        &mut self,
+        mailbox: u8,
+        port: DataPort<T>,
+        module: &str,
+        rate: Rate,
+    ) -> Result<Subscription<T>, ContextError> {
         let from = self.named(module, port.class)?;
-        Ok(Subscription::new(self.followings.follow(from, port.number, (port.hash)(), rate)))
+        self.follow(mailbox, from, port.number, (port.hash)(), rate)
     }
 
-    /// Subscribes to data whose type is known by its description alone.
-    pub fn subscribe_untyped(&mut self, from: Name, number: u16, interface: u32, rate: Rate) -> Subscription<()> {
-        Subscription::new(self.followings.follow(from, number, interface, rate))
+    /// Subscribes to data whose type is known by its description alone. They come to `mailbox`: [`local::DATA`], or one of the
+    /// module's own.
+    ///
+    /// # Errors
+    /// [`ContextError::NoMailbox`], when there is no such mailbox.
+    pub fn subscribe_untyped(
+        &mut self,
+        mailbox: u8,
+        from: Name,
+        number: u16,
+        interface: u32,
+        rate: Rate,
+    ) -> Result<Subscription<()>, ContextError> {
+        self.follow(mailbox, from, number, interface, rate)
     }
 
-    /// Makes a mailbox of the module's own, local id 3 or more. What it brings comes to [`crate::Module::received`]; bodies
-    /// begin as those of subscribed data do.
+    fn follow<T>(
+        &mut self,
+        mailbox: u8,
+        from: Name,
+        number: u16,
+        interface: u32,
+        rate: Rate,
+    ) -> Result<Subscription<T>, ContextError> {
+        if mailbox != local::DATA && !self.opened.contains(&mailbox) {
+            return Err(ContextError::NoMailbox(mailbox));
+        }
+        Ok(Subscription::new(self.followings.follow(mailbox, from, number, interface, rate), mailbox))
+    }
+
+    /// Makes a mailbox of the module's own, local id 3 or more. What it brings comes to [`crate::Module::received`]: data that
+    /// were subscribed to with [`Context::subscribe_in`], and packages of others whose bodies begin as those of data do.
     ///
     /// # Errors
     /// When it cannot be made.
     pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
         let participant = self.link.borrow().participant().clone();
         self.own.push(participant.receiver(self.me.with_local(local), shape)?);
+        self.opened.push(local);
         Ok(())
     }
 
@@ -221,12 +268,13 @@ impl Context {
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
         let at = self.newest_at(face, port.number);
         let newest = &mut self.newest[at];
-        newest.stamp_ns = stamp_ns;
+        (newest.name, newest.stamp_ns) = (port.name, stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);
         let (newest, link, faces) = (&self.newest[at], &self.link, &self.faces);
         let age = Duration::from_nanos(self.clock.now().ns.saturating_sub(stamp_ns));
         self.publications.published(faces[face], Type::data(port.number), newest.value.len(), age);
-        self.subscriptions.published(newest, |to| deliver(link, faces, newest, to));
+        let classes = &self.installation.classes;
+        self.subscriptions.published(newest, |to| deliver(link, classes, faces, newest, to));
         Ok(())
     }
 
@@ -250,10 +298,10 @@ impl Context {
 
     /// Delivers periodic data that is due.
     pub(crate) fn deliver_due(&mut self, now_ns: u64) {
-        let (all, link, faces) = (&self.newest, &self.link, &self.faces);
+        let (all, link, faces, classes) = (&self.newest, &self.link, &self.faces, &self.installation.classes);
         self.subscriptions.tick(now_ns, |to| {
             match all.iter().find(|newest| (newest.face, newest.number) == (to.face, to.wish.number)) {
-                Some(newest) => deliver(link, faces, newest, to),
+                Some(newest) => deliver(link, classes, faces, newest, to),
                 // Fresh, so there is one.
                 None => Delivery::Sent,
             }
@@ -262,7 +310,13 @@ impl Context {
 }
 
 /// Sends a value to a subscriber.
-fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::Subscription) -> Delivery {
+fn deliver(
+    link: &Caller,
+    classes: &ClassTable,
+    faces: &[Name],
+    newest: &Newest,
+    to: &crate::publish::Subscription,
+) -> Delivery {
     let head = DataHead { stamp_ns: newest.stamp_ns, sequence: to.sequence, missed: to.missed };
     let label = Label {
         from: faces[newest.face].with_local(local::COMMANDS),
@@ -274,7 +328,16 @@ fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::
     match link.borrow_mut().send(to.to, &label, &[&head.to_bytes(), &newest.value]) {
         Ok(()) => Delivery::Sent,
         Err(SendError::NoMailbox(_)) => Delivery::Gone,
-        Err(error @ SendError::TooLarge { .. }) => Delivery::TooLarge(error),
+        Err(SendError::TooLarge { len, max, .. }) => {
+            if !to.told {
+                let (data, subscriber) = (newest.name, classes.format(to.to.module()));
+                tracing::error!(
+                    "`{data}` cannot be delivered to {subscriber}: it has {len} bytes, and the data mailbox there takes \
+                     {max}; raise `size` in [module.mailbox.data] of {subscriber}"
+                );
+            }
+            Delivery::TooLarge
+        }
         Err(_) => Delivery::Full,
     }
 }
@@ -318,6 +381,6 @@ impl Received<'_> {
 
     /// Whether it belongs to this subscription.
     pub fn is_of<T>(&self, subscription: &Subscription<T>) -> bool {
-        self.mailbox == local::DATA && self.id == subscription.id
+        (self.mailbox, self.id) == (subscription.mailbox, subscription.id)
     }
 }

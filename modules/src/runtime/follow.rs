@@ -1,7 +1,7 @@
 //! The subscribing side of continuous data: asks, renews, and sees gaps.
 
 use crate::call::{CallError, Link};
-use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE};
+use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use crate::interface::append;
 use rohrpost_mailbox::Name;
 use std::marker::PhantomData;
@@ -35,6 +35,7 @@ impl Rate {
 /// A subscription to data of type `T`; [`super::Received::read`] tells whether data belong to it.
 pub struct Subscription<T> {
     pub(crate) id: u16,
+    pub(crate) mailbox: u8,
     data: PhantomData<fn() -> T>,
 }
 
@@ -47,8 +48,8 @@ impl<T> Clone for Subscription<T> {
 impl<T> Copy for Subscription<T> {}
 
 impl<T> Subscription<T> {
-    pub(crate) fn new(id: u16) -> Self {
-        Self { id, data: PhantomData }
+    pub(crate) fn new(id: u16, mailbox: u8) -> Self {
+        Self { id, mailbox, data: PhantomData }
     }
 }
 
@@ -75,14 +76,14 @@ pub(crate) struct Followings {
 }
 
 impl Followings {
-    /// Follows data number `number` of a module; returns the subscription's id.
-    pub(crate) fn follow(&mut self, from: Name, number: u16, interface: u32, rate: Rate) -> u16 {
+    /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id.
+    pub(crate) fn follow(&mut self, mailbox: u8, from: Name, number: u16, interface: u32, rate: Rate) -> u16 {
         let id = self.list.len() as u16;
         let period_us = match rate {
             Rate::Each => 0,
             Rate::Every(period) => crate::call::micros(period).max(1),
         };
-        let wish = Subscribe { number, id, period_us, lease_ms: LEASE.as_millis() as u32 };
+        let wish = Subscribe { number, id, period_us, lease_ms: LEASE.as_millis() as u32, mailbox };
         let next = Instant::now();
         let from = from.module();
         self.list.push(Followed { from, wish, interface, call: None, next, expected: None, refusal: None });
@@ -119,13 +120,10 @@ impl Followings {
         self.list.iter().map(|followed| followed.next).min()
     }
 
-    /// Notes a package's number.
-    /// `latest`: a gap is what the newer replaced, and no loss.
-    pub(crate) fn note(&mut self, from: Name, id: u16, head: &DataHead, latest: bool) {
-        let Some(followed) = self.list.get_mut(usize::from(id)).filter(|followed| followed.from == from.module())
-        else {
-            return;
-        };
+    /// Notes the number of a package that came to `mailbox`. `latest`: a gap there is what newer ones replaced, and no loss.
+    pub(crate) fn note(&mut self, mailbox: u8, latest: bool, from: Name, id: u16, head: &DataHead) {
+        let its = |followed: &&mut Followed| (followed.from, followed.wish.mailbox) == (from.module(), mailbox);
+        let Some(followed) = self.list.get_mut(usize::from(id)).filter(its) else { return };
         if let Some(expected) = followed.expected {
             // A publisher that was restarted begins at 0 again; that is no gap.
             let gap = head.sequence.wrapping_sub(expected);
@@ -139,7 +137,8 @@ impl Followings {
     /// Tells all publishers that nothing is wanted any more; does not wait for an answer.
     pub(crate) fn end(&mut self, link: &mut Link) {
         for followed in self.list.drain(..) {
-            let write = |body: &mut Vec<u8>| append(body, &followed.wish.id);
+            let Subscribe { id, mailbox, .. } = followed.wish;
+            let write = |body: &mut Vec<u8>| append(body, &Unsubscribe { id, mailbox });
             if let Ok(call) = link.begin(followed.from, UNSUBSCRIBE, crate::common::HASH, RENEW, write) {
                 link.forget(call);
             }

@@ -6,7 +6,7 @@ use super::parameters;
 use super::runner::Life;
 use super::server::{Call, Servant, read_arguments, write_result};
 use crate::call::Fault;
-use crate::common::{self, OutputLevel, SetParameters, Subscribe};
+use crate::common::{self, OutputLevel, SetParameters, Subscribe, Unsubscribe};
 use crate::module::Module;
 use crate::output;
 use rohrpost_mailbox::{Label, Name, SendError, local, monotonic_ns};
@@ -53,15 +53,15 @@ impl<M: Module> Hosted<'_, M> {
             common::SUBSCRIBE => {
                 let (wish,): (Subscribe,) = read_arguments(call.arguments)?;
                 self.offer.require_data(wish.number)?;
-                let to = call.head.from.with_local(local::DATA);
+                let to = data_mailbox(call, wish.mailbox)?;
                 let now_ns = monotonic_ns();
                 let subscriptions = &mut self.context.subscriptions;
                 let room = subscriptions.subscribe(self.index, to, call.head.priority, wish, now_ns);
                 if room { Ok(()) } else { Err(Fault::Busy) }
             }
             common::UNSUBSCRIBE => {
-                let (id,): (u16,) = read_arguments(call.arguments)?;
-                self.context.subscriptions.unsubscribe(call.head.from.with_local(local::DATA), id);
+                let (wish,): (Unsubscribe,) = read_arguments(call.arguments)?;
+                self.context.subscriptions.unsubscribe(data_mailbox(call, wish.mailbox)?, wish.id);
                 Ok(())
             }
             common::OUTPUT_LEVEL => {
@@ -94,4 +94,12 @@ impl<M: Module> Hosted<'_, M> {
         reply.extend_from_slice(&newest.value);
         Ok(())
     }
+}
+
+/// A mailbox of the caller's that takes data: those for commands and replies do not.
+fn data_mailbox(call: &Call<'_>, local: u8) -> Result<Name, Fault> {
+    if local >= local::DATA {
+        return Ok(call.head.from.with_local(local));
+    }
+    Err(Fault::Arguments(format!("mailbox {local} takes no data; name {} or one above", local::DATA)))
 }

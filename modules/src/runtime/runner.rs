@@ -337,9 +337,7 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Life<M>, context: &mut Con
             tracing::warn!("{} sent {} a package that is no data ({:?})", head.from, head.to, head.kind.kind());
             return true;
         };
-        if local == rohrpost_mailbox::local::DATA {
-            context.followings.note(head.from, head.id, &data, latest);
-        }
+        context.followings.note(local, latest, head.from, head.id, &data);
         if life.state == ModuleState::On {
             let received = Received { from: head.from, number, mailbox: local, id: head.id, head: data, value };
             let result = life.module.received(context, &received);
