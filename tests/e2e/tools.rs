@@ -7,9 +7,9 @@ use std::process::{Command, Stdio};
 /// All subcommands, as the command itself lists them.
 pub(crate) fn commands(place: &Place) -> Vec<String> {
     let help = place.say(&["--help"]).ok();
-    let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    // Their texts may go on in lines that are indented further.
-    let named = listed.filter_map(|line| line.strip_prefix("  ")).filter(|line| !line.starts_with(' '));
+    // In groups, each under a head; a name is indented by two, and its text may go on in lines that are indented further.
+    let listed = help.lines().take_while(|line| *line != "Options:").filter_map(|line| line.strip_prefix("  "));
+    let named = listed.filter(|line| line.starts_with(|letter: char| letter.is_ascii_lowercase()));
     let all: Vec<String> = named.filter_map(|line| line.split(' ').next()).map(str::to_owned).collect();
     assert!(all.len() > 20 && all.contains(&"top".to_owned()), "{help}");
     all.into_iter().filter(|command| command != "help").collect()
