@@ -255,6 +255,14 @@ impl Default for Latency {
 }
 
 impl Latency {
+    /// Counts a time.
+    pub fn count_one(&mut self, time: Duration) {
+        self.max = self.max.max(time);
+        self.sum += time;
+        let count = &mut self.buckets[bucket(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX))];
+        *count = count.saturating_add(1);
+    }
+
     /// Adds another histogram.
     pub fn add(&mut self, other: &Self) {
         self.max = self.max.max(other.max);

@@ -33,9 +33,9 @@ pub struct ModuleSurvey {
     pub received: u64,
     /// Bytes of their bodies.
     pub bytes_in: u64,
-    /// Packages that its mailboxes lost so far, for any cause.
+    /// Packages that its mailboxes lost so far, for any cause for which somebody misses them ([`Loss::is_missed`]).
     pub lost: u64,
-    /// The same by cause, in the order of [`Loss::ALL`].
+    /// Packages by cause, in the order of [`Loss::ALL`]: those lost, and those that a newer one replaced.
     pub losses: [u64; Loss::ALL.len()],
     /// How long packages waited in its mailboxes.
     pub waited: Latency,

@@ -1,8 +1,9 @@
 //! `rohrpost bw`: how many bytes go in and out of a module, read from the counters of those who send.
 
-use super::hz::{data_of, published};
+use super::published::{Watched, data_of};
 use super::target::Target;
-use super::watch::{Figures, Pace, Tracks};
+use super::units::{bytes, short};
+use super::watch::{Figures, Pace};
 use super::{Failure, say};
 use rohrpost::mailbox::{FlowInfo, Type};
 use serde_json::json;
@@ -27,36 +28,61 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let running = arguments.target.find()?;
-    let module = running.present(&arguments.name)?;
-    let data = arguments.data.as_deref().map(|name| data_of(&running, module, Some(name))).transpose()?;
-    let mut tracks = Tracks::new(arguments.pace.window()?);
-    let wanted = |flow: &FlowInfo| match &data {
-        Some(data) => data.iter().any(|(number, _)| flow.kind == Type::data(*number)),
-        None => !flow.is_publication() && [flow.from, flow.to].iter().any(|name| name.module() == module),
+    let mut watched = Watched::new(&arguments.target, &arguments.name, arguments.pace.window()?)?;
+    watched.running.present(&arguments.name)?;
+    let wanted = arguments.data.as_deref();
+    let mut data = match wanted {
+        Some(_) => data_of(&watched.running, watched.module, wanted)?,
+        None => Vec::new(),
     };
-    let look = |tracks: &mut Tracks| {
-        match &data {
-            Some(_) => tracks.look(published(&running, module).filter(|flow| wanted(flow))),
-            None => tracks.look(running.node.traffic().into_iter().filter(|flow| wanted(flow))),
+    let look = |watched: &mut Watched| {
+        watched.find_again()?;
+        let module = watched.module;
+        if wanted.is_some() {
+            let flows = watched.published();
+            watched.tracks.look(flows);
+        } else {
+            let touches = |flow: &FlowInfo| [flow.from, flow.to].iter().any(|name| name.module() == module);
+            let flows = watched.running.node.traffic().into_iter();
+            watched.tracks.look(flows.filter(|flow| !flow.is_publication() && touches(flow)));
         }
         Ok(())
     };
-    let tell = |tracks: &mut Tracks| {
-        let sum_of = |which: &dyn Fn(&FlowInfo) -> bool| sum(tracks.figures().filter(|(flow, _)| which(flow)));
-        let lines = match &data {
-            Some(data) => data.iter().map(|(_, name)| (name.as_str(), sum_of(&|_| true))).collect(),
-            None => vec![
-                ("in", sum_of(&|flow| flow.to.module() == module)),
-                ("out", sum_of(&|flow| flow.from.module() == module)),
-            ],
-        };
-        let wide = lines.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-        let line = |(name, sum): &(&str, Sum)| if arguments.pace.json { sum.json(name) } else { sum.text(name, wide) };
-        Ok(lines.iter().all(|each| say(line(each))))
+    let tell = |watched: &mut Watched| {
+        let sum_of = |which: &dyn Fn(&FlowInfo) -> bool| sum(watched.tracks.figures().filter(|(flow, _)| which(flow)));
+        if wanted.is_none() {
+            let to = sum_of(&|flow| flow.to.module() == watched.module);
+            let from = sum_of(&|flow| flow.from.module() == watched.module);
+            return Ok(tell_one(arguments, "in", "in", &to) && tell_one(arguments, "out", "out", &from));
+        }
+        let sums: Vec<Sum> = data.iter().map(|(number, _)| sum_of(&|flow| flow.kind == Type::data(*number))).collect();
+        let told = data.iter().zip(&sums).all(|((_, name), sum)| tell_one(arguments, name, "published", sum));
+        watched.renew(&mut data, wanted);
+        Ok(told)
     };
-    arguments.pace.watch(&mut tracks, look, tell)?;
+    arguments.pace.watch(&mut watched, look, tell)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// One line; false when nobody reads any more.
+fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &Sum) -> bool {
+    if !arguments.pace.json {
+        return say(sum.text(name));
+    }
+    say(json!({
+        "module": arguments.name,
+        "data": arguments.data,
+        "direction": direction,
+        "packages": sum.packages,
+        "packages_per_s": sum.packages_per_s,
+        "bytes": sum.bytes,
+        "bytes_per_s": sum.bytes_per_s,
+        "bytes_mean": sum.mean(),
+        "bytes_min": sum.bytes_min_max.map(|found| found.0),
+        "bytes_max": sum.bytes_min_max.map(|found| found.1),
+        "refused": sum.refused,
+        "silent_s": sum.silent_s(),
+    }))
 }
 
 /// Several flows together.
@@ -68,9 +94,12 @@ struct Sum {
     packages_per_s: f64,
     bytes_per_s: f64,
     bytes_min_max: Option<(u32, u32)>,
+    /// Time since the last package, and whether all flows are silent.
+    since_last_s: Option<f64>,
+    lively: bool,
 }
 
-/// Each flow's rate is exact, by its own first and last package, and so is their sum.
+/// Each flow's rate is by its own first and last package, and so is their sum.
 fn sum<'a>(flows: impl Iterator<Item = (&'a FlowInfo, Figures)>) -> Sum {
     let mut sum = Sum::default();
     for (_, figures) in flows {
@@ -80,6 +109,8 @@ fn sum<'a>(flows: impl Iterator<Item = (&'a FlowInfo, Figures)>) -> Sum {
         sum.packages_per_s += figures.rate_hz.unwrap_or(0.0);
         sum.bytes_per_s += figures.bytes_per_s().unwrap_or(0.0);
         let both = sum.bytes_min_max.zip(figures.bytes_min_max).map(|(a, b)| (a.0.min(b.0), a.1.max(b.1)));
+        sum.since_last_s = Some(sum.since_last_s.unwrap_or(f64::MAX).min(figures.since_last_s));
+        sum.lively |= figures.silent_s.is_none();
         sum.bytes_min_max = both.or(sum.bytes_min_max).or(figures.bytes_min_max);
     }
     sum
@@ -90,39 +121,20 @@ impl Sum {
         (self.packages > 0).then(|| self.bytes as f64 / self.packages as f64)
     }
 
-    fn text(&self, name: &str, wide: usize) -> String {
+    fn silent_s(&self) -> Option<f64> {
+        self.since_last_s.filter(|_| !self.lively)
+    }
+
+    fn text(&self, name: &str) -> String {
         let refused = if self.refused > 0 { format!("  {} refused", self.refused) } else { String::new() };
+        let silent = self.silent_s().map_or(String::new(), |silent_s| format!("  silent for {}", short(silent_s)));
         let (Some(mean), Some((min, max))) = (self.mean(), self.bytes_min_max) else {
-            return format!("{name:wide$}  nothing in this window{refused}");
+            return format!("{name:3}  nothing in this window{refused}");
         };
         format!(
-            "{name:wide$}  {:>10}/s  {:9.3} packages/s  mean {mean:.0} B  min {min} B  max {max} B{refused}",
+            "{name:3}  {:>10}/s  {:9.3} packages/s  mean {mean:.0} B  min {min} B  max {max} B{refused}{silent}",
             bytes(self.bytes_per_s),
             self.packages_per_s
         )
-    }
-
-    fn json(&self, name: &str) -> String {
-        let object = json!({
-            "of": name,
-            "packages": self.packages,
-            "bytes": self.bytes,
-            "refused": self.refused,
-            "packages_per_s": self.packages_per_s,
-            "bytes_per_s": self.bytes_per_s,
-            "bytes_mean": self.mean(),
-            "bytes_min": self.bytes_min_max.map(|found| found.0),
-            "bytes_max": self.bytes_min_max.map(|found| found.1),
-        });
-        object.to_string()
-    }
-}
-
-/// In the unit that suits it: powers of 1000, as rates are given.
-pub(super) fn bytes(bytes: f64) -> String {
-    match bytes {
-        b if b < 999.5 => format!("{b:.0} B"),
-        b if b < 999_500.0 => format!("{:.2} kB", b / 1e3),
-        b => format!("{:.2} MB", b / 1e6),
     }
 }

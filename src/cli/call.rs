@@ -1,13 +1,13 @@
 //! `rohrpost call`: a function of any module, by the module's own description.
 
 use super::target::Target;
+use super::units::seconds;
 use super::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::description::{Description, Function};
 use rohrpost::value::{Value, decode, describe_result, describe_type, encode, parse_argument};
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
-use std::time::Duration;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -51,11 +51,6 @@ fn usage_of_common(name: &str) -> Option<&'static str> {
         "output-level" => "one level (error, warn, info, debug or trace)",
         _ => return None,
     })
-}
-
-/// A time that a user gave in seconds.
-pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
-    Duration::try_from_secs_f64(seconds).map_err(|_| format!("{seconds} s is no time to wait").into())
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -133,7 +128,11 @@ fn postcard_u64(bytes: &[u8]) -> Option<(u64, &[u8])> {
 
 fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Result<Value, Failure> {
     let description = tool.describe(module)?;
-    let (function, body) = prepare(&description, name, texts)?;
+    let function = description.function(name).ok_or_else(|| {
+        let own: String = names(&description).iter().map(|name| format!("{name}, ")).collect();
+        format!("no function `{name}`; it has: {own}on, off, status, get DATA, output-level LEVEL")
+    })?;
+    let body = body_of(function, texts)?;
     let write = |to: &mut Vec<u8>| {
         to.extend_from_slice(&body);
         Ok(())
@@ -142,17 +141,13 @@ fn call(module: Name, name: &str, texts: &[String], tool: &mut ToolLink) -> Resu
     Ok(decode(&function.result, &bytes)?)
 }
 
-/// A function by its name, and its arguments as they go into a package.
-pub(super) fn prepare<'a>(
-    description: &'a Description,
-    name: &str,
-    texts: &[String],
-) -> Result<(&'a Function, Vec<u8>), Failure> {
-    let function = description.function(name).ok_or_else(|| {
-        let names: Vec<&str> = description.functions.iter().map(|function| function.name.as_str()).collect();
-        let own = if names.is_empty() { String::new() } else { format!("{}, ", names.join(", ")) };
-        format!("no function `{name}`; it has: {own}on, off, status, get DATA, output-level LEVEL")
-    })?;
+/// Names of a module's own functions.
+pub(super) fn names(description: &Description) -> Vec<&str> {
+    description.functions.iter().map(|function| function.name.as_str()).collect()
+}
+
+/// Arguments as they go into a package.
+pub(super) fn body_of(function: &Function, texts: &[String]) -> Result<Vec<u8>, Failure> {
     if function.arguments.len() != texts.len() {
         return Err(
             format!("{} takes {} arguments, not {}", usage(function), function.arguments.len(), texts.len()).into()
@@ -168,7 +163,7 @@ pub(super) fn prepare<'a>(
         };
         body.extend(encode(&argument.ty, &value).map_err(|error| format!("{}: {error}", argument.name))?);
     }
-    Ok((function, body))
+    Ok(body)
 }
 
 /// A function with the names and types of its arguments.

@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Shell::Fish => &Fish,
     };
     // Found on PATH, it is found there after an update too; else it is this very file.
-    let called = std::env::args().next().unwrap_or_default();
+    let called = std::env::args_os().next().unwrap_or_default().to_string_lossy().into_owned();
     let completer = if called.contains('/') { std::env::current_exe()?.display().to_string() } else { called };
     let mut script = Vec::new();
     shell.write_registration(VARIABLE, "rohrpost", "rohrpost", &completer, &mut script)?;
@@ -80,6 +80,7 @@ fn completed(command: &str, arg: Arg) -> Arg {
         ("new", _) => arg,
         (_, "name" | "names" | "module" | "modules") => from(arg, modules),
         (_, "node") => from(arg, nodes),
+        ("send", "function") => from(arg, own_functions),
         (_, "function") => from(arg, functions),
         (_, "data") => from(arg, data),
         (_, "level") => from(arg, levels),
@@ -98,10 +99,10 @@ fn from(arg: Arg, candidates: fn() -> Vec<CompletionCandidate>) -> Arg {
     arg.add(ArgValueCandidates::new(candidates))
 }
 
-/// The words so far, without this command's own name.
+/// The words so far, without this command's own name. A file's name need not be text; names that are asked for are.
 fn words() -> Vec<String> {
-    let words = std::env::args().skip_while(|word| word != "--").skip(2);
-    words.collect()
+    let words = std::env::args_os().skip_while(|word| word != "--").skip(2);
+    words.map(|word| word.to_string_lossy().into_owned()).collect()
 }
 
 /// The value of an option, if the words have it.
@@ -149,10 +150,13 @@ fn levels() -> Vec<CompletionCandidate> {
     [Error, Warn, Info, Debug, Trace].iter().map(|level| candidate(level.name(), "")).collect()
 }
 
-fn functions() -> Vec<CompletionCandidate> {
+fn own_functions() -> Vec<CompletionCandidate> {
     let own = described().map(|description| description.functions).unwrap_or_default();
-    let own = own.iter().map(|function| candidate(&function.name, &function.text));
-    own.chain(COMMON.iter().map(|(name, text)| candidate(*name, text))).collect()
+    own.iter().map(|function| candidate(&function.name, &function.text)).collect()
+}
+
+fn functions() -> Vec<CompletionCandidate> {
+    own_functions().into_iter().chain(COMMON.iter().map(|(name, text)| candidate(*name, text))).collect()
 }
 
 fn data() -> Vec<CompletionCandidate> {

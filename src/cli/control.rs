@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
         .into());
     }
     let timeout = match arguments.timeout {
-        Some(seconds) => super::call::seconds(seconds)?,
+        Some(seconds) => super::units::seconds(seconds)?,
         None => module.stop_within + module.ready_within + MARGIN,
     };
     let tool = running.join(PATIENCE)?;

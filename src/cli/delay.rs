@@ -1,13 +1,14 @@
 //! `rohrpost delay`: how long packages wait to be taken, and how old data are when they are published.
 
-use super::hz::{data_of, published, short};
-use super::table::{table, time};
+use super::published::{Watched, data_of};
+use super::table::table;
 use super::target::{Running, Target};
-use super::watch::{Pace, Tracks, Window};
+use super::units::short;
+use super::watch::{Pace, Window};
 use super::{Failure, say};
-use rohrpost::mailbox::{Class, Kind, Latency, Type};
+use rohrpost::Name;
+use rohrpost::mailbox::{Class, Kind, Latency};
 use rohrpost::survey::purpose;
-use rohrpost::{Name, config::Installation};
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -35,9 +36,10 @@ struct Wait {
     latency: Latency,
 }
 
-struct Watched {
+/// What the tool looks at.
+struct Looked {
     waits: Window<Vec<Wait>>,
-    data: Tracks,
+    module: Watched,
 }
 
 #[derive(Serialize)]
@@ -48,10 +50,10 @@ struct WaitLine {
     subscriber: bool,
     class: String,
     received: u64,
-    mean_s: Option<f64>,
-    p50_s: Option<f64>,
-    p99_s: Option<f64>,
-    max_ever_s: f64,
+    waited_mean_s: Option<f64>,
+    waited_p50_s: Option<f64>,
+    waited_p99_s: Option<f64>,
+    waited_max_ever_s: f64,
 }
 
 #[derive(Serialize)]
@@ -62,27 +64,39 @@ struct AgeLine {
 }
 
 #[derive(Serialize)]
-struct Delays {
+struct Delays<'a> {
+    module: &'a str,
     waits: Vec<WaitLine>,
     published: Vec<AgeLine>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let running = arguments.target.find()?;
-    let module = running.present(&arguments.name)?;
-    let names = data_of(&running, module, None).unwrap_or_default();
     let long = arguments.pace.window()?;
-    let mut watched = Watched { waits: Window::new(long), data: Tracks::new(long) };
-    let look = |watched: &mut Watched| {
-        watched.waits.push(waits(&running, module)?);
-        watched.data.look(published(&running, module));
+    let module = Watched::new(&arguments.target, &arguments.name, long)?;
+    module.running.present(&arguments.name)?;
+    let mut names = data_of(&module.running, module.module, None).unwrap_or_default();
+    let mut looked = Looked { waits: Window::new(long), module };
+    let look = |looked: &mut Looked| {
+        let Looked { waits: window, module } = looked;
+        if module.find_again()? {
+            *window = Window::new(long);
+        }
+        // Its directory goes with a node that has ended; there is nothing to be seen until the next.
+        match waits(&module.running, module.module) {
+            Ok(waits) => window.push(waits),
+            Err(_) if module.waits_for_launch() => window.push(Vec::new()),
+            Err(error) => return Err(error),
+        }
+        let flows = module.published();
+        module.tracks.look(flows);
         Ok(())
     };
-    let tell = |watched: &mut Watched| {
-        let delays = delays(&running.installation, module, watched, &names);
+    let tell = |looked: &mut Looked| {
+        looked.module.renew(&mut names, None);
+        let delays = delays(&arguments.name, looked, &names);
         Ok(say(if arguments.pace.json { serde_json::to_string(&delays)? } else { in_text(&delays) }))
     };
-    arguments.pace.watch(&mut watched, look, tell)?;
+    arguments.pace.watch(&mut looked, look, tell)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -101,8 +115,9 @@ fn waits(running: &Running, module: Name) -> Result<Vec<Wait>, Failure> {
     Ok(infos.flat_map(|info| info.classes.into_iter().map(wait(info.name))).collect())
 }
 
-fn delays(installation: &Installation, module: Name, watched: &Watched, names: &[(u16, String)]) -> Delays {
-    let (earlier, now) = watched.waits.ends().map_or((&[][..], &[][..]), |(a, b)| (&a[..], &b[..]));
+fn delays<'a>(name: &'a str, looked: &Looked, names: &[(u16, String)]) -> Delays<'a> {
+    let installation = &looked.module.running.installation;
+    let (earlier, now) = looked.waits.ends().map_or((&[][..], &[][..]), |(a, b)| (&a[..], &b[..]));
     let line = |wait: &Wait| {
         let before = earlier.iter().find(|known| (known.mailbox, known.class) == (wait.mailbox, wait.class));
         let latency = before.map_or(wait.latency.clone(), |before| wait.latency.since(&before.latency));
@@ -112,24 +127,23 @@ fn delays(installation: &Installation, module: Name, watched: &Watched, names: &
         WaitLine {
             mailbox: installation.classes.format_full(wait.mailbox),
             purpose: purpose(wait.mailbox.local()),
-            subscriber: wait.mailbox.module() != module,
+            subscriber: wait.mailbox.module() != looked.module.module,
             class,
             received: latency.count(),
-            mean_s: latency.mean().map(|mean| mean.as_secs_f64()),
-            p50_s: latency.quantile(0.5).map(|found| found.as_secs_f64()),
-            p99_s: latency.quantile(0.99).map(|found| found.as_secs_f64()),
-            max_ever_s: latency.max.as_secs_f64(),
+            waited_mean_s: latency.mean().map(|mean| mean.as_secs_f64()),
+            waited_p50_s: latency.quantile(0.5).map(|found| found.as_secs_f64()),
+            waited_p99_s: latency.quantile(0.99).map(|found| found.as_secs_f64()),
+            waited_max_ever_s: latency.max.as_secs_f64(),
         }
     };
     let age = |(number, name): &(u16, String)| {
-        let figures = watched.data.figures().find(|(flow, _)| flow.kind == Type::data(*number)).map(|(_, found)| found);
-        let figures = figures.unwrap_or_default();
+        let figures = looked.module.figures(*number).unwrap_or_default();
         AgeLine { data: name.clone(), values: figures.packages, age_mean_s: figures.age_mean_s }
     };
-    Delays { waits: now.iter().map(line).collect(), published: names.iter().map(age).collect() }
+    Delays { module: name, waits: now.iter().map(line).collect(), published: names.iter().map(age).collect() }
 }
 
-fn in_text(delays: &Delays) -> String {
+fn in_text(delays: &Delays<'_>) -> String {
     let or_none = |seconds: Option<f64>| seconds.map_or("-".into(), short);
     let rows = delays.waits.iter().map(|line| {
         [
@@ -137,10 +151,10 @@ fn in_text(delays: &Delays) -> String {
             if line.subscriber { format!("{} (subscribed)", line.purpose) } else { line.purpose.into() },
             line.class.clone(),
             line.received.to_string(),
-            or_none(line.mean_s),
-            or_none(line.p50_s),
-            or_none(line.p99_s),
-            time(std::time::Duration::from_secs_f64(line.max_ever_s)),
+            or_none(line.waited_mean_s),
+            or_none(line.waited_p50_s),
+            or_none(line.waited_p99_s),
+            short(line.waited_max_ever_s),
         ]
     });
     let heads = ["mailbox", "for", "class", ">received", ">waited mean", ">p50", ">p99", ">max ever"];

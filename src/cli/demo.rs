@@ -31,7 +31,7 @@ const FIRST_FUNCTION: u16 = 16;
 Reads config/demo.toml (or config/demo-log.toml) of the present folder if there is one, else its own copy.")]
 pub(super) struct Arguments {
     /// End by itself after so many seconds.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "SECONDS")]
     seconds: Option<f64>,
     /// Play this CARMEN log (also gzipped) instead of simulating.
     #[arg(long, value_name = "FILE")]
@@ -54,13 +54,14 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let long = arguments.seconds.map(super::units::seconds).transpose()?;
     let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let node = choose_node(&installation, None)?.name.clone();
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
     let speech = Speech::begin()?;
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
-    let outcome = watch(arguments, &mut launch, &speech);
+    let outcome = watch(arguments, long, &mut launch, &speech);
     let summary = summary(&mut launch);
     let code = end(launch, &speech);
     speech.settle();
@@ -86,11 +87,8 @@ fn drawing(installation: &Installation) -> Option<PathBuf> {
 }
 
 /// Until the time is over, the log is over, or it is told to stop.
-fn watch(arguments: &Arguments, launch: &mut Launch, speech: &Speech) -> Result<(), Failure> {
-    let mut deadline = match arguments.seconds {
-        Some(seconds) => Some(Instant::now() + super::call::seconds(seconds)?),
-        None => None,
-    };
+fn watch(arguments: &Arguments, long: Option<Duration>, launch: &mut Launch, speech: &Speech) -> Result<(), Failure> {
+    let mut deadline = long.map(|long| Instant::now() + long);
     let mut view = View::new(arguments.quiet, speech);
     let mut ask_at = Instant::now();
     let mut over = false;

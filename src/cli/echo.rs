@@ -27,9 +27,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
     /// At most so many a second; 0 for each.
-    #[arg(long, default_value_t = 0.0, value_name = "HZ", value_parser = rate)]
+    #[arg(long, default_value_t = 0.0, value_name = "HZ", value_parser = super::units::rate_or_all)]
     rate: f64,
-    /// End after so many.
+    /// End after so many values.
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
     /// Fail when no data comes for so long, seconds; 0 waits for ever.
@@ -38,12 +38,6 @@ pub(super) struct Arguments {
     /// One JSON object a line.
     #[arg(long)]
     json: bool,
-}
-
-/// A rate that can be subscribed to: the period goes as whole microseconds, of which 32 bits hold 71 minutes.
-fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate| *rate == 0.0 || (0.001..=1e6).contains(rate));
-    rate.ok_or_else(|| "write 0 for each value, or 0.001 to 1000000 a second".into())
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -90,7 +84,7 @@ fn follow(
     tool: &mut ToolLink,
 ) -> Result<(), Failure> {
     tool.data()?;
-    let patience = super::call::seconds(arguments.timeout)?;
+    let patience = super::units::seconds(arguments.timeout)?;
     let (mut renew_at, mut count) = (Instant::now(), 0);
     let mut heard = Instant::now();
     let stop = rohrpost::launch::events()?;

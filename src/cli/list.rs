@@ -1,6 +1,6 @@
 //! `rohrpost list`.
 
-use super::summary::{ModuleLine, losses, module_lines, print_modules};
+use super::summary::{Losses, ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
 use super::target::Target;
 use super::{Failure, say};
@@ -36,9 +36,11 @@ pub(super) struct MailboxLine {
     pub(super) waiting_max: u32,
     pub(super) sent: u64,
     pub(super) received: u64,
-    pub(super) lost: Vec<(&'static str, u64)>,
+    #[serde(flatten)]
+    pub(super) losses: Losses,
+    /// The same in words.
     #[serde(skip)]
-    pub(super) losses: String,
+    pub(super) lost_text: String,
 }
 
 #[derive(Serialize)]
@@ -88,8 +90,8 @@ fn mailbox_line(installation: &Installation, mailbox: &MailboxInfo) -> MailboxLi
         waiting_max: mailbox.depth_max,
         sent: mailbox.sent,
         received: mailbox.classes.iter().map(|class| class.received).sum(),
-        losses: losses(lost),
-        lost: Loss::ALL.into_iter().map(|cause| (cause.name(), lost(cause))).filter(|(_, n)| *n > 0).collect(),
+        losses: Losses::new(&Loss::ALL.map(lost)),
+        lost_text: losses(lost),
     }
 }
 
@@ -104,7 +106,7 @@ fn print_mailboxes(lines: &[MailboxLine]) -> String {
             format!("{} (most {})", line.waiting, line.waiting_max),
             line.sent.to_string(),
             line.received.to_string(),
-            line.losses.clone(),
+            line.lost_text.clone(),
         ]
     });
     table(["mailbox", "for", ">owner", ">slots", "when full", ">waiting", ">sent", ">received", "lost"], rows)

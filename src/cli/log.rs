@@ -67,6 +67,18 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+impl Arguments {
+    /// Whether something here says which lines to show.
+    fn chooses_lines(&self) -> bool {
+        let level = self.level.iter().any(|level| !level.contains('='));
+        level
+            || !(self.module.is_empty() && self.class.is_empty())
+            || self.text.is_some()
+            || self.since.is_some()
+            || self.last.is_some()
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let class = running.installation.classes.id(CollectorInterface::CLASS);
@@ -76,7 +88,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let settings: Vec<Setting> =
         settings.iter().map(|(name, level)| Setting::read(name, level, &running)).collect::<Result<_, _>>()?;
     let since = arguments.since.as_deref().map(rohrpost::config::parse_duration).transpose()?;
-    let mut tool = running.join(super::call::seconds(arguments.timeout)?)?;
+    if !settings.is_empty() && !arguments.follow && arguments.chooses_lines() {
+        return Err(
+            "--level NAME=LEVEL sets a level and shows no lines, so there are none to choose; add --follow to \
+                    see lines too, or leave out what chooses them"
+                .into(),
+        );
+    }
+    let mut tool = running.join(super::units::seconds(arguments.timeout)?)?;
     if arguments.levels {
         let code = levels::list(&running, arguments.json, &mut tool);
         tool.close();

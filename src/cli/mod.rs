@@ -20,6 +20,7 @@ mod manager;
 mod new;
 mod param;
 mod ping;
+mod published;
 mod run;
 mod send;
 mod speech;
@@ -28,6 +29,7 @@ mod summary;
 mod table;
 mod target;
 mod top;
+mod units;
 mod version;
 mod watch;
 

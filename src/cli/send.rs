@@ -1,11 +1,11 @@
 //! `rohrpost send`: a command over and over, as somebody at a keyboard would send it. Unlike `call` it waits for no answer
 //! before it sends the next; answers are counted.
 
-use super::call::{prepare, seconds};
+use super::call::{COMMON, body_of, names};
 use super::target::{Running, Target};
+use super::units::{Stop, rate, seconds};
 use super::{Failure, say};
-use rohrpost::description::Function;
-use rohrpost::launch::{Event, events};
+use rohrpost::description::{Description, Function};
 use rohrpost::mailbox::wait_any;
 use rohrpost::value::{Value, decode};
 use rohrpost::{CallError, Name, ToolLink};
@@ -32,10 +32,10 @@ pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
     /// So many a second.
-    #[arg(long, default_value_t = 10.0, value_name = "HZ")]
+    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = rate)]
     rate: f64,
-    /// End after so many.
-    #[arg(long, short, value_name = "N")]
+    /// End after so many commands.
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
     /// A command is valid for so long, and its answer is waited for so long at the end, seconds.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
@@ -48,12 +48,12 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let module = running.module(&arguments.name)?;
-    let period = Duration::try_from_secs_f64(1.0 / arguments.rate).ok().filter(|period| !period.is_zero());
-    let period = period.ok_or_else(|| format!("{} a second is no rate; try --rate 10", arguments.rate))?;
+    let period = Duration::from_secs_f64(1.0 / arguments.rate);
     let timeout = seconds(arguments.timeout)?;
     let description = running.noted(module)?;
-    let (function, body) = prepare(&description, &arguments.function, &arguments.arguments)?;
-    let stop = events()?;
+    let function = description.function(&arguments.function).ok_or_else(|| no_function(arguments, &description))?;
+    let body = body_of(function, &arguments.arguments)?;
+    let stop = Stop::new()?;
     let mut sending = Sending {
         running: &running,
         module,
@@ -71,20 +71,34 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let now = Instant::now();
         if now >= next {
             sending.send();
-            let passed = now.duration_since(next).as_nanos() / period.as_nanos();
-            sending.counts.left_out += passed as u64;
-            next += period.saturating_mul(passed as u32 + 1);
+            let late = now.duration_since(next).as_nanos();
+            sending.counts.left_out += (late / period.as_nanos()) as u64;
+            // What is left of the period that this moment lies in; it is shorter than a period, and so fits.
+            next = now + period - Duration::from_nanos((late % period.as_nanos()) as u64);
         }
         sending.collect_until(next.min(Instant::now() + LOOK));
-        if let Ok(Event::Stop) = stop.try_recv() {
+        if stop.within(Duration::ZERO) {
             break;
         }
     }
+    // Ctrl-C once more, or for the first time, ends the wait for answers too.
     let deadline = Instant::now() + timeout;
-    while !sending.under_way.is_empty() && Instant::now() < deadline {
+    while !sending.under_way.is_empty() && Instant::now() < deadline && !stop.within(Duration::ZERO) {
         sending.collect_until(deadline.min(Instant::now() + LOOK));
     }
     sending.finish(arguments.json)
+}
+
+/// Why there is nothing to send. What every module has besides, such as `off`, nobody needs over and over.
+fn no_function(arguments: &Arguments, description: &Description) -> String {
+    let (name, function) = (&arguments.name, &arguments.function);
+    if COMMON.iter().any(|(common, _)| common == function) {
+        return format!("`{function}` is not for send, but for once: `rohrpost call {name} {function}`");
+    }
+    match &names(description)[..] {
+        [] => format!("no function `{function}`; {name} has none to send"),
+        own => format!("no function `{function}`; it has: {}", own.join(", ")),
+    }
 }
 
 /// A command that is sent again and again.

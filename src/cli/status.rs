@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             asked.map(|module| module.name).collect()
         }
     };
-    let mut tool = running.join(super::call::seconds(arguments.timeout)?)?;
+    let mut tool = running.join(super::units::seconds(arguments.timeout)?)?;
     let mut lines = Vec::new();
     for name in names {
         let (status, failure) = match tool.status(name) {

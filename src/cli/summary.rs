@@ -7,6 +7,7 @@ use rohrpost::launch::Phase;
 use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, ParticipantInfo};
 use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// A module, as the tables show it.
 #[derive(Clone, Serialize)]
@@ -20,7 +21,8 @@ pub(super) struct ModuleLine {
     pub(super) received: u64,
     pub(super) received_per_s: Option<f64>,
     pub(super) waiting: u32,
-    pub(super) lost: u64,
+    #[serde(flatten)]
+    pub(super) losses: Losses,
     pub(super) restarts: u32,
 }
 
@@ -43,7 +45,7 @@ pub(super) fn module_lines(
             received: module.received,
             received_per_s: earlier.map(|earlier| survey.received_per_s(earlier, module.name)),
             waiting: module.depth,
-            lost: module.lost,
+            losses: Losses::new(&module.losses),
             restarts: module.process.as_ref().map_or(restarts, |process| process.restarts),
         }
     };
@@ -95,12 +97,31 @@ fn modules_table(lines: &[ModuleLine], gap: &str, received: &str, of: impl Fn(&M
             line.pid.map_or("-".into(), |pid| pid.to_string()),
             of(line),
             line.waiting.to_string(),
-            line.lost.to_string(),
+            line.losses.lost.to_string(),
             line.restarts.to_string(),
         ]
     });
     let heads = ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"];
     table(heads, rows)
+}
+
+/// Packages that were lost so far, as programs read it.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct Losses {
+    /// Somebody misses them.
+    pub(super) lost: u64,
+    pub(super) lost_by_cause: BTreeMap<&'static str, u64>,
+    /// A newer one took their place, as was wished.
+    pub(super) replaced: u64,
+}
+
+impl Losses {
+    /// Of these counts, in the order of [`Loss::ALL`].
+    pub(super) fn new(counts: &[u64; Loss::ALL.len()]) -> Self {
+        let missed = Loss::ALL.into_iter().filter(|cause| cause.is_missed() && counts[*cause as usize] > 0);
+        let lost_by_cause: BTreeMap<_, _> = missed.map(|cause| (cause.name(), counts[cause as usize])).collect();
+        Self { lost: lost_by_cause.values().sum(), lost_by_cause, replaced: counts[Loss::Replaced as usize] }
+    }
 }
 
 /// Losses by cause. Packages that a newer one replaced are nobody's loss, so they stand apart.

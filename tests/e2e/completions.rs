@@ -33,6 +33,19 @@ pub(crate) fn offered(place: &Place, words: &[&str]) -> Vec<String> {
 }
 
 #[test]
+fn words_that_are_no_text_are_no_panic() {
+    use std::os::unix::ffi::OsStrExt;
+    let place = Place::new();
+    let mut command = place.command(&["--", "rohrpost", "call"]);
+    command.args([std::ffi::OsStr::from_bytes(b"caf\xe9"), std::ffi::OsStr::new("")]);
+    command.env("ROHRPOST_COMPLETE", "bash").env("_CLAP_COMPLETE_INDEX", "3").env("_CLAP_COMPLETE_COMP_TYPE", "9");
+    command.env("_CLAP_COMPLETE_SPACE", "true").env("_CLAP_IFS", "\n");
+    let said = crate::process::Running::start(command).said();
+    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+    assert!(said.out.contains("output-level"), "{said:?}");
+}
+
+#[test]
 fn bash_offers_what_the_running_node_has() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);

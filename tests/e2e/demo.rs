@@ -16,7 +16,15 @@ fn number(text: &str, words: &str) -> u64 {
 #[test]
 fn the_simulated_robot_maps_and_says_what_came_of_it() {
     let place = Place::new();
-    let said = place.say(&["demo", "--seconds", "4", "--no-gui", "--quiet"]).ok();
+    let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
+    wait("it has mapped", || {
+        demo.assert_runs();
+        let said = place.say(&["call", "mapper.0", "counts", "--json"]);
+        let counts: serde_json::Value = serde_json::from_str(&said.out).ok()?;
+        let enough = |what: &str, least: u64| counts[what].as_u64() > Some(least);
+        (enough("mapped", 5) && enough("free", 1000) && enough("occupied", 50)).then_some(())
+    });
+    let said = demo.stop();
     for class in ["pilot", "mapper", "output", "tool"] {
         assert!(said.lines().any(|line| line.starts_with(class)), "no class {class}:\n{said}");
     }
@@ -24,6 +32,15 @@ fn the_simulated_robot_maps_and_says_what_came_of_it() {
     assert_eq!(number(&said, " lost\n"), 0, "{said}");
     assert!(number(&said, " scans mapped (") > 5, "{said}");
     assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+    place.assert_empty();
+}
+
+#[test]
+fn it_ends_by_itself_after_the_time_that_was_given() {
+    let place = Place::new();
+    let config = place.config(&[&probe("probe.0", "", "")]);
+    let said = place.say(&["demo", "--config", config.to_str().unwrap(), "--seconds", "2", "--quiet"]);
+    assert!(said.out.contains(" packages received, "), "{said:?}");
     place.assert_empty();
 }
 

@@ -113,7 +113,10 @@ fn figures_agree_with_a_known_source() {
     let long = ((end.before - first.after) / 1e9, (end.after - first.before) / 1e9);
 
     let line = wait("hz has counted all", || last(hz, |line| line["values"] == all));
-    agrees("rate", &line["rate_hz"], (count / long.1, count / long.0));
+    // The source has stopped by now, and the rate goes down with each line; what it was is in the intervals.
+    let silent_s = |line: &Value| line["silent_s"].as_f64().unwrap_or(0.0);
+    let until = silent_s(&line);
+    agrees("rate", &line["values_per_s"], (count / (long.1 + until), count / (long.0 + until)));
     agrees("mean interval", &line["interval_mean_s"], (long.0 / count, long.1 / count));
     let least = |of: fn((f64, f64)) -> f64| intervals().map(of).fold(f64::MAX, f64::min) / 1e9;
     let most = |of: fn((f64, f64)) -> f64| intervals().map(of).fold(0.0, f64::max) / 1e9;
@@ -135,14 +138,16 @@ fn figures_agree_with_a_known_source() {
     let line = wait("bw has counted all", || last(bw, |line| line["packages"] == all));
     let bytes: u64 = source.iter().map(|value| value.bytes).sum();
     assert_eq!(line["bytes"], bytes);
-    let per_s = |seconds: f64| bytes as f64 / all as f64 * count / seconds;
+    let until = silent_s(&line);
+    let per_s = |seconds: f64| bytes as f64 / all as f64 * count / (seconds + until);
     agrees("bytes a second", &line["bytes_per_s"], (per_s(long.1), per_s(long.0)));
     assert_eq!(line["bytes_mean"], bytes as f64 / all as f64);
     assert_eq!((&line["bytes_min"], &line["bytes_max"]), (&11.into(), &101.into()));
     assert!(source.iter().map(|value| value.second).max().unwrap() > first.second, "more than a second of it");
 
-    let line =
-        wait("bw has counted what came in", || last(bw_in, |line| line["of"] == "in" && line["packages"] == all));
+    let line = wait("bw has counted what came in", || {
+        last(bw_in, |line| line["direction"] == "in" && line["packages"] == all)
+    });
     assert_eq!(line["bytes"], taken.iter().map(|taken| taken.bytes).sum::<u64>());
     assert_eq!((&line["bytes_min"], &line["bytes_max"]), (&(11 + 16).into(), &(101 + 16).into()));
 
@@ -156,13 +161,17 @@ fn figures_agree_with_a_known_source() {
             .cloned()
     });
     let mean = |of: fn(&Taken) -> u64| taken.iter().map(|taken| of(taken) as f64).sum::<f64>() / all as f64 / 1e9;
-    agrees("mean wait", &row["mean_s"], (mean(|taken| taken.waited.0), mean(|taken| taken.waited.1)));
+    agrees("mean wait", &row["waited_mean_s"], (mean(|taken| taken.waited.0), mean(|taken| taken.waited.1)));
     let longest = |of: fn(&Taken) -> u64| taken.iter().map(of).max().unwrap() as f64 / 1e9;
-    agrees("longest wait", &row["max_ever_s"], (longest(|taken| taken.waited.0), longest(|taken| taken.waited.1)));
+    agrees(
+        "longest wait",
+        &row["waited_max_ever_s"],
+        (longest(|taken| taken.waited.0), longest(|taken| taken.waited.1)),
+    );
     // The histogram has two buckets to the octave.
     let mut waits: Vec<u64> = taken.iter().map(|taken| taken.waited.0).collect();
     waits.sort_unstable();
-    for (figure, share) in [("p50_s", 0.5), ("p99_s", 0.99)] {
+    for (figure, share) in [("waited_p50_s", 0.5), ("waited_p99_s", 0.99)] {
         let known = waits[(share * count) as usize] as f64 / 1e9;
         let told = row[figure].as_f64().unwrap();
         assert!((0.6..1.6).contains(&(told / known)), "{figure}: {told}, known {known}");
@@ -212,9 +221,11 @@ fn looking_changes_nothing() {
         &["bw", "probe.0", "beat", "--count", "2"],
         &["delay", "probe.0", "--count", "2"],
         &["graph", "--seconds", "1"],
-        &["graph", "--seconds", "0.1", "--all", "--json"],
+        &["graph", "--seconds", "0.1", "--all", "--silent", "--json"],
         &["graph", "--seconds", "0.1", "--dot"],
         &["graph", "--seconds", "0.1", "--svg"],
+        &["top", "--json", "--interval", "0.5"],
+        &["top", "--once", "--interval", "0.5"],
     ]
     .into_iter()
     .map(|arguments| Running::start(place.command(arguments)))
@@ -258,6 +269,68 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
     launch.wait_for("probe.0");
     hz.wait_for("never published");
     hz.stop();
+}
+
+#[test]
+fn what_stops_is_silent_and_no_longer_as_quick_as_it_was() {
+    let place = Place::new();
+    let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let mut tools = [["hz", "probe.0", "beat", "--json"], ["bw", "probe.0", "beat", "--json"]]
+        .map(|arguments| Running::start(place.command(&arguments)));
+    let names = [["values", "values_per_s"], ["packages", "packages_per_s"]];
+    for (tool, [count, _]) in tools.iter().zip(names) {
+        wait("it goes on", || last(tool, |line| line[count].as_u64() >= Some(20) && line["silent_s"].is_null()));
+    }
+    halt(robot.pid("probe.0"));
+    for (tool, [count, per_s]) in tools.iter_mut().zip(names) {
+        // Within the window of ten seconds, of which most is good.
+        let is_silent = |line: &Value| line[count].as_u64() > Some(1) && line["silent_s"].as_f64() > Some(1.0);
+        let line = wait("it is silent", || last(tool, is_silent));
+        let [sent, rate, silent_s] = [count, per_s, "silent_s"].map(|name| line[name].as_f64().unwrap());
+        assert!(rate > 0.0 && rate * silent_s < sent, "{line}");
+        if let Some(mean_s) = line["interval_mean_s"].as_f64() {
+            assert!(rate * mean_s < 0.99, "{line}");
+        }
+        let after = wait("it is silent for longer", || last(tool, |later| later["silent_s"].as_f64() > Some(silent_s)));
+        assert!(after[per_s].as_f64().is_none_or(|later| later < rate), "{line} {after}");
+        tool.stop();
+    }
+    let text = place.say(&["hz", "probe.0", "beat", "--count", "1"]).ok();
+    assert!(text.contains("nothing new in this window; the last came "), "{text}");
+    signal(robot.pid("probe.0"), Signal::SIGCONT);
+}
+
+#[test]
+fn a_node_that_is_launched_again_is_found_again() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let config = robot.installation.path.clone();
+    let start = |arguments: &[&str]| Running::start(place.command(arguments));
+    let mut tools = [
+        start(&["hz", "probe.0", "beat", "--json"]),
+        start(&["bw", "probe.0", "beat", "--json"]),
+        start(&["delay", "probe.0", "--json"]),
+    ];
+    let values = |line: &Value| {
+        line["values"].as_u64().or(line["packages"].as_u64()).or(line["published"][0]["values"].as_u64()).unwrap()
+    };
+    for tool in &tools {
+        wait("a value", || last(tool, |line| values(line) > 1));
+    }
+    drop(robot);
+    launch.stop();
+    for tool in &tools {
+        wait("that launch has ended", || tool.err().contains("waiting until it is launched again").then_some(()));
+    }
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    for tool in &mut tools {
+        wait("that it is there again", || tool.err().contains("node `main` was launched again").then_some(()));
+        let before = lines(tool).len();
+        wait("values of the new one", || lines(tool)[before..].iter().any(|line| values(line) > 1).then_some(()));
+        tool.stop();
+    }
 }
 
 #[test]
@@ -312,7 +385,10 @@ fn send_repeats_a_command_and_counts_what_came_of_it() {
     for (arguments, error) in [
         (&["send", "probe.0", "cound", "7"][..], "no function `cound`; it has: "),
         (&["send", "probe.0", "count"], "count <number: u32> takes 1 arguments, not 0"),
-        (&["send", "probe.0", "count", "7", "--rate", "0"], "0 a second is no rate; try --rate 10"),
+        (
+            &["send", "probe.0", "count", "7", "--timeout", "1e19"],
+            "10000000000000000000 s is no time to wait; write 0 to",
+        ),
     ] {
         let said = place.say(arguments).fails();
         assert!(said.starts_with(error), "{said}");
@@ -339,11 +415,14 @@ fn graph_shows_who_sends_what_to_whom() {
     assert_eq!((&data["from"], &data["what"]), (&"probe.0".into(), &"beat".into()));
     assert_eq!((&command["to"], &command["what"]), (&"probe.0".into(), &"count".into()));
     assert_eq!((&reply["to"], &reply["what"]), (&command["from"], &"count answered".into()));
-    for (edge, rate_hz) in [(&data, 50.0), (&command, 50.0)] {
-        let told = edge["packages_per_s"].as_f64().unwrap();
-        assert!(told > 0.0 && told < 1.5 * rate_hz, "{edge}");
+    let counted = |edge: &Value| edge["packages"].as_u64().unwrap();
+    for edge in [&data, &command, &reply] {
+        let (packages, per_s) = (counted(edge), edge["packages_per_s"].as_f64().unwrap());
+        assert!(packages > 0 && per_s > 0.0 && per_s.is_finite(), "{edge}");
     }
-    let modules: Vec<_> = graph["modules"].as_array().unwrap().iter().map(|module| module["name"].clone()).collect();
+    wait("all that it saw are run", || (place.counted().len() as u64 >= counted(&command)).then_some(()));
+    assert!(graph["interval_s"].as_f64().unwrap() >= 0.5, "{graph}");
+    let modules: Vec<_> = graph["modules"].as_array().unwrap().iter().map(|module| module["module"].clone()).collect();
     assert_eq!(modules.len(), 3, "{modules:?}");
     let text = place.say(&["graph", "--seconds", "0.5"]).ok();
     assert!(text.starts_with("from ") && text.contains("probe.0"), "{text}");
@@ -357,10 +436,22 @@ fn graph_shows_who_sends_what_to_whom() {
     assert!(svg.contains(">probe.0</text>") && svg.contains(">beat ") && svg.contains(">count "), "{svg}");
     echo.stop();
     send.stop();
+    let early = Running::start(place.command(&["graph", "--seconds", "3600", "--json"]));
+    wait("it heeds Ctrl-C", || early.heeds_control_c().then_some(()));
+    early.signal(Signal::SIGINT);
+    let graph = early.said().json();
+    assert!(graph["interval_s"].as_f64().unwrap() < 3600.0, "{graph}");
+    for edge in graph["edges"].as_array().unwrap() {
+        assert!(edge["packages_per_s"].as_f64().is_some_and(f64::is_finite), "{edge}");
+    }
+    let told = place.say(&["graph", "--seconds", "0", "--silent"]).fails();
+    assert_eq!(told, "in 0 s nothing is sent; try --seconds 2\n");
+    let told = place.say(&["graph", "--seconds", "0.1", "-o", "nowhere/graph.txt"]).fails();
+    assert!(told.contains("name a file in a folder that is there"), "{told}");
     // With nobody sending, it says so.
     robot.tool(PATIENCE).close();
     assert_eq!(
         place.say(&["graph", "--seconds", "0.1"]).ok(),
-        "nobody sent anything within 0.1 s; --all shows who did before\n"
+        "nobody sent anything within 0.1 s; --silent shows who did before\n"
     );
 }

@@ -110,6 +110,14 @@ impl Running {
         }
     }
 
+    /// Whether it looks after Ctrl-C itself by now, instead of dying of it.
+    pub(crate) fn heeds_control_c(&self) -> bool {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap_or_default();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+        caught & 1 << (Signal::SIGINT as u32 - 1) != 0
+    }
+
     pub(crate) fn signal(&self, number: Signal) {
         signal(self.pid(), number);
     }

@@ -4,6 +4,34 @@ use crate::harness::{OUTPUT, Place, probe, wait};
 use crate::process::Running;
 use std::process::{Command, Stdio};
 
+/// All subcommands, as the command itself lists them.
+pub(crate) fn commands(place: &Place) -> Vec<String> {
+    let help = place.say(&["--help"]).ok();
+    // In groups, each under a head; a name is indented by two, and its text may go on in lines that are indented further.
+    let listed = help.lines().take_while(|line| *line != "Options:").filter_map(|line| line.strip_prefix("  "));
+    let named = listed.filter(|line| line.starts_with(|letter: char| letter.is_ascii_lowercase()));
+    let all: Vec<String> = named.filter_map(|line| line.split(' ').next()).map(str::to_owned).collect();
+    assert!(all.len() > 20 && all.contains(&"top".to_owned()), "{help}");
+    all.into_iter().filter(|command| command != "help").collect()
+}
+
+/// What to say after the name of a command to have it look at a node with `probe.0`; none for those that look at no node
+/// that runs. A command that is not known here must be added.
+pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
+    let after: &[&str] = match command {
+        "list" | "status" | "log" => &[],
+        "top" => &["--once", "--interval", "0.1"],
+        "graph" => &["--seconds", "0.1"],
+        "call" | "hz" | "bw" | "delay" | "ping" | "restart" | "stop" | "start" => &["probe.0"],
+        "echo" => &["probe.0", "beat"],
+        "send" => &["probe.0", "count", "1", "--count", "1"],
+        "param" => &["list"],
+        "check" | "launch" | "demo" | "clean" | "doctor" | "new" | "completions" | "version" | "run" => return None,
+        other => panic!("`{other}` is new: say here how it is tested"),
+    };
+    Some([&[command], after].concat())
+}
+
 /// A node with a collector and a probe.
 fn node(place: &Place) -> Running {
     place.launched(&[OUTPUT, &probe("probe.0", "rate-hz = 50.0", "")]).0
@@ -94,6 +122,15 @@ fn mistakes_are_told_with_what_would_be_right() {
         (&["status", "probe.3"], &["no module `probe.3`"]),
         (&["log", "--level", "loud"], &["no level `loud`"]),
         (&["log", "--module", "prob.0"], &["prob"]),
+        (&["log", "--level", "warn", "--level", "probe.0=debug"], &["shows no lines", "add --follow"]),
+        (&["log", "--module", "probe.0", "--level", "probe.0=debug"], &["shows no lines", "add --follow"]),
+        (&["send", "probe.0", "off"], &["`rohrpost call probe.0 off`"]),
+        (&["call", "--timeout", "1e19", "probe.0", "status"], &["s is no time to wait; write 0 to 31536000"]),
+        (&["send", "--timeout", "1e19", "probe.0", "count", "1"], &["s is no time to wait"]),
+        (&["ping", "--interval", "nan", "probe.0"], &["NaN s is no time to wait"]),
+        (&["demo", "--seconds", "1e19", "--no-gui"], &["s is no time to wait"]),
+        (&["hz", "probe.0", "--window=-5"], &["a window of -5 s holds nothing; try --window 1"]),
+        (&["hz", "probe.0", "--window", "nan"], &["a window of NaN s holds nothing; try --window 1"]),
         (&["list", "--config", "nowhere.toml"], &["nowhere.toml"]),
     ] {
         let said = place.say(arguments);
@@ -118,6 +155,11 @@ fn a_mistaken_command_line_is_usage() {
         &["echo", "--rate", "fast", "x.0"],
         &["echo", "--rate=-1", "x.0"],
         &["echo", "-c", "0", "x.0"],
+        &["hz", "-c", "0", "x.0"],
+        &["ping", "-c", "0", "x.0"],
+        &["send", "-c", "0", "x.0", "f"],
+        &["send", "--rate", "0", "x.0", "f"],
+        &["send", "--rate", "1e-19", "x.0", "f"],
         &["demo", "--no-gui", "--viewer"],
         &[],
     ] {
@@ -126,24 +168,8 @@ fn a_mistaken_command_line_is_usage() {
         assert!(said.err.contains("--help") || said.err.contains("Usage"), "{arguments:?}: {said:?}");
     }
     assert!(place.say(&["--help"]).ok().contains("rohrpost demo"));
-    for command in [
-        "check",
-        "launch",
-        "demo",
-        "list",
-        "status",
-        "call",
-        "echo",
-        "log",
-        "param",
-        "clean",
-        "run",
-        "doctor",
-        "new",
-        "completions",
-        "version",
-    ] {
-        let help = place.say(&[command, "--help"]).ok();
+    for command in commands(&place) {
+        let help = place.say(&[&command, "--help"]).ok();
         assert!(help.contains("Example"), "{command} has no example:\n{help}");
     }
 }
@@ -151,8 +177,9 @@ fn a_mistaken_command_line_is_usage() {
 #[test]
 fn tools_say_what_to_do_while_nothing_runs() {
     let place = Place::new();
-    for arguments in [&["list"][..], &["status"], &["call", "probe.0"], &["echo", "probe.0"], &["log"]] {
-        let told = place.say(arguments).fails();
+    let commands = commands(&place);
+    for arguments in commands.iter().filter_map(|command| at_a_node(command)) {
+        let told = place.say(&arguments).fails();
         assert!(told.contains("no node runs here; launch one: `rohrpost launch FILE`"), "{arguments:?}: {told}");
     }
     let config = place.config(&[OUTPUT]);
@@ -226,12 +253,15 @@ fn without_a_collector_there_is_no_log() {
 fn a_closed_pipe_ends_a_tool_quietly() {
     let place = Place::new();
     let _launch = node(&place);
-    for arguments in [&["echo", "probe.0", "beat"][..], &["list"], &["call", "probe.0"], &["log", "--follow"]] {
-        let mut command: Command = place.command(arguments);
+    let commands = commands(&place);
+    let mut all: Vec<Vec<&str>> = commands.iter().filter_map(|command| at_a_node(command)).collect();
+    all.extend([vec!["log", "--follow"], vec!["version"], vec!["completions", "bash"], vec!["clean"]]);
+    for arguments in all {
+        let mut command: Command = place.command(&arguments);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
         drop(child.stdout.take());
-        if arguments[0] == "log" {
+        if arguments[..] == ["log", "--follow"] {
             // It finds out when there is something to say.
             wait("the tool ends", || {
                 place.say(&["call", "probe.0", "say", "info", "well"]).ok();

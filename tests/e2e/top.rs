@@ -69,6 +69,54 @@ fn modules_are_selected_switched_sorted_and_filtered_by_keys() {
 }
 
 #[test]
+fn all_keys_move_the_mark_and_a_pause_stands_still() {
+    let place = Place::new();
+    let (_launch, robot) = robot(&place);
+    let (terminal, top) = Terminal::start(&place, &TOP, 24, 100);
+    terminal.wait_row("probe.1", &["on"]);
+    let (down, up, home, end_key) = ("\x1b[B", "\x1b[A", "\x1b[H", "\x1b[F");
+    for (keys, marked) in [
+        (down, "probe.0"),
+        (down, "probe.1"),
+        (up, "probe.0"),
+        ("k", "output.0"),
+        ("j", "probe.0"),
+        (end_key, "probe.1"),
+        (home, "output.0"),
+        ("G", "probe.1"),
+        ("g", "output.0"),
+        // There is nothing beyond the ends.
+        ("k", "output.0"),
+        ("\x1b[F\x1b[B", "probe.1"),
+    ] {
+        terminal.keys(keys);
+        terminal.wait_screen(&format!("the mark at {marked} after {keys:?}"), |screen| {
+            screen.lines().any(|line| line.starts_with(&format!("> {marked} ")))
+        });
+    }
+    terminal.keys("p");
+    terminal.wait_screen("a pause", |screen| screen.contains("PAUSED"));
+    let row = |screen: &str| screen.lines().find(|line| line.contains(" probe.0 ")).unwrap_or_default().to_owned();
+    let before = terminal.screen();
+    // Something happens that would be seen, if it looked.
+    place.say(&["call", "probe.0", "off"]).ok();
+    assert_eq!(robot.state("probe.0"), "off");
+    // The mark still moves, so it has drawn since; all else is as it was.
+    for keys in [home, end_key, home, end_key] {
+        let drawn = terminal.drawn().len();
+        terminal.keys(keys);
+        wait("it draws", || (terminal.drawn().len() > drawn).then_some(()));
+    }
+    terminal.wait_screen("the mark at the end", |screen| screen.contains("> probe.1 "));
+    let paused = terminal.screen();
+    assert_eq!((row(&paused), paused.lines().next()), (row(&before), before.lines().next()));
+    terminal.keys("p");
+    terminal.wait_row("probe.0", &["off"]);
+    terminal.wait_screen("that it goes on", |screen| !screen.contains("PAUSED"));
+    end(top, &terminal);
+}
+
+#[test]
 fn details_show_mailboxes_and_what_the_module_says_of_itself() {
     let place = Place::new();
     let (_launch, _robot) = robot(&place);

@@ -1,6 +1,7 @@
 //! Programs of another version: nobody guesses, each names both versions and what to do.
 
 use crate::harness::{OUTPUT, Place, Robot, probe};
+use crate::tools::{at_a_node, commands};
 use rohrpost::mailbox::LAYOUT_VERSION;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -26,24 +27,11 @@ fn every_tool_says_that_a_node_is_of_another_version() {
     let config = config.to_str().unwrap();
     let length = node_file(&robot).metadata().unwrap().len();
     write_version(&node_file(&robot), OTHER);
-    for arguments in [
-        &["list"][..],
-        &["list", "--config", config],
-        &["status"],
-        &["call", "probe.0"],
-        &["echo", "probe.0", "beat"],
-        &["log"],
-        &["hz", "probe.0"],
-        &["bw", "probe.0"],
-        &["delay", "probe.0"],
-        &["graph"],
-        &["ping", "probe.0"],
-        &["send", "probe.0", "count", "1"],
-        &["param", "list"],
-        &["restart", "probe.0"],
-        &["launch", config],
-    ] {
-        let told = place.say(arguments).fails();
+    let commands = commands(&place);
+    let mut all: Vec<Vec<&str>> = commands.iter().filter_map(|command| at_a_node(command)).collect();
+    all.extend([vec!["list", "--config", config], vec!["launch", config]]);
+    for arguments in all {
+        let told = place.say(&arguments).fails();
         let both = format!("layout {OTHER}, this program has {LAYOUT_VERSION}");
         assert!(told.contains(&both), "{arguments:?}: {told}");
         assert!(told.contains("use the `rohrpost` that launched it, or stop what runs there"), "{arguments:?}: {told}");

@@ -11,8 +11,13 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
     for module in &graph.modules {
         let faces = module.faces.iter().map(|face| format!("\\n+ {face}"));
         let dead = if module.state == "dead" { ", style = \"rounded,dashed\"" } else { "" };
-        let _ =
-            writeln!(text, "    {:?} [label = \"{}{}\"{dead}]", module.name, module.name, faces.collect::<String>());
+        let _ = writeln!(
+            text,
+            "    {:?} [label = \"{}{}\"{dead}]",
+            module.module,
+            module.module,
+            faces.collect::<String>()
+        );
     }
     for edge in graph.drawn(all) {
         let style = match edge.carries {

@@ -3,11 +3,9 @@
 mod dot;
 mod svg;
 
-use super::bw::bytes;
-use super::call::seconds;
-use super::ping::stopped;
 use super::table::table;
 use super::target::{Running, Target};
+use super::units::{Stop, bytes, seconds};
 use super::watch::Tracks;
 use super::{Failure, say};
 use rohrpost::Name;
@@ -18,7 +16,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -42,9 +40,12 @@ pub(super) struct Arguments {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Everything: what was silent meanwhile, and in drawings replies and calls that every module has.
+    /// Draw replies and calls that every module has, too; table and JSON have them anyway.
     #[arg(long)]
     all: bool,
+    /// Also what was silent meanwhile.
+    #[arg(long)]
+    silent: bool,
     /// Write it there.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -55,14 +56,15 @@ pub(super) struct Arguments {
 struct Graph {
     installation: String,
     node: String,
-    seconds: f64,
+    /// What rates are measured over.
+    interval_s: f64,
     modules: Vec<Module>,
     edges: Vec<Edge>,
 }
 
 #[derive(Serialize)]
 struct Module {
-    name: String,
+    module: String,
     faces: Vec<String>,
     state: String,
     priority: u8,
@@ -94,7 +96,11 @@ struct Edge {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
-    let graph = Graph::new(&running, seconds(arguments.seconds)?, arguments.all)?;
+    let long = seconds(arguments.seconds)?;
+    if long.is_zero() {
+        return Err("in 0 s nothing is sent; try --seconds 2".into());
+    }
+    let graph = Graph::new(&running, long, arguments.silent)?;
     let text = if arguments.json {
         serde_json::to_string(&graph)?
     } else if arguments.dot {
@@ -106,7 +112,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     match &arguments.output {
         Some(file) => {
-            std::fs::write(file, text + "\n").map_err(|error| format!("{}: {error}", file.display()))?;
+            let failed = |error| {
+                format!("{}: {error}; name a file in a folder that is there and that you may write to", file.display())
+            };
+            std::fs::write(file, text + "\n").map_err(failed)?;
         }
         None => {
             say(text);
@@ -116,18 +125,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 impl Graph {
-    fn new(running: &Running, long: Duration, all: bool) -> Result<Self, Failure> {
+    fn new(running: &Running, long: Duration, silent: bool) -> Result<Self, Failure> {
         // The window is as long as the look at it.
         let mut tracks = Tracks::new(Duration::MAX);
         let look = || running.node.traffic().into_iter().filter(|flow| flow.to != Name::NONE);
+        let stop = Stop::new()?;
         tracks.look(look());
-        stopped(&rohrpost::launch::events()?, long);
+        let began = Instant::now();
+        // Ctrl-C ends it early: then it is a shorter look.
+        stop.within(long);
         tracks.look(look());
+        let interval_s = began.elapsed().as_secs_f64();
         let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
         let mut names = Names { running, survey: &survey, descriptions: BTreeMap::new() };
         let mut edges: Vec<Edge> = Vec::new();
         for (flow, figures) in tracks.figures() {
-            if !all && figures.packages == 0 && figures.refused == 0 {
+            if !silent && figures.packages == 0 && figures.refused == 0 {
                 continue;
             }
             let (carries, what) = names.what(flow);
@@ -137,8 +150,8 @@ impl Graph {
                 carries,
                 what,
                 packages: figures.packages,
-                packages_per_s: figures.rate_hz.unwrap_or(figures.packages as f64 / long.as_secs_f64()),
-                bytes_per_s: figures.bytes_per_s().unwrap_or(figures.bytes as f64 / long.as_secs_f64()),
+                packages_per_s: figures.rate_hz.unwrap_or(figures.packages as f64 / interval_s),
+                bytes_per_s: figures.bytes_per_s().unwrap_or(figures.bytes as f64 / interval_s),
                 refused: figures.refused,
             };
             let same = |known: &&mut Edge| {
@@ -155,7 +168,7 @@ impl Graph {
             .modules
             .iter()
             .map(|module| Module {
-                name: classes.format(module.name),
+                module: classes.format(module.name),
                 faces: module.faces.iter().map(|face| classes.format(*face)).collect(),
                 state: super::summary::state(module, None, &running.installation),
                 priority: module.name.class().0,
@@ -163,14 +176,13 @@ impl Graph {
             .collect();
         // Tools send too, and are in no configuration.
         for name in edges.iter().flat_map(|edge| [&edge.from, &edge.to]) {
-            if modules.iter().all(|module| module.name != *name) {
+            if modules.iter().all(|module| module.module != *name) {
                 let priority = running.module(name).map_or(0, |module| module.class().0);
-                modules.push(Module { name: name.clone(), faces: Vec::new(), state: "tool".into(), priority });
+                modules.push(Module { module: name.clone(), faces: Vec::new(), state: "tool".into(), priority });
             }
         }
-        let seconds = long.as_secs_f64();
         let installation = running.installation.name.clone();
-        Ok(Self { installation, node: running.node_name.clone(), seconds, modules, edges })
+        Ok(Self { installation, node: running.node_name.clone(), interval_s, modules, edges })
     }
 
     /// The edges that a drawing shows.
@@ -265,7 +277,7 @@ fn common(number: u16) -> String {
 
 fn in_text(graph: &Graph) -> String {
     if graph.edges.is_empty() {
-        return format!("nobody sent anything within {} s; --all shows who did before", graph.seconds);
+        return format!("nobody sent anything within {:.1} s; --silent shows who did before", graph.interval_s);
     }
     let rows = graph.edges.iter().map(|edge| {
         let kind = match edge.carries {

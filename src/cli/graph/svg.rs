@@ -27,11 +27,11 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
     let mut plan = VisualGraph::new(Orientation::LeftToRight);
     let edges: Vec<&Edge> = graph.drawn(all).collect();
     let in_use = |module: &&Module| {
-        module.state != "left out" && (module.state != "tool" || edges.iter().any(|edge| edge.touches(&module.name)))
+        module.state != "left out" && (module.state != "tool" || edges.iter().any(|edge| edge.touches(&module.module)))
     };
     let modules: Vec<&Module> = graph.modules.iter().filter(in_use).collect();
     let boxes: Vec<_> = modules.iter().map(|module| plan.add_node(box_of(module))).collect();
-    let place = |name: &str| modules.iter().position(|module| module.name == name).map(|at| boxes[at]);
+    let place = |name: &str| modules.iter().position(|module| module.module == name).map(|at| boxes[at]);
     for edge in &edges {
         if let (Some(from), Some(to)) = (place(&edge.from), place(&edge.to)) {
             plan.add_edge(arrow_of(edge), from, to);
@@ -53,7 +53,7 @@ impl Edge {
 
 fn box_of(module: &Module) -> Element {
     let faces = module.faces.iter().map(|face| format!("\n+ {face}"));
-    let text = format!("{}{}", module.name, faces.collect::<String>());
+    let text = format!("{}{}", module.module, faces.collect::<String>());
     let fill = if module.state == "dead" { 0xf4_d9_d3 } else { 0xf1_f4_f8 };
     let look = StyleAttr::new(colour(0x33_3a_44), 1, Some(colour(fill)), 6, FONT);
     let size = get_size_for_str(&text, FONT);
@@ -270,7 +270,7 @@ mod tests {
     use crate::cli::graph::Carries;
 
     fn graph(modules: usize, edges: &[(usize, usize)]) -> Graph {
-        let module = |n: usize| Module { name: format!("m.{n}"), faces: Vec::new(), state: "on".into(), priority: 9 };
+        let module = |n: usize| Module { module: format!("m.{n}"), faces: Vec::new(), state: "on".into(), priority: 9 };
         let edge = |(from, to): &(usize, usize)| Edge {
             from: format!("m.{from}"),
             to: format!("m.{to}"),
@@ -284,7 +284,7 @@ mod tests {
         Graph {
             installation: "test".into(),
             node: "main".into(),
-            seconds: 2.0,
+            interval_s: 2.0,
             modules: (0..modules).map(module).collect(),
             edges: edges.iter().map(edge).collect(),
         }

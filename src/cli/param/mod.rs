@@ -129,7 +129,7 @@ struct Session {
 /// Takes part as a tool for as long as `work` takes.
 fn at_work(common: &Common, work: impl FnOnce(&mut Session) -> Result<ExitCode, Failure>) -> Result<ExitCode, Failure> {
     let running = common.target.find()?;
-    let tool = running.join(super::call::seconds(common.timeout)?)?;
+    let tool = running.join(super::units::seconds(common.timeout)?)?;
     let mut session = Session { running, tool };
     let result = work(&mut session);
     session.tool.close();

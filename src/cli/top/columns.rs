@@ -1,9 +1,8 @@
 //! Columns of the table: what they say, by what they sort, and which go first when the terminal is narrow.
 
-use super::super::table::time;
+use super::super::units;
 use super::model::Row;
 use std::cmp::Ordering;
-use std::time::Duration;
 
 /// A column.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -140,7 +139,7 @@ impl Column {
     /// What it says of a module.
     pub(super) fn cell(self, row: &Row) -> String {
         let number = |number: Option<f64>| number.map_or("-".into(), short);
-        let waited = |ns: Option<u64>| ns.map_or("-".into(), |ns| time(Duration::from_nanos(ns)));
+        let waited = |seconds: Option<f64>| seconds.map_or("-".into(), units::short);
         match self {
             Self::Module => row.line.module.clone(),
             Self::State => row.line.state.clone(),
@@ -150,9 +149,9 @@ impl Column {
             Self::In => number(row.line.received_per_s),
             Self::Out => number(row.sent_per_s),
             Self::Waiting => row.line.waiting.to_string(),
-            Self::Lost => short(row.line.lost as f64),
-            Self::P50 => waited(row.waited_p50_ns),
-            Self::P99 => waited(row.waited_p99_ns),
+            Self::Lost => short(row.line.losses.lost as f64),
+            Self::P50 => waited(row.waited_p50_s),
+            Self::P99 => waited(row.waited_p99_s),
             Self::Restarts => row.line.restarts.to_string(),
             Self::Cpu => row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}")),
             Self::Memory => row.memory_bytes.map_or("-".into(), memory),
@@ -171,9 +170,9 @@ impl Column {
             Self::In => number(|row| row.line.received_per_s),
             Self::Out => number(|row| row.sent_per_s),
             Self::Waiting => b.line.waiting.cmp(&a.line.waiting),
-            Self::Lost => b.line.lost.cmp(&a.line.lost),
-            Self::P50 => number(|row| row.waited_p50_ns.map(|ns| ns as f64)),
-            Self::P99 => number(|row| row.waited_p99_ns.map(|ns| ns as f64)),
+            Self::Lost => b.line.losses.lost.cmp(&a.line.losses.lost),
+            Self::P50 => number(|row| row.waited_p50_s),
+            Self::P99 => number(|row| row.waited_p99_s),
             Self::Restarts => b.line.restarts.cmp(&a.line.restarts),
             Self::Cpu => number(|row| row.cpu_percent),
             Self::Memory => b.memory_bytes.cmp(&a.memory_bytes),
@@ -188,9 +187,10 @@ pub(super) fn severity(state: &str) -> usize {
     order.iter().position(|known| *known == state).unwrap_or(order.len())
 }
 
-/// Why it is in error; else how its packages were lost.
+/// Why it is in error; else how its packages were lost. Those that a newer one replaced are nobody's loss.
 fn why(row: &Row) -> String {
-    let losses = || row.losses.lost_by_cause.iter().map(|(cause, lost)| format!("{lost} {cause}")).collect::<Vec<_>>();
+    let losses =
+        || row.line.losses.lost_by_cause.iter().map(|(cause, lost)| format!("{lost} {cause}")).collect::<Vec<_>>();
     row.error.clone().unwrap_or_else(|| losses().join(", "))
 }
 

@@ -112,7 +112,7 @@ fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> Stri
             line.full.into(),
             format!("{} (most {})", line.waiting, line.waiting_max),
             line.received.to_string(),
-            line.losses.clone(),
+            line.lost_text.clone(),
         ]
     });
     table(["", ">slots", "when full", ">waiting", ">received", "lost"], rows)
@@ -124,7 +124,7 @@ fn peers(head: &str, peers: &[Peer]) -> Vec<String> {
         return Vec::new();
     }
     let rows = peers.iter().map(|peer| {
-        let per_s = peer.per_s.map_or("-".into(), short);
+        let per_s = peer.packages_per_s.map_or("-".into(), short);
         [peer.module.clone(), format!("{per_s}/s"), format!("{} so far", peer.packages)]
     });
     let mut lines = vec![String::new(), head.into()];

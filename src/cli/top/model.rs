@@ -1,7 +1,7 @@
 //! What `top` shows: two looks at a node, made into one table. Pure; also what `--json` prints.
 
 use super::super::list::{MailboxLine, mailbox_lines};
-use super::super::summary::ModuleLine;
+use super::super::summary::{Losses, ModuleLine};
 use super::process::Usage;
 use rohrpost::Name;
 use rohrpost::config::Installation;
@@ -62,9 +62,9 @@ pub(super) struct Model {
     /// Number of modules by state.
     pub(super) states: BTreeMap<String, usize>,
     pub(super) received_per_s: Option<f64>,
-    pub(super) lost: u64,
     #[serde(flatten)]
     pub(super) losses: Losses,
+    pub(super) lost_per_s: Option<f64>,
     pub(super) modules: Vec<Row>,
     pub(super) mailboxes: Vec<MailboxLine>,
 }
@@ -79,13 +79,13 @@ pub(super) struct Row {
     pub(super) class: String,
     /// Why it is in error or failed.
     pub(super) error: Option<String>,
-    #[serde(flatten)]
-    pub(super) losses: Losses,
+    /// Packages lost a second.
+    pub(super) lost_per_s: Option<f64>,
     /// Packages sent a second.
     pub(super) sent_per_s: Option<f64>,
     /// What the packages waited that it took in the interval; none when it took none.
-    pub(super) waited_p50_ns: Option<u64>,
-    pub(super) waited_p99_ns: Option<u64>,
+    pub(super) waited_p50_s: Option<f64>,
+    pub(super) waited_p99_s: Option<f64>,
     /// Since its process joined the node.
     pub(super) uptime_s: Option<f64>,
     /// Share of one processor.
@@ -100,14 +100,7 @@ pub(super) struct Row {
 pub(super) struct Peer {
     pub(super) module: String,
     pub(super) packages: u64,
-    pub(super) per_s: Option<f64>,
-}
-
-/// Packages that were lost so far.
-#[derive(Clone, Default, Serialize)]
-pub(super) struct Losses {
-    pub(super) lost_by_cause: BTreeMap<&'static str, u64>,
-    pub(super) lost_per_s: Option<f64>,
+    pub(super) packages_per_s: Option<f64>,
 }
 
 impl Model {
@@ -124,16 +117,16 @@ impl Model {
         let rows = now.survey.modules.iter().zip(&now.lines).map(|(module, line)| {
             let before = earlier.and_then(|earlier| earlier.survey.module(module.name)).zip(interval);
             let waited = before.map(|(before, _)| module.waited.since(&before.waited));
-            let quantile = |share| waited.as_ref()?.quantile(share).map(|waited| waited.as_nanos() as u64);
+            let quantile = |share| waited.as_ref()?.quantile(share).map(|waited| waited.as_secs_f64());
             Row {
                 name: module.name,
                 line: line.clone(),
                 class: installation.classes.name(module.name.class()).unwrap_or("-").into(),
                 error: errors.get(&module.name).cloned(),
-                losses: Losses::new(&module.losses, before.map(|(before, interval)| (before.lost, interval))),
+                lost_per_s: before.map(|(before, interval)| per_s(module.lost, before.lost, interval)),
                 sent_per_s: before.and_then(|(before, interval)| sent_per_s(module, before, interval)),
-                waited_p50_ns: quantile(0.5),
-                waited_p99_ns: quantile(0.99),
+                waited_p50_s: quantile(0.5),
+                waited_p99_s: quantile(0.99),
                 uptime_s: module
                     .process
                     .as_ref()
@@ -151,8 +144,10 @@ impl Model {
         let mut states = BTreeMap::new();
         modules.iter().for_each(|row| *states.entry(row.line.state.clone()).or_default() += 1);
         let received = |sample: &Sample| sample.survey.classes.iter().map(|class| class.received).sum();
-        let lost =
-            |sample: &Sample| Loss::ALL.map(|cause| sample.survey.classes.iter().map(|class| class.lost(cause)).sum());
+        let losses = |sample: &Sample| {
+            Losses::new(&Loss::ALL.map(|cause| sample.survey.classes.iter().map(|class| class.lost(cause)).sum()))
+        };
+        let lost_since = |before: &Sample, interval| per_s(losses(now).lost, losses(before).lost, interval);
         let since = earlier.zip(interval);
         Self {
             installation: installation.name.clone(),
@@ -162,8 +157,8 @@ impl Model {
             interval_s: interval.map(|interval| interval.as_secs_f64()),
             states,
             received_per_s: since.map(|(before, interval)| per_s(received(now), received(before), interval)),
-            lost: lost(now).iter().sum(),
-            losses: Losses::new(&lost(now), since.map(|(before, interval)| (lost(before).iter().sum(), interval))),
+            losses: losses(now),
+            lost_per_s: since.map(|(before, interval)| lost_since(before, interval)),
             modules,
             mailboxes: mailbox_lines(installation, &now.survey.mailboxes),
         }
@@ -172,18 +167,6 @@ impl Model {
     /// The module of this name.
     pub(super) fn row(&self, name: Name) -> Option<&Row> {
         self.modules.iter().find(|row| row.name == name)
-    }
-}
-
-impl Losses {
-    /// Of these counts, in the order of [`Loss::ALL`]; and how many they were so long before.
-    fn new(counts: &[u64; Loss::ALL.len()], before: Option<(u64, Duration)>) -> Self {
-        let lost = counts.iter().sum();
-        let causes = Loss::ALL.into_iter().map(|cause| (cause.name(), counts[cause as usize]));
-        Self {
-            lost_by_cause: causes.filter(|(_, lost)| *lost > 0).collect(),
-            lost_per_s: before.map(|(before, interval)| per_s(lost, before, interval)),
-        }
     }
 }
 
@@ -209,7 +192,7 @@ fn peers(
     let mut peers: Vec<Peer> = Vec::new();
     for flow in now.survey.flows.iter().filter(|flow| !flow.is_publication()) {
         let Some(name) = end(flow).filter(|name| *name != Name::NONE) else { continue };
-        let per_s = since.map(|(earlier, interval)| {
+        let packages_per_s = since.map(|(earlier, interval)| {
             let before = earlier.survey.flows.iter().find(|before| flow.is_same(before));
             per_s(flow.packages, before.map_or(0, |before| before.packages), interval)
         });
@@ -217,9 +200,9 @@ fn peers(
         match peers.iter_mut().find(|peer| peer.module == module) {
             Some(peer) => {
                 peer.packages += flow.packages;
-                peer.per_s = peer.per_s.zip(per_s).map(|(sum, more)| sum + more);
+                peer.packages_per_s = peer.packages_per_s.zip(packages_per_s).map(|(sum, more)| sum + more);
             }
-            None => peers.push(Peer { module, packages: flow.packages, per_s }),
+            None => peers.push(Peer { module, packages: flow.packages, packages_per_s }),
         }
     }
     peers.sort_by_key(|peer| std::cmp::Reverse(peer.packages));

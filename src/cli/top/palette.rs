@@ -51,7 +51,7 @@ impl Palette {
                 "left out" | "ended" => Style::new(),
                 _ => self.coloured(Color::Yellow),
             },
-            Column::Lost if row.losses.lost_per_s.is_some_and(|lost| lost > 0.0) => {
+            Column::Lost if row.lost_per_s.is_some_and(|lost| lost > 0.0) => {
                 self.coloured(Color::Red).add_modifier(Modifier::BOLD)
             }
             Column::Why if row.error.is_some() => self.coloured(Color::Red),

@@ -60,10 +60,10 @@ pub(super) fn head(model: &Model) -> [String; 2] {
     let mut second = vec![
         format!("{} modules: {}", model.modules.len(), states.join(", ")),
         format!("{} packages/s", number(model.received_per_s)),
-        format!("{} lost", model.lost),
+        format!("{} lost", model.losses.lost),
     ];
-    if model.lost > 0 {
-        second.push(format!("{} lost/s", number(model.losses.lost_per_s)));
+    if model.losses.lost > 0 {
+        second.push(format!("{} lost/s", number(model.lost_per_s)));
     }
     [first.join("   "), second.join("   ")]
 }

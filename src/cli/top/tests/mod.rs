@@ -70,12 +70,16 @@ fn json_says_what_the_screen_says() {
     assert_eq!(mapper["module"], "mapper.0");
     assert_eq!((&mapper["state"], &mapper["error"]), (&"error".into(), &"no scan has come for 5 s".into()));
     assert_eq!((&mapper["sent_per_s"], &mapper["cpu_percent"]), (&1.0.into(), &40.0.into()));
+    let motor = &json["modules"][1];
+    let nobodys = (&motor["lost"], &motor["lost_by_cause"], &motor["replaced"], &motor["lost_per_s"]);
+    assert_eq!(nobodys, (&0.into(), &serde_json::json!({}), &12.into(), &0.0.into()), "replaced is not lost");
+    assert_eq!(json["replaced"], 12);
     assert_eq!((&mapper["lost"], &mapper["lost_by_cause"]), (&9.into(), &serde_json::json!({ "refused": 9 })));
     let gui = &json["modules"][4];
-    for key in ["pid", "sent_per_s", "cpu_percent", "memory_bytes", "waited_p99_ns", "uptime_s"] {
+    for key in ["pid", "sent_per_s", "cpu_percent", "memory_bytes", "waited_p99_s", "uptime_s"] {
         assert!(gui[key].is_null(), "{key} of a module that does not run: {gui}");
     }
-    assert_eq!(json["modules"][3]["sends_to"][0]["per_s"], 12.0);
+    assert_eq!(json["modules"][3]["sends_to"][0]["packages_per_s"], 12.0);
     assert_eq!(json["modules"][1]["receives_from"][0]["module"], "pilot.0");
     assert_eq!(json["mailboxes"].as_array().unwrap().len(), 4);
 }
@@ -86,7 +90,7 @@ fn the_first_look_has_no_rates() {
     let model = super::Model::new(&robot.installation, "main", &robot.earlier, None, &Default::default());
     assert_eq!((model.interval_s, model.received_per_s), (None, None));
     assert!(model.modules.iter().all(|row| row.sent_per_s.is_none() && row.cpu_percent.is_none()));
-    assert!(model.modules.iter().all(|row| row.waited_p99_ns.is_none() && row.losses.lost_per_s.is_none()));
+    assert!(model.modules.iter().all(|row| row.waited_p99_s.is_none() && row.lost_per_s.is_none()));
 }
 
 #[test]

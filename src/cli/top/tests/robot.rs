@@ -6,7 +6,7 @@ use super::super::model::{Model, Sample, TimeNow};
 use super::super::palette::Palette;
 use super::super::process::Usage;
 use super::super::{app::App, output};
-use crate::cli::summary::ModuleLine;
+use crate::cli::summary::{Losses, ModuleLine};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use rohrpost::Name;
@@ -15,7 +15,7 @@ use rohrpost::config::Installation;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::MotorInterface;
 use rohrpost::mailbox::{
-    Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, ModuleState, ParticipantInfo, Shape, Type, local,
+    Class, ClassTraffic, FlowInfo, Full, Latency, Loss, MailboxInfo, ModuleState, ParticipantInfo, Shape, Type, local,
 };
 use rohrpost::output::OutputLine;
 use rohrpost::survey::{ModuleSurvey, Survey, sum};
@@ -29,6 +29,9 @@ pub(super) struct Robot {
     pub(super) now: Sample,
     pub(super) model: Model,
 }
+
+/// The module whose mailbox keeps the newest package only.
+const LATEST: &str = "motor.0";
 
 /// A module at a moment: what it has received, lost, sent, and how much of a processor it took, ms.
 struct Counts {
@@ -183,6 +186,10 @@ fn module(installation: &Installation, counts: &Counts) -> ModuleSurvey {
     waited.buckets[29] = counts.received as u32 / 15;
     let mut losses = [0; Loss::ALL.len()];
     losses[Loss::Refused as usize] = counts.refused;
+    // Its mailbox of commands has the policy `latest`: of each ten, a newer one replaced one.
+    if counts.module == LATEST {
+        losses[Loss::Replaced as usize] = counts.received / 10;
+    }
     ModuleSurvey {
         name,
         faces: configured.faces.clone(),
@@ -206,9 +213,10 @@ fn mailbox(module: &ModuleSurvey) -> MailboxInfo {
         losses: module.losses,
         latency: module.waited.clone(),
     };
+    let full = if module.losses[Loss::Replaced as usize] > 0 { Full::Latest } else { Full::Displace };
     MailboxInfo {
         name: module.name.with_local(local::COMMANDS),
-        shape: Shape::default(),
+        shape: Shape { full, ..Shape::default() },
         owner: module.process.as_ref().map(|process| process.pid),
         adoptions: 0,
         depth: module.depth,
@@ -256,7 +264,7 @@ fn line(installation: &Installation, counts: &Counts, module: &ModuleSurvey) -> 
         // As after a second in which the others counted this.
         received_per_s: Some(counts.received as f64 / 10.0),
         waiting: counts.waiting,
-        lost: counts.refused,
+        losses: Losses::new(&module.losses),
         restarts: module.process.as_ref().map_or(0, |process| process.restarts),
     }
 }

@@ -1,0 +1,94 @@
+//! Times, rates and bytes: as a user gives them, and as they are shown.
+
+use super::Failure;
+use super::table::time;
+use rohrpost::launch::{Event, events};
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+/// Nobody waits longer, and clocks can add it.
+const SECONDS_MAX: f64 = 365.0 * 86_400.0;
+/// What a rate may be: its period goes into packages as whole microseconds, of which 32 bits hold 71 minutes.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=1e6;
+
+/// A time that a user gave in seconds.
+pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
+    if (0.0..=SECONDS_MAX).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err(format!("{seconds} s is no time to wait; write 0 to {SECONDS_MAX} (a year), such as 1.5").into())
+    }
+}
+
+/// A rate that a user gave, a second.
+pub(super) fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| RATES_HZ.contains(rate));
+    rate.ok_or_else(|| format!("write {} to {} a second", RATES_HZ.start(), RATES_HZ.end()))
+}
+
+/// The same, where 0 means all.
+pub(super) fn rate_or_all(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(0.0) => Ok(0.0),
+        _ => rate(text).map_err(|why| format!("write 0 for each value, or {}", why.trim_start_matches("write "))),
+    }
+}
+
+/// Signals, and the wish of Ctrl-C to end.
+pub(super) struct Stop(Receiver<Event>);
+
+impl Stop {
+    pub(super) fn new() -> Result<Self, Failure> {
+        Ok(Self(events()?))
+    }
+
+    /// Waits, and says whether somebody wants an end meanwhile.
+    pub(super) fn within(&self, wait: Duration) -> bool {
+        matches!(self.0.recv_timeout(wait), Ok(Event::Stop))
+    }
+}
+
+/// A short time given in seconds, in the unit that suits it.
+pub(super) fn short(seconds: f64) -> String {
+    time(Duration::try_from_secs_f64(seconds).unwrap_or_default())
+}
+
+/// Four digits or more: jitter is small beside the interval.
+pub(super) fn fine(seconds: f64) -> String {
+    let us = seconds * 1e6;
+    match us {
+        us if us < 999.95 => format!("{us:.1} µs"),
+        us if us < 9_999.5 => format!("{:.3} ms", us / 1e3),
+        us if us < 9_999_500.0 => format!("{:.2} ms", us / 1e3),
+        us => format!("{:.2} s", us / 1e6),
+    }
+}
+
+/// Bytes in the unit that suits them: powers of 1000, as rates are given.
+pub(super) fn bytes(bytes: f64) -> String {
+    match bytes {
+        b if b < 999.5 => format!("{b:.0} B"),
+        b if b < 999_500.0 => format!("{:.2} kB", b / 1e3),
+        b => format!("{:.2} MB", b / 1e6),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_and_rates_have_bounds() {
+        for wrong in [-1.0, -1e-9, 1e19, SECONDS_MAX * 1.01, f64::NAN, f64::INFINITY] {
+            let told = seconds(wrong).unwrap_err().to_string();
+            assert!(told.contains("is no time to wait; write 0 to 31536000 (a year)"), "{told}");
+        }
+        assert_eq!(seconds(0.0).unwrap(), Duration::ZERO);
+        assert_eq!(seconds(SECONDS_MAX).unwrap(), Duration::from_secs(31_536_000));
+        for wrong in ["0", "-1", "1e-19", "1e7", "nan", "inf", "fast"] {
+            assert_eq!(rate(wrong).unwrap_err(), "write 0.001 to 1000000 a second");
+        }
+        assert_eq!((rate("0.001"), rate("1e6"), rate_or_all("0")), (Ok(0.001), Ok(1e6), Ok(0.0)));
+        assert_eq!(rate_or_all("-1").unwrap_err(), "write 0 for each value, or 0.001 to 1000000 a second");
+    }
+}
