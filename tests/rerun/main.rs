@@ -5,8 +5,11 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod drawings;
+mod launched;
 mod own_view;
+mod picture;
 mod programs;
 mod robot;
+mod switching;
 mod torture;
 mod viewer;
