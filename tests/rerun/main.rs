@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod drawings;
+mod load;
 mod own_view;
 mod programs;
 mod robot;

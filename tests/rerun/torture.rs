@@ -1,10 +1,13 @@
 //! A viewer is frozen, killed and restarted, also in a flood, while the robot measures its own latencies.
 //!
+//! The robot and its bridge have one processor, which is never idle ([`Load`]); the viewer is elsewhere, if there is a second one.
+//!
 //! What is compared are medians of short windows. Faults are interleaved with two kinds of peace: a viewer that is `well`, which costs
 //! the computer more than one that does nothing; and none at all, `absent`, which costs it less. With a fault the robot must be no
 //! slower than with either. How many windows there are does not depend on what they say: only when peace itself is noisy
 //! are they as many again, once, and all count. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` makes each fault come that often.
 
+use super::load::{Load, on_one_processor};
 use super::robot::{Mark, Robot};
 use super::viewer::{Viewer, free_port};
 use std::time::{Duration, Instant};
@@ -43,14 +46,16 @@ struct Test {
     port: u16,
     viewer: Option<Viewer>,
     most_mib: u64,
+    _load: Load,
 }
 
 impl Test {
     fn new(settings: impl FnOnce(u16) -> String) -> Self {
         let port = free_port();
         let drawing = format!("viewer = \"rerun+http://127.0.0.1:{port}/proxy\"");
-        let robot = Robot::start(&drawing, &settings(port));
-        Self { robot, port, viewer: None, most_mib: 0 }
+        let settings = settings(port);
+        let (robot, load) = on_one_processor(|| (Robot::start(&drawing, &settings), Load::start()));
+        Self { robot, port, viewer: None, most_mib: 0, _load: load }
     }
 
     /// Median latency of one window, ns.
