@@ -74,7 +74,13 @@ impl Subjects {
         if let Some(class) = installation.classes.id(CollectorInterface::CLASS) {
             let from = Name::new(installation.system.id, class.0, 0, 0);
             if installation.module(from).is_some() {
-                entries.push(Entry { from, module: text(from), data: Some("line".into()), rate: None, answered: false });
+                entries.push(Entry {
+                    from,
+                    module: text(from),
+                    data: Some("line".into()),
+                    rate: None,
+                    answered: false,
+                });
             }
         }
         let views = own.into_iter().chain(views::built_in()).collect();

@@ -26,16 +26,13 @@ fn printed(file: &Path, how: &[&str]) -> String {
 /// Times of the scans that are drawn, ns since 1970, in order.
 fn scans_ns(file: &Path) -> Vec<u64> {
     let all = printed(file, &["-vvv"]);
-    let chunks = all.split("\nChunk(").filter(|chunk| chunk.lines().next().unwrap().contains(" - /world/scan/source.0 - "));
+    let chunks =
+        all.split("\nChunk(").filter(|chunk| chunk.lines().next().unwrap().contains(" - /world/scan/source.0 - "));
     // Columns: row, time since the beginning, system time.
     let rows = chunks.flat_map(str::lines).filter(|line| line.contains(" row_"));
     let times = rows.map(|row| format!("{}Z\n", row.split('┆').nth(2).unwrap().trim()));
-    let mut date = Command::new("date")
-        .args(["-f", "-", "+%s%N"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut date =
+        Command::new("date").args(["-f", "-", "+%s%N"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     let times: String = times.collect();
     let mut pipe = date.stdin.take().unwrap();
     // It writes while it reads.
