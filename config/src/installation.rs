@@ -24,6 +24,8 @@ pub struct Installation {
     pub name: String,
     /// The file, as it was named to [`load`](Self::load).
     pub path: PathBuf,
+    /// The file as messages name it: [`path`](Self::path), unless that is a copy of another file, line by line.
+    pub shown: PathBuf,
     /// Folder of the file: relative paths in the file start here.
     pub folder: PathBuf,
     /// The file's text.
@@ -158,6 +160,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let (path, text) = (path.to_owned(), text.to_owned());
     let installation = Installation {
         name,
+        shown: path.clone(),
         path,
         folder,
         text,

@@ -77,7 +77,7 @@ impl Installation {
                 program: program.clone(),
                 message: format!(
                     "{}:{}: module `{}`: `{program}` {place}; {right}",
-                    self.path.display(),
+                    self.shown.display(),
                     module.line,
                     self.classes.format(module.name)
                 ),

@@ -49,7 +49,9 @@ pub(crate) fn ring(node: &Node, participant: u16) {
     }
 }
 
-/// What can go wrong does no harm: the sleeper is dead, its pipe gone, or so full that it will not sleep.
+/// What can go wrong does no harm: the sleeper is dead, its pipe gone, or so full that it will not sleep. Or we, or the system,
+/// have no descriptor or memory left to open it with: then the sleeper sees the ring a little later by itself (`PIPE_TRUSTED` in
+/// `watch`).
 #[cold]
 fn write_to_pipe(node: &Node, participant: u16) {
     step!("ring: before pipe");
@@ -93,7 +95,8 @@ fn with_name<T>(participant: u16, then: impl FnOnce(&CStr) -> T) -> T {
     then(CStr::from_bytes_until_nul(&name).unwrap_or_default())
 }
 
-/// Takes the bytes out that woke the sleeper. What does not fit wakes it once more.
+/// Takes the bytes out that woke the sleeper, for a poller that was stopped under load up to a pipe full, 64 KiB. What does not
+/// fit wakes it once more.
 pub(crate) fn drain(pipe: &impl AsFd) {
-    let _ = nix::unistd::read(pipe, &mut [0; 64]);
+    let _ = nix::unistd::read(pipe, &mut [0; 4096]);
 }

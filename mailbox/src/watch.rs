@@ -8,10 +8,15 @@ use crate::waiting::{Waiting, wait};
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Most descriptors that one participant watches.
 pub const WATCHES_MAX: usize = 64;
+
+/// How long a sleeper believes that its pipe would wake it. Who rings must open the pipe, and cannot when its process, or the
+/// system, has no descriptor left; but it has changed the bell before, and that the sleeper sees after so long. Costs ten
+/// looks at one word a second, and only who watches descriptors.
+const PIPE_TRUSTED: Duration = Duration::from_millis(100);
 
 /// One watched descriptor.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -47,6 +52,15 @@ pub struct Ready {
     pub readable: bool,
     /// A write will not wait: it takes bytes, or brings an error.
     pub writable: bool,
+}
+
+/// What `poll` brought.
+#[derive(PartialEq, Eq)]
+enum Polled {
+    /// Its time has passed.
+    Nothing,
+    /// A descriptor is ready, the pipe among them, or a signal came.
+    Something,
 }
 
 /// The descriptors that a participant waits for besides its mailboxes. It sleeps in `poll` then, and senders wake it through a named
@@ -132,7 +146,7 @@ impl Watches {
     /// Asks which are ready now, and returns at once. One system call, or none if nothing is watched.
     pub fn look(&mut self) {
         if !self.is_empty() {
-            self.poll(Some(Duration::ZERO));
+            self.poll(Duration::ZERO);
         }
     }
 
@@ -146,24 +160,32 @@ impl Watches {
 
     /// Sleeps until a descriptor is ready or the bell, which was `seen` before the last look, is rung.
     pub(crate) fn sleep(&mut self, bell: Bell<'_>, seen: u32, timeout: Option<Duration>) {
+        let began = Instant::now();
+        let left = || timeout.map_or(Duration::MAX, |timeout| timeout.saturating_sub(began.elapsed()));
         let quiet = bell.may_poll(seen);
-        self.poll(if quiet { timeout } else { Some(Duration::ZERO) });
+        let mut nap = if quiet { left().min(PIPE_TRUSTED) } else { Duration::ZERO };
+        while self.poll(nap) == Polled::Nothing && bell.seen() == seen {
+            nap = left().min(PIPE_TRUSTED);
+            if nap.is_zero() {
+                break;
+            }
+        }
         bell.polled();
     }
 
-    fn poll(&mut self, timeout: Option<Duration>) {
-        let timeout = timeout.map(doorbell::timespec);
-        let timeout = timeout.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
+    fn poll(&mut self, timeout: Duration) -> Polled {
+        let timeout = doorbell::timespec(timeout);
         let count = self.polls.len() as libc::nfds_t;
         // SAFETY: so many entries are there, and ours alone; the timeout outlives the call, which only reads it; a null
         // mask leaves the signals as they are.
-        let ready = unsafe { libc::ppoll(self.polls.as_mut_ptr(), count, timeout, std::ptr::null()) };
+        let ready = unsafe { libc::ppoll(self.polls.as_mut_ptr(), count, &raw const timeout, std::ptr::null()) };
         if ready < 0 {
             // A signal, mostly. The kernel has written nothing, so what stands there is old.
             self.polls.iter_mut().for_each(|poll| poll.revents = 0);
         } else if self.polls[0].revents != 0 {
             doorbell::drain(&self.pipe);
         }
+        if ready == 0 { Polled::Nothing } else { Polled::Something }
     }
 }
 

@@ -35,6 +35,9 @@ fn take_all(receiver: &mut Receiver) -> u32 {
 #[test]
 fn role() {
     let Some((role, ground)) = common::role() else { return };
+    if role == "send without descriptors" {
+        return send_without_descriptors(&ground);
+    }
     assert_eq!(role, "sleep in poll");
     let me = ground.join();
     let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
@@ -222,6 +225,53 @@ fn a_living_poller_of_another_process_is_woken() {
     assert_eq!(sleeper.hear(), "woken");
     assert_eq!(word(&ground, POLLING), 0);
     sleeper.kill();
+}
+
+/// As a process that has used up what it may open.
+fn send_without_descriptors(ground: &Ground) {
+    let mut sender = ground.sender();
+    let none = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: reads the limit, which outlives the call.
+    assert_eq!(unsafe { libc::setrlimit(libc::RLIMIT_NOFILE, &raw const none) }, 0);
+    assert!(std::fs::File::open("/dev/null").is_err());
+    sender.send(&label(LOW, 1), &[]).unwrap();
+    tell("sent");
+    stay();
+}
+
+#[test]
+fn a_poller_is_woken_by_who_cannot_open_its_pipe() {
+    let ground = Ground::new();
+    let me = ground.join();
+    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (_far, near) = UnixStream::pair().unwrap();
+    let mut watches = Watches::new(&me).unwrap();
+    watches.add(&near, Interest::Read).unwrap();
+    let (tell, told) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        // No deadline, and no reason but the package.
+        watches.wait_any(&mut [&mut receiver], Waiting::default(), || false);
+        let _ = tell.send(take_all(&mut receiver));
+    });
+    until("it polls", || word(&ground, POLLING) == 1);
+    let sender = ground.start("send without descriptors");
+    assert_eq!(sender.hear(), "sent");
+    assert_eq!(told.recv_timeout(PATIENCE), Ok(1));
+    sender.kill();
+}
+
+#[test]
+fn a_poller_naps_on_while_nobody_rings() {
+    let ground = Ground::new();
+    let me = ground.join();
+    let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
+    let (_far, near) = UnixStream::pair().unwrap();
+    let mut watches = Watches::new(&me).unwrap();
+    watches.add(&near, Interest::Read).unwrap();
+    // Longer than it trusts the pipe.
+    let (began, timeout) = (Instant::now(), Duration::from_millis(350));
+    let slept = watches.wait_any(&mut [&mut receiver], timeout, || false);
+    assert!(began.elapsed() >= timeout && slept >= timeout - Duration::from_millis(10), "{slept:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The publishing side of continuous data: who wants what, how often, and until when. Knows no clock and no mailbox.
 
 use crate::common::Subscribe;
-use rohrpost_mailbox::{Name, Priority, SendError};
+use rohrpost_mailbox::{Name, Priority};
 
 /// Subscriptions of one module at a time.
 pub(crate) const SUBSCRIPTIONS_MAX: usize = 64;
@@ -13,6 +13,8 @@ const PERIOD_MIN_US: u32 = 100;
 pub(crate) struct Newest {
     pub(crate) face: usize,
     pub(crate) number: u16,
+    /// Its name, for messages.
+    pub(crate) name: &'static str,
     pub(crate) stamp_ns: u64,
     /// Postcard of the value.
     pub(crate) value: Vec<u8>,
@@ -34,7 +36,7 @@ pub(crate) struct Subscription {
     /// Whether a value has come since the last was sent.
     fresh: bool,
     /// It was said that its mailbox is too small; once is enough.
-    told: bool,
+    pub(crate) told: bool,
 }
 
 /// Tells what became of one delivery.
@@ -43,8 +45,8 @@ pub(crate) enum Delivery {
     Sent,
     /// The subscriber's mailbox was full.
     Full,
-    /// The subscriber's mailbox takes no value of this size.
-    TooLarge(SendError),
+    /// The subscriber's mailbox takes no value of this size, and this was said.
+    TooLarge,
     /// The subscriber is gone.
     Gone,
 }
@@ -160,12 +162,8 @@ impl Subscription {
     fn settle(&mut self, delivery: Delivery) -> bool {
         match delivery {
             Delivery::Sent => self.sequence = self.sequence.wrapping_add(1),
-            Delivery::Full | Delivery::TooLarge(_) => {
-                if let Delivery::TooLarge(error) = delivery
-                    && !std::mem::replace(&mut self.told, true)
-                {
-                    tracing::error!("data {} cannot be delivered: {error}", self.wish.number);
-                }
+            Delivery::Full | Delivery::TooLarge => {
+                self.told |= matches!(delivery, Delivery::TooLarge);
                 // The number is used up, so that the subscriber sees the gap.
                 self.sequence = self.sequence.wrapping_add(1);
                 self.missed = self.missed.saturating_add(1);
@@ -293,12 +291,8 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_a_gap_and_keeps_the_subscription() {
         let mut all = subscribed(0);
-        let too_large = || {
-            let name = Name::new(1, 9, 0, 2);
-            Delivery::TooLarge(SendError::TooLarge { name, len: 9, max: 8 })
-        };
-        publish(&mut all, too_large);
-        publish(&mut all, too_large);
+        publish(&mut all, || Delivery::TooLarge);
+        publish(&mut all, || Delivery::TooLarge);
         assert_eq!((all.len(), all.list[0].sequence, all.missed(), all.list[0].told), (1, 2, 2, true));
     }
 

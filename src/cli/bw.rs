@@ -13,7 +13,7 @@ use std::process::ExitCode;
   rohrpost bw mapper.0                what goes in and out, two lines a second; Ctrl-C ends it
   rohrpost bw laser.0 scan            the values that it publishes, each counted once whoever subscribes
   rohrpost bw mapper.0 --seconds 5 --json
-Bytes are those of bodies: a package has 16 bytes of head besides. It reads counters in shared memory: nothing is
+Bytes are those of bodies: a package has 16 bytes of head besides. It reads counters in shared memory: nothing is \
 subscribed to, nothing is sent. Smallest and largest are those of the whole seconds that the window touches.")]
 pub(super) struct Arguments {
     /// Module or face, such as mapper.0.

@@ -16,7 +16,7 @@ use std::process::ExitCode;
   rohrpost delay mapper.0             by mailbox and class, once a second; Ctrl-C ends it
   rohrpost delay mapper.0 --count 1 --window 5
   rohrpost delay laser.0 --json       also how long its data wait for those that subscribed
-A package waits from being published to being taken. The mean is exact; p50 and p99 come from a histogram and are
+A package waits from being published to being taken. The mean is exact; p50 and p99 come from a histogram and are \
 right to a quarter or so; the longest is that of the mailbox's whole life. It reads counters: nothing is sent.")]
 pub(super) struct Arguments {
     /// Module or face, such as mapper.0.

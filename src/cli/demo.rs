@@ -1,22 +1,22 @@
 //! `rohrpost demo`: a simulated robot, or the log of a real one.
 
+mod copy;
+
 use super::launch::{View, end};
+use super::speech::Speech;
 use super::summary::print_classes;
 use super::{Failure, say};
 use rohrpost::common::State;
-use rohrpost::config::{Installation, Program};
+use rohrpost::config::Installation;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CartographerInterface, MapCounts, PlayerInterface, Progress};
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::{Class, Name};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-const SIMULATION: &str = include_str!("../../config/demo.toml");
-const LOG: &str = include_str!("../../config/demo-log.toml");
-const BUILDING: &str = include_str!("../../config/building.map");
 const GUI: &str = "gui";
 /// After the end of a log, so long for the last packages to be mapped and drawn.
 const SETTLE: Duration = Duration::from_secs(2);
@@ -55,14 +55,15 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
-    let file = configuration(arguments, folder.path())?;
-    let installation = Arc::new(super::check::load(&file)?);
+    let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let node = choose_node(&installation, None)?.name.clone();
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
+    let speech = Speech::begin()?;
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
-    let outcome = watch(arguments, &mut launch);
+    let outcome = watch(arguments, &mut launch, &speech);
     let summary = summary(&mut launch);
-    let code = end(launch);
+    let code = end(launch, &speech);
+    speech.settle();
     outcome?;
     let (text, well) = summary?;
     say(text.trim_end());
@@ -85,12 +86,12 @@ fn drawing(installation: &Installation) -> Option<PathBuf> {
 }
 
 /// Until the time is over, the log is over, or it is told to stop.
-fn watch(arguments: &Arguments, launch: &mut Launch) -> Result<(), Failure> {
+fn watch(arguments: &Arguments, launch: &mut Launch, speech: &Speech) -> Result<(), Failure> {
     let mut deadline = match arguments.seconds {
         Some(seconds) => Some(Instant::now() + super::call::seconds(seconds)?),
         None => None,
     };
-    let mut view = View::new(arguments.quiet);
+    let mut view = View::new(arguments.quiet, speech);
     let mut ask_at = Instant::now();
     let mut over = false;
     while launch.watch(view.wait()) {
@@ -107,84 +108,6 @@ fn watch(arguments: &Arguments, launch: &mut Launch) -> Result<(), Failure> {
         }
     }
     view.leave();
-    Ok(())
-}
-
-/// The file that says what runs: the folder's own, or a copy with what the command line says written in.
-fn configuration(arguments: &Arguments, temporary: &Path) -> Result<PathBuf, Failure> {
-    let (name, text) = if arguments.log.is_some() { ("demo-log.toml", LOG) } else { ("demo.toml", SIMULATION) };
-    let own = arguments.config.clone().unwrap_or_else(|| Path::new("config").join(name));
-    let there = own.exists();
-    if arguments.config.is_some() && !there {
-        return Err(format!("{}: no such file", own.display()).into());
-    }
-    if there && arguments.log.is_none() && !arguments.no_gui && !arguments.viewer {
-        return Ok(own);
-    }
-    let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
-    let folder = if there { installation_folder(&own)? } else { std::env::current_dir()? };
-    // Checked as it was written, so that a mistake is told with its own file and line.
-    let installation = super::check::judge(Installation::parse(&text, &own)?)?;
-    let mut table: toml::Table = toml::from_str(&text)?;
-    if let (Some(toml::Value::String(file)), true) = (table.get_mut("parameters"), there) {
-        *file = folder.join(&*file).display().to_string();
-    }
-    let modules = table.get_mut("module").and_then(toml::Value::as_array_mut).ok_or("no [[module]]")?;
-    for (entry, module) in modules.iter_mut().zip(&installation.modules) {
-        let Some(entry) = entry.as_table_mut() else { continue };
-        rewrite(entry, &module.program, &folder, there, arguments)?;
-    }
-    if arguments.no_gui {
-        let is_gui = |entry: &toml::Value| entry.get("name").and_then(toml::Value::as_str).is_some_and(is_gui);
-        modules.retain(|entry| !is_gui(entry));
-    }
-    let file = temporary.join(name);
-    std::fs::write(&file, toml::to_string(&table)?)?;
-    std::fs::write(temporary.join("building.map"), BUILDING)?;
-    Ok(file)
-}
-
-/// The folder of a file that is there; a file named without one is in the present folder.
-fn installation_folder(file: &Path) -> Result<PathBuf, Failure> {
-    Ok(file.canonicalize()?.parent().map(Path::to_owned).unwrap_or_default())
-}
-
-fn is_gui(name: &str) -> bool {
-    name.split('.').next() == Some(GUI)
-}
-
-/// Paths that started from the file's folder must find their way from another one; then what the command line says.
-fn rewrite(
-    entry: &mut toml::Table,
-    program: &Program,
-    folder: &Path,
-    there: bool,
-    arguments: &Arguments,
-) -> Result<(), Failure> {
-    if let Program::Command(words) = program
-        && let [first, rest @ ..] = &words[..]
-        && first.contains('/')
-    {
-        let absolute = folder.join(first).display().to_string();
-        let words: Vec<toml::Value> =
-            std::iter::once(absolute).chain(rest.iter().cloned()).map(toml::Value::String).collect();
-        entry.insert("program".into(), toml::Value::Array(words));
-    }
-    let gui = entry.get("name").and_then(toml::Value::as_str).is_some_and(is_gui);
-    let Some(settings) = entry.get_mut("settings").and_then(toml::Value::as_table_mut) else { return Ok(()) };
-    if let (Some(log), true) = (&arguments.log, settings.contains_key("speed")) {
-        let log = log.canonicalize().map_err(|error| format!("{}: {error}", log.display()))?;
-        settings.insert("file".into(), log.display().to_string().into());
-        settings.insert("speed".into(), arguments.speed.into());
-    } else if gui {
-        let file = std::env::current_dir()?.join("rohrpost-demo.rrd");
-        settings.insert("file".into(), file.display().to_string().into());
-        if arguments.viewer {
-            settings.insert("viewer".into(), "window".into());
-        }
-    } else if let (Some(toml::Value::String(map)), true) = (settings.get_mut("map"), there) {
-        *map = folder.join(&*map).display().to_string();
-    }
     Ok(())
 }
 

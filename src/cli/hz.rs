@@ -15,7 +15,7 @@ use std::time::Duration;
   rohrpost hz odometry.0              all its data, a line each a second; Ctrl-C ends it
   rohrpost hz laser.0 scan --seconds 5
   rohrpost hz laser.0 scan --window 60 --json
-It reads what the module counts in shared memory: nothing is subscribed to, nothing is sent. Rate and standard
+It reads what the module counts in shared memory: nothing is subscribed to, nothing is sent. Rate and standard \
 deviation are exact; minimum and maximum are those of the whole seconds that the window touches.")]
 pub(super) struct Arguments {
     /// Module or face, such as odometry.0.

@@ -1,11 +1,12 @@
 //! `rohrpost launch`: the modules of a node, with a live table.
 
-use super::manager::{Manager, Urgency, for_journal};
+use super::Failure;
+use super::manager::Manager;
+use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
-use super::{Failure, say};
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::survey::Survey;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -28,13 +29,23 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let speech = Speech::begin()?;
+    let code = launch(arguments, &speech).unwrap_or_else(|error| {
+        speech.complain(&error.to_string());
+        ExitCode::FAILURE
+    });
+    speech.settle();
+    Ok(code)
+}
+
+fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let installation = Arc::new(super::check::load(&arguments.file)?);
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
-    let mut manager = Manager::from_environment()?;
+    let mut manager = Manager::from_environment(|warning| speech.complain(warning));
     manager.starting(&node);
     let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
     manager.ready(&launch);
-    let mut view = View::new(arguments.quiet);
+    let mut view = View::new(arguments.quiet, speech);
     view.began(&launch, &node);
     let mut shown = Ok(());
     while shown.is_ok() && launch.watch(view.wait().min(manager.wait())) {
@@ -44,30 +55,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     view.leave();
     manager.stopping();
     // Also when it can be shown no more: the modules are stopped in order.
-    let code = end(launch);
+    let code = end(launch, speech);
     shown.map(|()| code)
 }
 
 /// Stops everything; what failed for good makes the exit code.
-pub(super) fn end(mut launch: Launch) -> ExitCode {
-    say_all(&launch.take_notes());
+pub(super) fn end(mut launch: Launch, speech: &Speech) -> ExitCode {
+    launch.take_notes().iter().for_each(|note| speech.say(note));
     let failures = launch.failures();
-    say_all(&launch.stop());
+    launch.stop().iter().for_each(|note| speech.say(note));
+    // What failed for good stands below all else, where both streams lead to one place.
+    speech.settle();
     for (module, why) in &failures {
-        let line = format!("{module} failed for good: {why}");
-        eprintln!("{}", for_journal(std::io::stderr(), Urgency::Error, &line));
+        speech.complain(&format!("{module} failed for good: {why}"));
     }
     if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-fn say_all(notes: &[String]) {
-    for note in notes {
-        say(for_journal(std::io::stdout(), Urgency::Notice, note));
-    }
-}
-
 /// What a person at the terminal sees while a node runs.
-pub(super) struct View {
+pub(super) struct View<'a> {
+    speech: &'a Speech,
     /// Draw the table over and over in one place.
     live: bool,
     begun: Instant,
@@ -79,10 +86,10 @@ pub(super) struct View {
 /// Notes that stay below the live table.
 const NOTES_MAX: usize = 8;
 
-impl View {
-    pub(super) fn new(quiet: bool) -> Self {
+impl<'a> View<'a> {
+    pub(super) fn new(quiet: bool, speech: &'a Speech) -> Self {
         let live = !quiet && std::io::stdout().is_terminal();
-        Self { live, begun: Instant::now(), next: Instant::now(), last: None, notes: Vec::new() }
+        Self { speech, live, begun: Instant::now(), next: Instant::now(), last: None, notes: Vec::new() }
     }
 
     /// All modules are on. Without a table, one line says so.
@@ -91,7 +98,7 @@ impl View {
             let modules = launch.phases().count();
             let word = if modules == 1 { "module" } else { "modules" };
             let line = format!("node {node} of {} runs: {modules} {word}", launch.installation().name);
-            say_all(&[line]);
+            self.speech.say(&line);
         }
     }
 
@@ -104,7 +111,7 @@ impl View {
     pub(super) fn show(&mut self, launch: &mut Launch) -> Result<(), Failure> {
         let notes = launch.take_notes();
         if !self.live {
-            say_all(&notes);
+            notes.iter().for_each(|note| self.speech.say(note));
         }
         self.notes.extend(notes);
         if Instant::now() < self.next {
@@ -132,14 +139,13 @@ impl View {
         let text = format!("{head}\n\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
         let text = text.replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };
-        let _ = write!(std::io::stdout(), "{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J");
-        let _ = std::io::stdout().flush();
+        self.speech.draw(format!("{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J"));
     }
 
     /// Leaves the last table where it stands.
     pub(super) fn leave(&mut self) {
         if self.live {
-            say("");
+            self.speech.say("");
         }
         self.notes.clear();
     }

@@ -1,5 +1,4 @@
-//! What launch tells the service manager that started it (systemd), and how its words stand in the journal. Started by hand,
-//! it tells nobody.
+//! What launch tells the service manager that started it (systemd). Started by hand, it tells nobody.
 //!
 //! The protocol is sd_notify(3): lines in a datagram. The crate for it waits when the manager does not read, and knows no
 //! abstract socket; launch must never wait, and containers have such sockets.
@@ -8,10 +7,8 @@ use rohrpost::launch::{Launch, Phase};
 use std::collections::VecDeque;
 use std::ffi::OsStr;
 use std::io::{self, ErrorKind};
-use std::os::fd::AsFd;
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::MetadataExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::time::{Duration, Instant};
 
@@ -29,20 +26,20 @@ pub(super) struct Manager {
 }
 
 impl Manager {
-    /// The one that the environment names, if there is one.
-    pub(super) fn from_environment() -> io::Result<Self> {
-        let socket = match std::env::var_os("NOTIFY_SOCKET") {
-            Some(name) => {
-                let socket = UnixDatagram::unbound()?;
-                socket.set_nonblocking(true)?;
-                Some((socket, address(&name)?))
+    /// The one that the environment names, if there is one. One that cannot be told anything is no reason not to launch a
+    /// robot: then there is none, and `warn` hears why.
+    pub(super) fn from_environment(warn: impl FnOnce(&str)) -> Self {
+        let socket = std::env::var_os("NOTIFY_SOCKET").and_then(|name| match connect(&name) {
+            Ok(socket) => Some(socket),
+            Err(error) => {
+                warn(&format!("no word to the service manager: NOTIFY_SOCKET={}: {error}", name.display()));
+                None
             }
-            None => None,
-        };
+        });
         let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
         let ours = number("WATCHDOG_PID").is_none_or(|pid| pid == u64::from(std::process::id()));
         let watchdog = number("WATCHDOG_USEC").filter(|us| ours && *us > 0).map(Duration::from_micros);
-        Ok(Self { socket, waiting: VecDeque::new(), watchdog, ping_at: Instant::now(), status: String::new() })
+        Self { socket, waiting: VecDeque::new(), watchdog, ping_at: Instant::now(), status: String::new() }
     }
 
     /// The modules are being started.
@@ -108,6 +105,12 @@ impl Manager {
     }
 }
 
+fn connect(name: &OsStr) -> io::Result<(UnixDatagram, SocketAddr)> {
+    let (address, socket) = (address(name)?, UnixDatagram::unbound()?);
+    socket.set_nonblocking(true)?;
+    Ok((socket, address))
+}
+
 /// A path, or a name behind an `@`.
 fn address(name: &OsStr) -> io::Result<SocketAddr> {
     match name.as_bytes() {
@@ -127,27 +130,4 @@ fn status(launch: &Launch) -> String {
         }
     }
     format!("{running} modules run{others}")
-}
-
-/// How urgent a line of launch's is.
-#[derive(Clone, Copy)]
-pub(super) enum Urgency {
-    Error = 3,
-    Notice = 5,
-}
-
-/// A line as this stream takes it: the journal wants each to begin with its urgency.
-pub(super) fn for_journal(stream: impl AsFd, urgency: Urgency, line: &str) -> String {
-    if !is_journal(stream) {
-        return line.to_owned();
-    }
-    let mark = format!("<{}>", urgency as u8);
-    format!("{mark}{}", line.replace('\n', &format!("\n{mark}")))
-}
-
-/// Whether it is the stream that systemd has connected to its journal: `JOURNAL_STREAM` has its device and number.
-fn is_journal(stream: impl AsFd) -> bool {
-    let Ok(wanted) = std::env::var("JOURNAL_STREAM") else { return false };
-    let own = stream.as_fd().try_clone_to_owned().and_then(|stream| std::fs::File::from(stream).metadata());
-    own.is_ok_and(|own| wanted == format!("{}:{}", own.dev(), own.ino()))
 }

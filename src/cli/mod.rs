@@ -11,6 +11,7 @@ mod demo;
 mod doctor;
 mod echo;
 mod graph;
+mod help;
 mod hz;
 mod launch;
 mod list;
@@ -21,6 +22,7 @@ mod param;
 mod ping;
 mod run;
 mod send;
+mod speech;
 mod status;
 mod summary;
 mod table;
@@ -29,16 +31,16 @@ mod top;
 mod version;
 mod watch;
 
-use clap::{Parser, Subcommand};
+use clap::{FromArgMatches, Parser, Subcommand};
 use std::io::Write;
 use std::process::ExitCode;
 
 /// What went wrong, in words for the person at the terminal.
 type Failure = Box<dyn std::error::Error>;
 
-/// Prioritised mailboxes for robots: check a configuration, launch it, look at it, call it.
+/// Prioritised mailboxes for robots: configure, launch, look, call.
 #[derive(Parser)]
-#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost list`.")]
+#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -76,7 +78,7 @@ enum Command {
     Bw(bw::Arguments),
     /// Measure how long packages wait; disturbs nobody.
     Delay(delay::Arguments),
-    /// Show or draw who sends what to whom, how often; disturbs nobody.
+    /// Show or draw who sends what to whom; disturbs nobody.
     Graph(graph::Arguments),
     /// Measure how long a module takes to answer.
     Ping(ping::Arguments),
@@ -88,11 +90,11 @@ enum Command {
     Clean(clean::Arguments),
     /// Look whether this computer lets a robot run in time.
     Doctor(doctor::Arguments),
-    /// Begin a module of your own: a project that compiles, runs and has a test.
+    /// Begin a module of your own: a project that builds and runs.
     New(new::Arguments),
-    /// Print a script by which a shell completes commands, modules, functions and data.
+    /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
-    /// Print versions: of this program, and of what it shares with others.
+    /// Print versions, of this program and of what nodes share.
     Version(version::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
@@ -101,7 +103,8 @@ enum Command {
 /// Runs the command that was typed.
 pub(crate) fn main() -> ExitCode {
     completions::answer();
-    let result = match Arguments::parse().command {
+    let arguments = Arguments::from_arg_matches(&help::command().get_matches()).unwrap_or_else(|error| error.exit());
+    let result = match arguments.command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),

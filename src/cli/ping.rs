@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 #[command(after_help = "Examples:
   rohrpost ping motor.0               once a second; Ctrl-C ends it
   rohrpost ping motor.0 -c 100 --interval 0.01
-It calls `status`. The time is that of the whole round: a module answers between its own work, and so what it does just
+It calls `status`. The time is that of the whole round: a module answers between its own work, and so what it does just \
 then is in it, as is being waited for behind more important classes. The exit code is 1 if nothing was answered.")]
 pub(super) struct Arguments {
     /// Module or face, such as motor.0.
@@ -104,12 +104,7 @@ fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
             process.state.map_or("unknown", ModuleState::name),
             found.depth
         ),
-        None if found.is_some() => {
-            format!(
-                "{name} answered nothing: it does not run; see `rohrpost log --module {name}`, then launch it again"
-            )
-        }
-        None => format!("{name} answered nothing: there is no such module on this node; see `rohrpost list`"),
+        None => running.absent(module).to_string(),
     })
 }
 

@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(50);
 #[command(after_help = "Examples:
   rohrpost send motor.0 drive 0.3 0.5                 ten times a second, until Ctrl-C
   rohrpost send motor.0 drive 0.3 0.5 --rate 20 --count 40
-Each error is told once, then counted. A command that waits longer than --timeout is not run any more. Commands that
+Each error is told once, then counted. A command that waits longer than --timeout is not run any more. Commands that \
 come due while earlier ones keep this program from sending are left out, not sent in a heap.")]
 pub(super) struct Arguments {
     /// Module or face, such as motor.0.

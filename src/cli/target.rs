@@ -5,7 +5,7 @@ use clap::Args;
 use rohrpost::ToolLink;
 use rohrpost::config::Installation;
 use rohrpost::description::Description;
-use rohrpost::mailbox::{Name, Node, node_directory};
+use rohrpost::mailbox::{Name, Node, SendError, node_directory};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -92,22 +92,49 @@ impl Running {
         Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)
     }
 
-    /// The module or face that a user names.
+    /// The module or face that a user names, or a program run by hand: one of the configuration, or with mailboxes here.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
-        Ok(self.installation.classes.parse_name(text)?.module())
+        let classes = &self.installation.classes;
+        let module = classes.parse_name(text)?.module();
+        let known = self.installation.module(module).is_some() || module.class() == classes.tool();
+        if known || self.is_here(module)? {
+            return Ok(module);
+        }
+        let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
+        Err(format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into())
     }
 
     /// The module or face that a user names, if it has mailboxes on this node.
     pub(super) fn present(&self, text: &str) -> Result<Name, Failure> {
         let module = self.module(text)?;
-        let here = self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module);
-        if here { Ok(module) } else { Err(self.absent(module)) }
+        if self.is_here(module)? { Ok(module) } else { Err(self.absent(module)) }
     }
 
-    fn absent(&self, module: Name) -> Failure {
-        let known = self.installation.module(module).is_some();
-        let next = if known { "is it launched? see `rohrpost list`" } else { "`rohrpost list` shows those that run" };
-        format!("{} has no mailboxes here; {next}", self.text(module)).into()
+    fn is_here(&self, module: Name) -> Result<bool, Failure> {
+        Ok(self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module))
+    }
+
+    /// A module that has no mailboxes here: why, and what to do.
+    pub(super) fn absent(&self, module: Name) -> Failure {
+        let name = self.text(module);
+        match self.installation.module(module) {
+            Some(known) if known.node != self.node_name => {
+                format!(
+                    "{name} is a module of node {}, and this is {}; no router leads there yet",
+                    known.node, self.node_name
+                )
+            }
+            Some(_) if self.node.launcher().is_some() => {
+                format!("{name} does not run; `rohrpost start {name}` starts it, or says why it cannot")
+            }
+            Some(_) => {
+                format!("{name} does not run, and no launch watches over it; start it as you started the others")
+            }
+            None => format!(
+                "{name} does not run, and the configuration has no such module; `rohrpost list` shows what runs"
+            ),
+        }
+        .into()
     }
 
     /// What the module offers, as it noted beside its mailboxes: nobody is asked.
@@ -117,7 +144,11 @@ impl Running {
 
     /// An error about a module, with its name as users write it: the lower layers know numbers only.
     pub(super) fn told(&self, module: Name, error: &dyn std::error::Error) -> Failure {
-        error.to_string().replace(&module.to_string(), &self.text(module)).into()
+        let text = error.to_string();
+        if text.contains(&SendError::NoMailbox(module).to_string()) {
+            return self.absent(module);
+        }
+        text.replace(&module.to_string(), &self.text(module)).into()
     }
 
     /// A name as users write it.

@@ -33,7 +33,13 @@ fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
     let said = place.say(&["stop", "probe.0"]).ok();
     assert!(said.contains("probe.0 is stopped (ended with 0 when told to)"), "{said}");
     assert!(robot.process("probe.0").is_none());
-    assert!(place.say(&["call", "probe.0", "count", "1"]).fails().contains("not on this node"), "nobody waits for it");
+    assert!(
+        place
+            .say(&["call", "probe.0", "count", "1"])
+            .fails()
+            .contains("probe.0 does not run; `rohrpost start probe.0` starts it"),
+        "nobody waits for it"
+    );
     assert!(place.say(&["stop", "probe.0"]).fails().contains("probe.0 is stopped already; `rohrpost start probe.0`"));
     assert_eq!(child(&robot, "probe.0").phase, Phase::Stopped);
 

@@ -111,6 +111,22 @@ fn the_configuration_of_the_present_folder_is_taken_if_there_is_one() {
 }
 
 #[test]
+fn a_demo_without_its_gui_names_the_file_that_people_know() {
+    let place = Place::new();
+    let absent = "[[module]]\nname = \"probe.1\"\nprogram = \"../absent\"\noptional = true\n";
+    let config = place.config(&[&probe("probe.0", "", ""), absent]);
+    let text = std::fs::read_to_string(&config).unwrap();
+    let line = text.lines().position(|line| line == "name = \"probe.1\"").unwrap(); // of [[module]], counted from 1
+    std::fs::create_dir(place.path("config")).unwrap();
+    std::fs::rename(config, place.path("config/demo.toml")).unwrap();
+    let said = place.say(&["demo", "--no-gui", "--seconds", "0.1", "--quiet"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let note = format!("config/demo.toml:{line}: module `probe.1`: `");
+    assert!(format!("{}{}", said.out, said.err).contains(&note), "{note}: {said:?}");
+    place.assert_empty();
+}
+
+#[test]
 fn a_log_that_is_none_is_told_and_fails() {
     let place = Place::new();
     let log = place.path("poem.txt");

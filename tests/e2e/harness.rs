@@ -10,6 +10,7 @@ use rohrpost::mailbox::{Node, ParticipantInfo, local, node_directory};
 use rohrpost::serde::Serialize;
 use rohrpost::{Name, ToolLink};
 use std::fmt::Debug;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -46,6 +47,11 @@ pub(crate) fn wait<T>(what: impl Debug, mut look: impl FnMut() -> Option<T>) -> 
     }
 }
 
+/// Says that something was not tested here, past the test harness, which keeps what passing tests print to itself.
+pub(crate) fn skipped(why: &str) {
+    let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: {why}");
+}
+
 /// A table's line in a configuration: a probe with these settings and other keys.
 pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
     let program = super::probe::program();
@@ -63,8 +69,8 @@ pub(crate) fn runs(pid: u32) -> bool {
     threads.map(|thread| state(&thread.path().join("stat"))).any(|state| !matches!(state, 'Z' | 'X'))
 }
 
-/// The letter after the name, which may hold anything; `X` when there is none any more.
-fn state(stat: &Path) -> char {
+/// State of a process or thread: the letter after the name, which may hold anything; `X` when there is none any more.
+pub(crate) fn state(stat: &Path) -> char {
     let text = std::fs::read_to_string(stat).unwrap_or_default();
     text.rsplit_once(") ").and_then(|(_, rest)| rest.chars().next()).unwrap_or('X')
 }

@@ -241,9 +241,9 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
     assert!(blob.starts_with("blob     "), "{text}");
     for (arguments, error) in [
         (&["hz", "probe.0", "bleat"][..], "probe.0 has no data `bleat`; it has: beat, silence, blob\n"),
-        (&["hz", "probe.7"], "probe.7 has no mailboxes here; `rohrpost list` shows those that run\n"),
-        (&["bw", "probe.7"], "probe.7 has no mailboxes here; `rohrpost list` shows those that run\n"),
-        (&["delay", "probe.7"], "probe.7 has no mailboxes here; `rohrpost list` shows those that run\n"),
+        (&["hz", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
+        (&["bw", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
+        (&["delay", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
         (&["hz", "probe.0", "--window", "0"], "a window of 0 s holds nothing; try --window 1\n"),
     ] {
         assert_eq!(place.say(arguments).fails(), error);
@@ -286,7 +286,7 @@ fn ping_counts_answers_and_ends_at_its_deadline() {
     signal(pid, Signal::SIGCONT);
     place.say(&["ping", "probe.0", "-c", "1"]).ok();
     let error = place.say(&["ping", "probe.3", "-c", "1"]).fails();
-    assert!(error.contains("there is no such module on this node; see `rohrpost list`"), "{error}");
+    assert!(error.contains("the configuration has no module `probe.3`; there are probe.0"), "{error}");
 }
 
 #[test]

@@ -54,6 +54,20 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
     let count = place.say(&["echo", "wind-vane.0", "count", "--count", "1", "--json"]).json();
     assert!(count["value"].as_u64().unwrap() > 1000, "{count}");
     assert!(place.say(&["log"]).ok().contains("counts 10 times a second"));
+    // Its parameter, as the README there changes it.
+    let listed = place.say(&["param", "get", "wind-vane.0"]).ok();
+    assert!(listed.contains("rate-hz") && listed.contains("Hz    0.1..=1000  Counts so often."), "{listed}");
+    let set = place.say(&["param", "set", "wind-vane.0", "rate-hz", "200"]).ok();
+    assert_eq!(set, "wind-vane.0 rate-hz: 10 -> 200 Hz\n");
+    let refused = place.say(&["param", "set", "wind-vane.0", "rate-hz", "0"]).fails();
+    assert!(refused.contains("out of range: 0.1..=1000 Hz"), "{refused}");
+    // Ten a second could not count so far in this time.
+    let counted = || place.say(&["call", "wind-vane.0", "get", "count", "--json"]).json().as_u64().unwrap();
+    let (first, began) = (counted(), std::time::Instant::now());
+    wait("it counts at the new rate", || {
+        let elapsed_s = began.elapsed().as_secs_f64();
+        ((counted() - first) as f64 > 20.0 + 15.0 * elapsed_s).then_some(())
+    });
     launch.stop();
     place.assert_empty();
     // What was built for a project in a folder that is gone is of no use to anybody.

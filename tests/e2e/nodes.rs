@@ -58,7 +58,9 @@ fn two_nodes_of_one_system_are_apart() {
         assert_eq!(list["modules"][0]["module"], own);
         assert_eq!(place.say(&[&["call"], &at[..], &[own, "count", "1"]].concat()).ok(), "1\n");
         let told = place.say(&[&["call"], &at[..], &[other, "count", "1"]].concat()).fails();
-        assert!(told.contains("not on this node"), "{told}");
+        let why =
+            format!("{other} is a module of node {}, and this is {node}", if node == "base" { "arm" } else { "base" });
+        assert!(told.contains(&why), "{told}");
     }
     for (mut launch, robot) in running {
         drop(robot);

@@ -14,7 +14,8 @@ fn log(place: &Place, arguments: &[&str]) -> crate::process::Said {
 /// What was said, without time and node, and without the modules' own words.
 fn shown(place: &Place, arguments: &[&str]) -> Vec<String> {
     let text = log(place, arguments).ok();
-    let lines = text.lines().filter(|line| !line.ends_with("is on"));
+    // The probe is a test binary, and says so.
+    let lines = text.lines().filter(|line| !line.ends_with("is on") && !line.ends_with("running 1 test"));
     lines.map(|line| line.split_once("main/").unwrap().1.to_owned()).collect()
 }
 
@@ -63,11 +64,11 @@ fn what_is_set_wrongly_is_told_with_what_would_be_right() {
     let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     for (arguments, words) in [
         (&["--level", "probe.0=loud"][..], "no level `loud`; there are error, warn, info, debug, trace"),
-        (&["--level", "probe.7=debug"], "no [[module]] is called `probe.7`; there are output.0, probe.0"),
+        (&["--level", "probe.7=debug"], "the configuration has no module `probe.7`; there are output.0, probe.0"),
         (&["--level", "prob=debug"], "no class `prob`; there are probe, output, tool"),
         (&["--level", "tool=debug"], "node `main` has no module of class `tool`"),
         (&["--level", "warn", "--level", "info"], "to set levels write --level NAME=LEVEL"),
-        (&["--module", "probe.7"], "no [[module]] is called `probe.7`; there are output.0, probe.0"),
+        (&["--module", "probe.7"], "the configuration has no module `probe.7`; there are output.0, probe.0"),
         (&["--class", "prob"], "no class `prob`; there are probe, output, tool"),
         (&["--since", "5"], "`5` has no unit"),
         (&["--timeout=-1"], "-1 s is no time to wait"),

@@ -108,7 +108,7 @@ fn a_refused_value_says_why_and_changes_nothing() {
     wait_for(&place, " 1 1 9 Left true a \\\"word\\\" []");
     for (arguments, says) in [
         (&["param", "set", "output.0", "ring", "1"][..], "output.0 has no parameters"),
-        (&["param", "get", "probe.1"], "not on this node"),
+        (&["param", "get", "probe.1"], "the configuration has no module `probe.1`; there are"),
         (&["param", "get", "prob.0"], "did you mean `probe`?"),
         (&["param", "set", "probe.0", "gain", "1", "--timeout=-1"], "-1 s is no time to wait"),
     ] {

@@ -74,7 +74,10 @@ fn pauses_grow_and_a_module_that_keeps_ending_is_given_up() {
         (robot.node.mailboxes().unwrap().iter().all(|n| n.module() != robot.name("probe.0"))).then_some(())
     });
     let told = place.say(&["call", "probe.0", "count", "1"]).fails();
-    assert!(told.contains("not on this node"), "nothing waits for a module that never comes: {told}");
+    assert!(
+        told.contains("probe.0 does not run; `rohrpost start probe.0` starts it"),
+        "nothing waits for a module that never comes: {told}"
+    );
     let status = place.say(&["status"]);
     assert_eq!(status.code, Some(1), "one does not answer: {}", status.out);
     launch.signal(Signal::SIGINT);

@@ -6,10 +6,12 @@
 
 mod drawings;
 mod launched;
+mod load;
 mod own_view;
 mod picture;
 mod programs;
 mod robot;
+mod stopped;
 mod switching;
 mod torture;
 mod viewer;

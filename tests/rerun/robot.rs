@@ -2,10 +2,12 @@
 //!
 //! Both are this test program itself, started by launch with the one test [`module`] to run.
 
+use super::load::on_one_processor;
 use super::programs::bridge;
+use rohrpost::common::GET_DATA;
 use rohrpost::config::Installation;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{ModuleState, Node, monotonic_ns, node_directory};
+use rohrpost::mailbox::{MailboxInfo, ModuleState, Node, monotonic_ns, node_directory};
 use rohrpost::serde::{Deserialize, de::DeserializeOwned};
 use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use rohrpost::{Context, Module, ModuleError, Name, Rate, Received, Subscription, ToolLink};
@@ -28,7 +30,8 @@ const FLOOD: u64 = 8;
 fn module() {
     let Some(name) = std::env::var_os("ROHRPOST_MODULE") else { return };
     let is_source = name.to_string_lossy().starts_with("source");
-    let code = if is_source { rohrpost::run::<Source>() } else { rohrpost::run::<Sink>() };
+    let run = || if is_source { rohrpost::run::<Source>() } else { rohrpost::run::<Sink>() };
+    let code = on_one_processor(run);
     std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
 }
 
@@ -119,8 +122,8 @@ struct SourceSettings {
 
 struct Source {
     settings: SourceSettings,
-    began: Option<Instant>,
-    began_ns: u64,
+    /// On the monotonic clock, which ticks go by too.
+    began_ns: Option<u64>,
     beats: u64,
     mark: Option<Mark>,
     flood: bool,
@@ -132,16 +135,18 @@ impl Module for Source {
 
     fn new(settings: SourceSettings, context: &mut Context) -> Result<Self, ModuleError> {
         context.set_period(BEAT);
-        Ok(Self { settings, began: None, began_ns: 0, beats: 0, mark: None, flood: false })
+        Ok(Self { settings, began_ns: None, beats: 0, mark: None, flood: false })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        let began = *self.began.get_or_insert_with(|| {
-            self.began_ns = monotonic_ns();
-            Instant::now()
-        });
+        let Some(began_ns) = self.began_ns else {
+            // From here on beats are due: the first tick was late, and would be taken for the grid of all others.
+            self.began_ns = Some(monotonic_ns());
+            context.set_period(BEAT);
+            return Ok(());
+        };
         let beat_ns = BEAT.as_nanos() as u64;
-        let due_ns = self.began_ns + began.elapsed().as_nanos() as u64 / beat_ns * beat_ns;
+        let due_ns = began_ns + (monotonic_ns() - began_ns) / beat_ns * beat_ns;
         if let Some(port) = self.settings.ask_viewer {
             ask(port);
         }
@@ -234,7 +239,7 @@ impl Receiving for Sink {
     }
 }
 
-/// The robot, running, with a bridge that draws to the viewer at a port.
+/// The robot, running, with a bridge that draws.
 pub(crate) struct Robot {
     launch: Child,
     tool: ToolLink,
@@ -244,11 +249,11 @@ pub(crate) struct Robot {
 }
 
 impl Robot {
-    /// Starts it; `settings` are the source's.
-    pub(crate) fn start(port: u16, settings: &str) -> Self {
+    /// Starts it; `drawing` are the bridge's settings, `settings` the source's.
+    pub(crate) fn start(drawing: &str, settings: &str) -> Self {
         let memory = tempfile::Builder::new().prefix("rohrpost-gui-").tempdir().unwrap();
         let config = memory.path().join("robot.toml");
-        std::fs::write(&config, configuration(port, settings)).unwrap();
+        std::fs::write(&config, configuration(drawing, settings)).unwrap();
         let installation = Installation::load(&config).unwrap();
         let launch = Command::new(env!("CARGO_BIN_EXE_rohrpost"))
             .args(["launch", "robot.toml"])
@@ -313,6 +318,26 @@ impl Robot {
         self.node.participants().into_iter().find(|p| p.module == gui).unwrap().pid
     }
 
+    /// Time of the newest scan that was published, ns since 1970: whoever subscribed to each has been sent it.
+    pub(crate) fn newest_scan_ns(&mut self) -> u64 {
+        let (source, scan) = (self.name("source.0"), SendingInterface::SCAN.number);
+        let write = |body: &mut Vec<u8>| append(body, &(scan,));
+        let (stamp_ns, _): (u64, LaserScan) =
+            self.tool.call(source, GET_DATA, SendingInterface::hash(), write, |bytes| from_bytes(bytes)).unwrap();
+        stamp_ns
+    }
+
+    /// One of the bridge's mailboxes.
+    pub(crate) fn bridge_mailbox(&self, local: u8) -> MailboxInfo {
+        self.node.look_at(self.name("gui.0").with_local(local)).unwrap()
+    }
+
+    /// Data that a module should have got and did not.
+    pub(crate) fn lost_by(&mut self, module: &str) -> u64 {
+        let module = self.name(module);
+        self.tool.status(module).unwrap().lost
+    }
+
     /// Memory of the bridge, MiB.
     pub(crate) fn bridge_mib(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.bridge_pid())).unwrap();
@@ -335,8 +360,13 @@ impl Robot {
 
     /// What modules have said.
     pub(crate) fn said(&self) -> String {
-        let mut log = Command::new(env!("CARGO_BIN_EXE_rohrpost"));
-        let output = log.arg("log").env("ROHRPOST_DIR", self.memory.path().join("nodes")).output().unwrap();
+        self.say(&["log"])
+    }
+
+    /// What a tool says of it.
+    pub(crate) fn say(&self, arguments: &[&str]) -> String {
+        let mut tool = Command::new(env!("CARGO_BIN_EXE_rohrpost"));
+        let output = tool.args(arguments).env("ROHRPOST_DIR", self.memory.path().join("nodes")).output().unwrap();
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
@@ -360,7 +390,7 @@ impl Drop for Robot {
 }
 
 /// No scheduling in real time, so that it runs where that is not allowed, and what the bridge takes is felt.
-fn configuration(port: u16, settings: &str) -> String {
+fn configuration(drawing: &str, settings: &str) -> String {
     let me = std::env::current_exe().unwrap();
     let program = format!("[{me:?}, \"--exact\", \"robot::module\", \"--nocapture\"]");
     let bridge = bridge();
@@ -395,13 +425,13 @@ settings = {{}}
 name = "gui.0"
 program = [{bridge:?}]
 calls = ["source.0", {{ to = "output.0", although = "it reads earlier lines once, and waits for nobody" }}]
-settings = {{ viewer = "rerun+http://127.0.0.1:{port}/proxy" }}
+settings = {{ {drawing} }}
 [module.mailbox.data]
 slots = 256
 size = "20 KiB"
 [gui]
 show = [
-    {{ from = "source.0", data = "scan" }},
+    {{ from = "source.0", data = "scan", rate = 0.0 }},
     {{ from = "source.0", data = "odometry" }},
     {{ from = "source.0", data = "map", rate = 0.0 }},
     {{ from = "source.0", data = "marks", rate = 0.0 }},

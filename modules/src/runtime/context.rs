@@ -6,7 +6,7 @@ use crate::common::DataHead;
 use crate::interface::{DataPort, Proxy, append};
 use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
-use rohrpost_config::{Installation, NameTextError};
+use rohrpost_config::{ClassTable, Installation, NameTextError};
 use rohrpost_mailbox::{
     CreateError, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime,
     Type, Watch, Watches, local,
@@ -268,12 +268,13 @@ impl Context {
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
         let at = self.newest_at(face, port.number);
         let newest = &mut self.newest[at];
-        newest.stamp_ns = stamp_ns;
+        (newest.name, newest.stamp_ns) = (port.name, stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);
         let (newest, link, faces) = (&self.newest[at], &self.link, &self.faces);
         let age = Duration::from_nanos(self.clock.now().ns.saturating_sub(stamp_ns));
         self.publications.published(faces[face], Type::data(port.number), newest.value.len(), age);
-        self.subscriptions.published(newest, |to| deliver(link, faces, newest, to));
+        let classes = &self.installation.classes;
+        self.subscriptions.published(newest, |to| deliver(link, classes, faces, newest, to));
         Ok(())
     }
 
@@ -297,10 +298,10 @@ impl Context {
 
     /// Delivers periodic data that is due.
     pub(crate) fn deliver_due(&mut self, now_ns: u64) {
-        let (all, link, faces) = (&self.newest, &self.link, &self.faces);
+        let (all, link, faces, classes) = (&self.newest, &self.link, &self.faces, &self.installation.classes);
         self.subscriptions.tick(now_ns, |to| {
             match all.iter().find(|newest| (newest.face, newest.number) == (to.face, to.wish.number)) {
-                Some(newest) => deliver(link, faces, newest, to),
+                Some(newest) => deliver(link, classes, faces, newest, to),
                 // Fresh, so there is one.
                 None => Delivery::Sent,
             }
@@ -309,7 +310,13 @@ impl Context {
 }
 
 /// Sends a value to a subscriber.
-fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::Subscription) -> Delivery {
+fn deliver(
+    link: &Caller,
+    classes: &ClassTable,
+    faces: &[Name],
+    newest: &Newest,
+    to: &crate::publish::Subscription,
+) -> Delivery {
     let head = DataHead { stamp_ns: newest.stamp_ns, sequence: to.sequence, missed: to.missed };
     let label = Label {
         from: faces[newest.face].with_local(local::COMMANDS),
@@ -321,7 +328,16 @@ fn deliver(link: &Caller, faces: &[Name], newest: &Newest, to: &crate::publish::
     match link.borrow_mut().send(to.to, &label, &[&head.to_bytes(), &newest.value]) {
         Ok(()) => Delivery::Sent,
         Err(SendError::NoMailbox(_)) => Delivery::Gone,
-        Err(error @ SendError::TooLarge { .. }) => Delivery::TooLarge(error),
+        Err(SendError::TooLarge { len, max, .. }) => {
+            if !to.told {
+                let (data, subscriber) = (newest.name, classes.format(to.to.module()));
+                tracing::error!(
+                    "`{data}` cannot be delivered to {subscriber}: it has {len} bytes, and the data mailbox there takes \
+                     {max}; raise `size` in [module.mailbox.data] of {subscriber}"
+                );
+            }
+            Delivery::TooLarge
+        }
         Err(_) => Delivery::Full,
     }
 }

@@ -200,6 +200,21 @@ mod tests {
         compare("bad", &said.replace(&format!("this program {LAYOUT_VERSION}"), "this program …"));
     }
 
+    /// As the unit for systemd has it, in /run: what holds there is told of /run, not of /dev/shm.
+    #[test]
+    fn a_computer_with_too_little_room_in_run() {
+        let asked = Asked {
+            fifo: Ok(()),
+            base: "/run/rohrpost/main".into(),
+            room: Some(Room { bytes: 64 << 20, free: 60 << 20 }),
+            nodes: Vec::new(),
+            bridge: None,
+            viewer: None,
+        };
+        let needs = Needs { memory: 70 << 20, from: Some("robot.toml".into()), ..Needs::default() };
+        compare("run", &said("run", asked, &needs));
+    }
+
     /// What a kernel does not tell is not guessed at.
     #[test]
     fn a_computer_that_tells_nothing() {

@@ -29,19 +29,42 @@ pub(super) fn size(bytes: u64) -> String {
     if bytes.is_multiple_of(one) { size_text(bytes) } else { format!("{:.1} {unit}", bytes as f64 / one as f64) }
 }
 
+/// Where a file system is mounted, and of what kind it is.
+struct Mount {
+    point: String,
+    kind: String,
+}
+
+/// The one that nodes lie on; none where the kernel does not tell.
+fn mount(machine: &Machine) -> Option<Mount> {
+    let mounts = machine.read("/proc/mounts")?;
+    let mounts = mounts.lines().filter_map(|line| {
+        let mut words = line.split(' ').skip(1);
+        // White space in a path is written in octal.
+        let point = words.next()?.replace("\\040", " ").replace("\\011", "\t").replace("\\134", "\\");
+        Some(Mount { point, kind: words.next()?.to_owned() })
+    });
+    // The last of the longest: a later mount hides an earlier one.
+    mounts.filter(|mount| machine.asked.base.starts_with(&mount.point)).max_by_key(|mount| mount.point.len())
+}
+
+impl Mount {
+    fn is_memory(&self) -> bool {
+        matches!(self.kind.as_str(), "tmpfs" | "ramfs")
+    }
+
+    /// For a command line.
+    fn quoted(&self) -> String {
+        if self.point.contains(char::is_whitespace) { format!("'{}'", self.point) } else { self.point.clone() }
+    }
+}
+
 fn file_system(machine: &Machine) -> Option<Finding> {
     let (what, why) =
         ("node directory", "mailboxes are files there; on any other file system the kernel writes them to a disk");
-    let base = &machine.asked.base;
-    let mounts = machine.read("/proc/mounts")?;
-    // The last of the longest: a later mount hides an earlier one.
-    let mounts = mounts.lines().filter_map(|line| {
-        let mut words = line.split(' ').skip(1);
-        Some((words.next()?, words.next()?))
-    });
-    let (_, kind) = mounts.filter(|(point, _)| base.starts_with(point)).max_by_key(|(point, _)| point.len())?;
-    let is = format!("{} ({kind})", base.display());
-    if matches!(kind, "tmpfs" | "ramfs") {
+    let mount = mount(machine)?;
+    let is = format!("{} ({})", machine.asked.base.display(), mount.kind);
+    if mount.is_memory() {
         return Some(Finding::ok(what, is, why));
     }
     Some(Finding::not(State::Warn, what, is, why, "unset ROHRPOST_DIR, or set it to a folder below /dev/shm"))
@@ -49,8 +72,12 @@ fn file_system(machine: &Machine) -> Option<Finding> {
 
 fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
     let (what, why) = ("shared memory", "a mailbox takes its memory when it is made; then it must be there");
+    let mount = mount(machine);
     let Some(room) = machine.asked.room else {
-        let mend = "mount -t tmpfs tmpfs /dev/shm";
+        let mend = match &mount {
+            Some(mount) if mount.is_memory() => format!("df {}", mount.quoted()),
+            _ => "mount -t tmpfs tmpfs /dev/shm".to_owned(),
+        };
         return Some(Finding::not(State::Warn, what, "its size is not told", why, mend));
     };
     let needed = match &needs.from {
@@ -59,18 +86,24 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
     };
     let is = format!("{} free of {}{needed}", size(room.free), size(room.bytes));
     let mend = || {
-        let more = (needs.memory + 2 * SPARE + room.bytes - room.free).next_power_of_two();
-        format!(
-            "rohrpost clean; sudo mount -o remount,size={}M /dev/shm; in a container: `--shm-size={}m`",
-            more >> 20,
-            more >> 20
-        )
+        let wanted = (needs.memory + 2 * SPARE + room.bytes - room.free).next_power_of_two() >> 20;
+        format!("rohrpost clean; {}", more_room(mount.as_ref(), wanted))
     };
     Some(match room.free {
         free if free < needs.memory => Finding::not(State::Bad, what, is, why, mend()),
         free if free < needs.memory + SPARE => Finding::not(State::Warn, what, is, why, mend()),
         _ => Finding::ok(what, is, why),
     })
+}
+
+/// What makes a file system so large.
+fn more_room(mount: Option<&Mount>, mib: u64) -> String {
+    let Some(mount) = mount else { return format!("give the node directory a tmpfs of {mib} MiB") };
+    if !mount.is_memory() {
+        return format!("free some of the disk at {}, or better move to /dev/shm, with {mib} MiB", mount.quoted());
+    }
+    let remount = format!("sudo mount -o remount,size={mib}M {}", mount.quoted());
+    if mount.point == "/dev/shm" { format!("{remount}; in a container: `--shm-size={mib}m`") } else { remount }
 }
 
 fn container(machine: &Machine) -> Option<Finding> {
@@ -86,56 +119,55 @@ fn container(machine: &Machine) -> Option<Finding> {
 
 /// Limits of the control group that this process is in, and of those around it.
 fn groups_of_control(machine: &Machine, needs: &Needs) -> Vec<Finding> {
-    let mut found = Vec::new();
+    let mut found: Vec<Finding> = share_of_time(machine).into_iter().chain(share_of_real_time(machine)).collect();
+    // Of version 2, and of version 1.
+    found.extend(["memory.max", "memory.limit_in_bytes"].iter().filter_map(|file| memory_limit(machine, needs, file)));
+    found.extend(process_limit(machine, needs));
+    found
+}
+
+fn share_of_time(machine: &Machine) -> Option<Finding> {
     let why = "a control group that has used up its share stands still, however urgent its threads are";
-    if let Some((value, path)) = tightest(machine, "cpu", "cpu.max", |text| {
+    let (value, path) = tightest(machine, "cpu", "cpu.max", |text| {
         let (quota, period) = text.split_once(' ')?;
         Some(quota.parse::<f64>().ok()? / period.parse::<f64>().ok()?)
-    }) {
-        let is = format!("{value} cores ({path})");
-        let mend = format!("echo max | sudo tee {path}, or start the container without `--cpus`");
-        found.push(Finding::not(State::Warn, "CPU quota", is, why, mend));
+    })?;
+    let mend = format!("echo max | sudo tee {path}, or start the container without `--cpus`");
+    Some(Finding::not(State::Warn, "CPU quota", format!("{value} cores ({path})"), why, mend))
+}
+
+/// Version 1 of control groups gives real-time threads nothing unless told.
+fn share_of_real_time(machine: &Machine) -> Option<Finding> {
+    let least = tightest(machine, "cpu", "cpu.rt_runtime_us", |text| text.parse::<f64>().ok());
+    let (_, path) = least.filter(|(value, _)| *value <= 0.0)?;
+    let mend = format!("echo 950000 | sudo tee {path}, in the groups around it first");
+    let why = "SCHED_FIFO is refused in such a group";
+    Some(Finding::not(State::Warn, "real-time quota", format!("0 µs ({path})"), why, mend))
+}
+
+fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding> {
+    let (what, why) = ("memory limit", "who goes beyond is killed; shared memory counts");
+    let (limit, path) = tightest(machine, "memory", file, whole)?;
+    let (limit, is) = (limit as u64, format!("{} ({path})", size(limit as u64)));
+    if limit >= needs.memory + SPARE {
+        return Some(Finding::ok(what, is, why));
     }
-    // Version 1 of control groups gives real-time threads nothing unless told.
-    if let Some((value, path)) = tightest(machine, "cpu", "cpu.rt_runtime_us", |text| text.parse::<f64>().ok())
-        && value <= 0.0
-    {
-        let is = format!("0 µs ({path})");
-        let mend = format!("echo 950000 | sudo tee {path}, in the groups around it first");
-        found.push(Finding::not(State::Warn, "real-time quota", is, "SCHED_FIFO is refused in such a group", mend));
+    let mend = "start the container with more `--memory`, or MemoryMax= in the unit";
+    Some(Finding::not(State::Bad, what, is, why, mend))
+}
+
+fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
+    let (what, why) = ("processes", "each module is a process of a few threads");
+    let (limit, path) = tightest(machine, "pids", "pids.max", whole)?;
+    let (limit, wanted) = (limit as u64, needs.processes as u64 * THREADS);
+    let used = machine.number(&path.replace("pids.max", "pids.current")).unwrap_or(0);
+    let is = format!("{limit}, {used} in use ({path})");
+    if limit >= used + wanted {
+        return Some(Finding::ok(what, is, why));
     }
-    let why = "who goes beyond is killed; shared memory counts";
-    for file in ["memory.max", "memory.limit_in_bytes"] {
-        let Some((limit, path)) = tightest(machine, "memory", file, whole) else { continue };
-        let (limit, is) = (limit as u64, format!("{} ({path})", size(limit as u64)));
-        found.push(if limit < needs.memory + SPARE {
-            Finding::not(
-                State::Bad,
-                "memory limit",
-                is,
-                why,
-                "start the container with more `--memory`, or MemoryMax= in the unit",
-            )
-        } else {
-            Finding::ok("memory limit", is, why)
-        });
-    }
-    let why = "each module is a process of a few threads";
-    if let Some((limit, path)) = tightest(machine, "pids", "pids.max", whole) {
-        let (limit, wanted) = (limit as u64, needs.processes as u64 * THREADS);
-        let used = machine.number(&path.replace("pids.max", "pids.current")).unwrap_or(0);
-        let is = format!("{limit}, {used} in use ({path})");
-        found.push(if limit < used + wanted {
-            let mend = format!(
-                "echo {} | sudo tee {path}, or `--pids-limit` of the container, TasksMax= of the unit",
-                used + 10 * wanted
-            );
-            Finding::not(State::Bad, "processes", is, why, mend)
-        } else {
-            Finding::ok("processes", is, why)
-        });
-    }
-    found
+    let more = used + 10 * wanted;
+    let mend = format!("echo {more} | sudo tee {path}, or `--pids-limit` of the container, TasksMax= of the unit");
+    Some(Finding::not(State::Bad, what, is, why, mend))
 }
 
 /// A limit in bytes or processes. What is as good as none (version 1 writes it as the largest number of pages) is none.

@@ -25,7 +25,7 @@ use std::time::Duration;
   rohrpost graph                             a table: who, to whom, what, how often
   rohrpost graph --svg -o graph.svg          a drawing
   rohrpost graph --dot | dot -Tpdf > graph.pdf
-Rates are of the time that it looks. A drawing leaves out replies and the calls that every module has (such as the
+Rates are of the time that it looks. A drawing leaves out replies and the calls that every module has (such as the \
 renewing of subscriptions); --all draws them too. It reads counters in shared memory: nothing is sent.")]
 pub(super) struct Arguments {
     #[command(flatten)]

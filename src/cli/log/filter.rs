@@ -49,10 +49,10 @@ impl Filter {
 /// The module that a user names by its own name or a face's: lines carry its own.
 pub(super) fn module(text: &str, running: &Running) -> Result<Name, Failure> {
     let name = running.module(text)?;
-    let module = running.installation.module(name).ok_or_else(|| {
-        let all: Vec<String> = running.installation.modules.iter().map(|module| running.text(module.name)).collect();
-        format!("no [[module]] is called `{text}`; there are {}", all.join(", "))
-    })?;
+    let module = running
+        .installation
+        .module(name)
+        .ok_or_else(|| format!("{text} is a program run by hand, and says nothing to the collector"))?;
     Ok(module.name)
 }
 

@@ -1,0 +1,63 @@
+//! `rohrpost --help`: thirty subcommands, those of every day first.
+
+use clap::{Command, CommandFactory};
+
+/// Headings and their subcommands, in the order of a newcomer's days.
+const GROUPS: [(&str, &[&str]); 6] = [
+    ("To begin", &["demo", "new", "check", "launch"]),
+    ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
+    ("One of its modules", &["restart", "stop", "start"]),
+    ("To measure", &["hz", "bw", "delay", "graph", "ping", "send"]),
+    ("This computer", &["doctor", "clean", "completions", "version"]),
+    ("Else", &["run", "help"]),
+];
+
+/// The command line, with its subcommands in groups.
+pub(super) fn command() -> Command {
+    let command = super::Arguments::command();
+    let template = format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}\nOptions:\n{{options}}{{after-help}}",
+        groups(&command)
+    );
+    command.help_template(template)
+}
+
+fn groups(command: &Command) -> String {
+    let width = command.get_subcommands().map(|sub| sub.get_name().len()).max().unwrap_or_default();
+    let line = |name: &&str| match command.find_subcommand(name) {
+        Some(sub) => format!("  {name:width$}  {}\n", sub.get_about().cloned().unwrap_or_default()),
+        // Clap adds `help` by itself, later.
+        None => format!("  {name:width$}  Print this, or the help of a command: `rohrpost help echo`\n"),
+    };
+    let group =
+        |(heading, names): &(&str, &[&str])| format!("{heading}:\n{}", names.iter().map(line).collect::<String>());
+    GROUPS.iter().map(group).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_subcommand_is_in_one_group() {
+        let mut grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
+        let command = super::super::Arguments::command();
+        let mut there: Vec<&str> = command.get_subcommands().map(Command::get_name).chain(["help"]).collect();
+        grouped.sort_unstable();
+        there.sort_unstable();
+        assert_eq!(grouped, there);
+    }
+
+    #[test]
+    fn help_shows_what_is_done_first_and_keeps_within_eighty_columns() {
+        let help = command().render_help().to_string();
+        let at = |text: &str| help.find(text).unwrap_or_else(|| panic!("{text}: {help}"));
+        assert!(
+            at("Usage: rohrpost") < at("To begin:")
+                && at("\n  demo ") < at("\n  top ")
+                && at("\n  top ") < at("\n  run ")
+        );
+        let long = help.lines().find(|line| line.chars().count() > 80);
+        assert_eq!(long, None);
+    }
+}

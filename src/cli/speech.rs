@@ -1,0 +1,209 @@
+//! What launch says at its standard output and standard error. Whoever should read there may stand still (a full pipe, a
+//! journal that hangs, a terminal after Ctrl-S), and launch must go on: so each stream has a queue, and a thread that
+//! writes. What finds no room is counted, and the count is said in its place.
+//!
+//! ```text
+//! launch ── line ──▶ queue, 256 lines ──▶ thread ──▶ stdout          the same with stderr
+//! ```
+
+use std::collections::VecDeque;
+use std::io::{self, Write};
+use std::os::fd::AsFd;
+use std::os::unix::fs::MetadataExt;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Texts that wait for a stream that is not read.
+const WAITING_MAX: usize = 256;
+/// So long it waits at the end for who reads what it said.
+const LAST_WORDS: Duration = Duration::from_secs(1);
+
+/// How urgent a line is, as the journal counts.
+#[derive(Clone, Copy)]
+enum Urgency {
+    Error = 3,
+    Notice = 5,
+}
+
+/// Says things and never waits, but for a moment at the end.
+pub(super) struct Speech {
+    out: Stream,
+    err: Stream,
+}
+
+impl Speech {
+    /// Of this process's standard output and standard error.
+    pub(super) fn begin() -> io::Result<Self> {
+        Ok(Self {
+            out: Stream::begin("says", io::stdout(), Urgency::Notice)?,
+            err: Stream::begin("complains", io::stderr(), Urgency::Error)?,
+        })
+    }
+
+    /// Something that happened.
+    pub(super) fn say(&self, line: &str) {
+        self.out.line(line);
+    }
+
+    /// Something that failed for good.
+    pub(super) fn complain(&self, line: &str) {
+        self.err.line(line);
+    }
+
+    /// Draws over what was drawn before; not while that is still being written.
+    pub(super) fn draw(&self, picture: String) {
+        let mut queue = self.out.shared.lock();
+        if !queue.is_busy() {
+            queue.push(picture);
+            self.out.shared.changed.notify_all();
+        }
+    }
+
+    /// Waits until all is written, but only for a moment: at the end, when nothing runs any more.
+    pub(super) fn settle(&self) {
+        let deadline = Instant::now() + LAST_WORDS;
+        self.out.shared.wait(deadline);
+        self.err.shared.wait(deadline);
+    }
+}
+
+/// A stream, and what waits to be written there.
+struct Stream {
+    shared: Arc<Shared>,
+    /// Stands before each line in the journal; empty elsewhere.
+    mark: String,
+}
+
+#[derive(Default)]
+struct Shared {
+    queue: Mutex<Queue>,
+    changed: Condvar,
+}
+
+impl Stream {
+    fn begin(name: &str, stream: impl Write + AsFd + Send + 'static, urgency: Urgency) -> io::Result<Self> {
+        let mark = if is_journal(&stream) { format!("<{}>", urgency as u8) } else { String::new() };
+        let shared = Arc::new(Shared::default());
+        let (source, lost_mark) = (shared.clone(), mark.clone());
+        // It is never waited for to the end: it may stand in a write for ever, and goes with the process.
+        std::thread::Builder::new().name(name.into()).spawn(move || source.write_all(stream, &lost_mark))?;
+        Ok(Self { shared, mark })
+    }
+
+    fn line(&self, line: &str) {
+        self.shared.lock().push(marked(&self.mark, line));
+        self.shared.changed.notify_all();
+    }
+}
+
+/// A line, or several, as the journal wants them: each begins with its urgency.
+fn marked(mark: &str, line: &str) -> String {
+    format!("{mark}{}\n", line.replace('\n', &format!("\n{mark}")))
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn write_all(&self, mut stream: impl Write, mark: &str) {
+        let mut queue = self.lock();
+        loop {
+            let Some(next) = queue.take() else {
+                queue = self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner);
+                continue;
+            };
+            drop(queue);
+            let text = match next {
+                Next::Text(text) => text,
+                Next::Lost(count) => marked(mark, &format!("… lost here: {count}, since nobody read this")),
+            };
+            // Who would read it may be gone; that is no reason to stop a robot.
+            let _ = stream.write_all(text.as_bytes()).and_then(|()| stream.flush());
+            queue = self.lock();
+            queue.writing = false;
+            self.changed.notify_all();
+        }
+    }
+
+    fn wait(&self, deadline: Instant) {
+        let left = deadline.saturating_duration_since(Instant::now());
+        let waited = self.changed.wait_timeout_while(self.lock(), left, |queue| queue.is_busy());
+        drop(waited.unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+/// What waits for a stream. What finds no room is lost, not what was there before: so the order stays, and the gap has a place.
+#[derive(Default)]
+struct Queue {
+    waiting: VecDeque<Next>,
+    /// What was taken last is being written.
+    writing: bool,
+}
+
+#[derive(Debug, PartialEq)]
+enum Next {
+    Text(String),
+    /// So many found no room here.
+    Lost(u64),
+}
+
+impl Queue {
+    fn push(&mut self, text: String) {
+        if self.waiting.len() < WAITING_MAX {
+            self.waiting.push_back(Next::Text(text));
+        } else if let Some(Next::Lost(count)) = self.waiting.back_mut() {
+            *count += 1;
+        } else {
+            self.waiting.push_back(Next::Lost(1));
+        }
+    }
+
+    fn take(&mut self) -> Option<Next> {
+        let next = self.waiting.pop_front();
+        self.writing = next.is_some();
+        next
+    }
+
+    fn is_busy(&self) -> bool {
+        self.writing || !self.waiting.is_empty()
+    }
+}
+
+/// Whether it is the stream that systemd has connected to its journal: `JOURNAL_STREAM` has its device and number.
+fn is_journal(stream: impl AsFd) -> bool {
+    let Ok(wanted) = std::env::var("JOURNAL_STREAM") else { return false };
+    let own = stream.as_fd().try_clone_to_owned().and_then(|stream| std::fs::File::from(stream).metadata());
+    own.is_ok_and(|own| wanted == format!("{}:{}", own.dev(), own.ino()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_finds_no_room_is_counted_where_it_is_missing() {
+        let mut queue = Queue::default();
+        let text = |n: usize| Next::Text(n.to_string());
+        for n in 0..WAITING_MAX + 3 {
+            queue.push(n.to_string());
+        }
+        for n in 0..WAITING_MAX {
+            assert_eq!(queue.take(), Some(text(n)));
+            // Room again, from the second on: the first makes way for the count.
+            if n < 2 {
+                queue.push(format!("{}", 1000 + n));
+            }
+        }
+        assert_eq!(queue.take(), Some(Next::Lost(4)), "the first of the later ones still found no room");
+        assert_eq!(queue.take(), Some(text(1001)));
+        assert!(queue.is_busy(), "it is being written");
+        assert_eq!((queue.take(), queue.is_busy()), (None, false));
+    }
+
+    #[test]
+    fn each_line_in_the_journal_begins_with_its_urgency() {
+        assert_eq!(marked("<5>", "probe.0 ended\n    why"), "<5>probe.0 ended\n<5>    why\n");
+        assert_eq!(marked("", "a\nb"), "a\nb\n");
+    }
+}

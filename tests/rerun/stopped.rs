@@ -1,0 +1,97 @@
+//! The bridge itself stands still for a while, as on a computer that is too busy, and goes on.
+
+use super::programs::{rerun, rows};
+use super::robot::{Robot, wait};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use rohrpost::mailbox::{ClassTraffic, Full, Loss, local};
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// The bridge's mailbox for what tells how things are.
+const NEWEST: u8 = 3;
+/// Patches of the source's map.
+const PATCHES: usize = 64;
+/// Patches that come while the bridge stands still: a second, which is less than a subscription lives without being renewed.
+const WAITING: u32 = 10;
+
+/// What is in a drawing; it is still being written, so what is last in it may be torn.
+fn printed(file: &Path, how: &[&str]) -> String {
+    let mut print = Command::new(rerun());
+    print.args(["rrd", "print"]).args(how).arg(file).env("NO_COLOR", "1");
+    String::from_utf8_lossy(&print.output().unwrap().stdout).into_owned()
+}
+
+/// Times of the scans that are drawn, ns since 1970, in order.
+fn scans_ns(file: &Path) -> Vec<u64> {
+    let all = printed(file, &["-vvv"]);
+    let chunks =
+        all.split("\nChunk(").filter(|chunk| chunk.lines().next().unwrap().contains(" - /world/scan/source.0 - "));
+    // Columns: row, time since the beginning, system time.
+    let rows = chunks.flat_map(str::lines).filter(|line| line.contains(" row_"));
+    let times = rows.map(|row| format!("{}Z\n", row.split('┆').nth(2).unwrap().trim()));
+    let mut date =
+        Command::new("date").args(["-f", "-", "+%s%N"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let times: String = times.collect();
+    let mut pipe = date.stdin.take().unwrap();
+    // It writes while it reads.
+    let writer = std::thread::spawn(move || pipe.write_all(times.as_bytes()));
+    let output = date.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    let mut ns: Vec<u64> = String::from_utf8(output.stdout).unwrap().lines().map(|ns| ns.parse().unwrap()).collect();
+    ns.sort_unstable();
+    ns
+}
+
+fn is_stopped(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+    stat.rsplit_once(") ").unwrap().1.starts_with('T')
+}
+
+#[test]
+fn a_bridge_that_stood_still_goes_on_with_the_newest() {
+    let mut robot = Robot::start("file = \"robot.rrd\"", "");
+    let file = robot.folder().join("robot.rrd");
+    wait("scans are drawn", || (!scans_ns(&file).is_empty()).then_some(()));
+
+    let pid = robot.bridge_pid();
+    let signal = |signal| kill(Pid::from_raw(pid as i32), signal).unwrap();
+    signal(Signal::SIGSTOP);
+    wait("the bridge stands still", || is_stopped(pid).then_some(()));
+    let stopped_ns = robot.newest_scan_ns();
+    // Of what was published, that which was followed by something sent has been sent itself, however slow the computer is.
+    let (mut continued_ns, mut last) = (stopped_ns, (stopped_ns, u64::MAX));
+    wait("patches wait", || {
+        let sent = robot.bridge_mailbox(NEWEST).sent;
+        if sent > last.1 {
+            continued_ns = last.0;
+        }
+        last = (robot.newest_scan_ns(), robot.bridge_mailbox(NEWEST).sent);
+        (robot.bridge_mailbox(local::DATA).depth >= WAITING).then_some(())
+    });
+    assert!(continued_ns > stopped_ns, "scans were sent meanwhile");
+    signal(Signal::SIGCONT);
+
+    let drawn = wait("it draws again", || {
+        let drawn = scans_ns(&file);
+        drawn.last().is_some_and(|last| *last >= continued_ns).then_some(drawn)
+    });
+    let first = drawn.into_iter().find(|ns| *ns > stopped_ns).unwrap();
+    let late_s = continued_ns.saturating_sub(first) as f64 / 1e9;
+    assert!(first >= continued_ns, "the first scan after the stop was {late_s:.3} s old; the newest was there");
+    wait("the map is whole", || {
+        let rows = rows(&printed(&file, &[]));
+        (rows.keys().filter(|entity| entity.starts_with("/world/map/source.0/")).count() == PATCHES).then_some(())
+    });
+
+    let [newest, each] = [NEWEST, local::DATA].map(|local| robot.bridge_mailbox(local));
+    let replaced = |classes: &[ClassTraffic]| classes.iter().map(|class| class.lost(Loss::Replaced)).sum::<u64>();
+    assert_eq!((newest.shape.full, each.shape.full), (Full::Latest, Full::Displace));
+    assert!(replaced(&newest.classes) > u64::from(WAITING), "{:?}", newest.classes);
+    assert_eq!(replaced(&each.classes), 0, "patches do not replace each other");
+    robot.assert_well();
+    assert_eq!((robot.lost_by("gui.0"), robot.lost_by("sink.0")), (0, 0), "packages");
+    let list = robot.say(&["list", "-m"]);
+    assert!(list.lines().any(|line| line.contains("gui.0.3") && line.contains("latest")), "{list}");
+}
