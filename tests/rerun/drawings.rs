@@ -89,8 +89,8 @@ fn a_log_is_drawn() {
     assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
     // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that come together
     // after the computer had no time, the newest alone are drawn.
-    drawing.has("/world/scan/laser.0", 5..=20);
-    drawing.has("/world/robot/mapper.0", 5..=21);
+    drawing.has("/world/scan/laser.0", 5..=22);
+    drawing.has("/world/robot/mapper.0", 5..=24);
     drawing.has("/world/map/mapper.0", 4..=2000);
     drawing.has_robot(&["output.0", "mapper.0", "gui.0", "player.0"], &["mapper", "gui"], 4..=30);
     drawing.has("/output/player.0", 1..=3);
