@@ -4,10 +4,12 @@
 //! mailboxes are empty soon, whatever a viewer does; and if they were not, it would be the bridge that misses something, and
 //! never a sender that waits.
 
+use crate::pen::{self, Pen, Turn};
+use crate::sink::CloseError;
 use crate::store::DrawingCounts;
 use crate::subjects::{NEWEST, Subjects};
 use crate::view::Views;
-use crate::{RATE_HZ, Scene, Sink, views};
+use crate::{RATE_HZ, RATE_HZ_MIN, Scene, Sink, views};
 use rohrpost::config::MailboxSpec;
 use rohrpost::interface::{Interface, Proxy};
 use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
@@ -18,7 +20,7 @@ use serde::Deserialize;
 use std::marker::PhantomData;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// States and charts are drawn so often.
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
@@ -27,6 +29,8 @@ const NEWEST_SLOTS: u16 = 64;
 /// The collector answers within this time, or its earlier lines are not drawn.
 const PATIENCE: Duration = Duration::from_millis(300);
 const MIB: u64 = 1024 * 1024;
+/// A smaller file would hold little but what each begins with.
+const FILE_MIB_MIN: u64 = 8;
 
 /// What the configuration says of the bridge.
 #[derive(Deserialize)]
@@ -34,13 +38,13 @@ const MIB: u64 = 1024 * 1024;
 pub struct Settings {
     /// File to write, from the configuration file's folder.
     file: Option<PathBuf>,
-    /// When the file is this large, it becomes `NAME.old.rrd`, and a new one is begun.
+    /// When the file is this large, at least [`FILE_MIB_MIN`], it becomes `NAME.old.rrd`, and a new one is begun.
     #[serde(default = "file_max_mib")]
     file_max_mib: u64,
     /// `window` opens the Rerun viewer, if it is installed; else the address of one that runs or will run
     /// (`rerun+http://…/proxy`).
     viewer: Option<String>,
-    /// No entity is drawn more often; 0 is no limit.
+    /// No entity is drawn more often; [`RATE_HZ_MIN`] to 1000, or 0, which is no limit.
     #[serde(default = "rate_hz")]
     rate_hz: f64,
 }
@@ -68,6 +72,13 @@ pub struct Bridge<V> {
     subjects: Subjects,
     /// None while switched off.
     scene: Option<Scene>,
+    /// Drawings that were switched off and are being ended.
+    ending: Vec<Pen>,
+    turn: Turn,
+    /// Who collects lines, once it is heard.
+    collector: Option<Name>,
+    /// Lines were said that the scene does not know.
+    lines_wanted: bool,
     node: Arc<Node>,
     node_name: String,
     last: Option<Survey>,
@@ -89,8 +100,13 @@ impl<V: Views> Module for Bridge<V> {
             }
             (None, None) => return Err(ModuleError::new("draw where? set `file` or `viewer` in its settings")),
         };
-        if !(0.0..=1000.0).contains(&rate_hz) {
-            return Err(ModuleError::new(format!("`rate-hz` is {rate_hz}; use 0 (no limit) to 1000")));
+        if rate_hz != 0.0 && !(RATE_HZ_MIN..=1000.0).contains(&rate_hz) {
+            let text = format!("`rate-hz` is {rate_hz}; use {RATE_HZ_MIN} to 1000, or 0 for no limit");
+            return Err(ModuleError::new(text));
+        }
+        if file_max_mib < FILE_MIB_MIN {
+            let text = format!("`file-max-mib` is {file_max_mib}; use {FILE_MIB_MIN} or more");
+            return Err(ModuleError::new(text));
         }
         let me = installation.module(context.me()).ok_or_else(|| ModuleError::new("it is not in the configuration"))?;
         let node_name = me.node.clone();
@@ -99,22 +115,37 @@ impl<V: Views> Module for Bridge<V> {
         context.open_mailbox(NEWEST, newest)?;
         let subjects = Subjects::new(V::make(), context);
         context.set_period(SURVEY_PERIOD);
-        Ok(Self { sink, rate_hz, subjects, scene: None, node, node_name, last: None, views: PhantomData })
+        Ok(Self {
+            sink,
+            rate_hz,
+            subjects,
+            scene: None,
+            ending: Vec::new(),
+            turn: Turn::default(),
+            collector: None,
+            lines_wanted: false,
+            node,
+            node_name,
+            last: None,
+            views: PhantomData,
+        })
     }
 
     fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let now_ns = context.now().ns;
-        let scene = Scene::open(&context.installation().name, self.sink.clone(), self.rate_hz, now_ns)?;
+        let name = &context.installation().name;
+        let scene = Scene::open_in_turn(name, self.sink.clone(), self.rate_hz, now_ns, self.turn.clone())?;
         self.scene.insert(scene).arrange(self.subjects.layout());
+        // The new drawing knows nothing of what the last one knew.
+        self.subjects.want_repair();
+        self.lines_wanted = true;
         let survey = Survey::new(&self.node, context.installation(), &self.node_name)?;
         self.find(context, &survey)
     }
 
     fn off(&mut self, _: &mut Context) {
-        let Some(scene) = self.scene.take() else { return };
-        if let Err(error) = scene.close() {
-            tracing::warn!("{error}");
-        }
+        self.ending.retain(|pen| !pen.has_ended());
+        self.ending.extend(self.scene.take().and_then(Scene::leave));
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -149,6 +180,20 @@ impl<V: Views> Drawing for Bridge<V> {
     }
 }
 
+impl<V> Drop for Bridge<V> {
+    /// The process is about to end, and the drawings with it.
+    fn drop(&mut self) {
+        let deadline = Instant::now() + pen::LAST;
+        for pen in self.ending.drain(..) {
+            if let Err(error @ CloseError::Stuck) = pen.close_by(deadline) {
+                tracing::warn!("{error}");
+            }
+        }
+        // The module's own runner has said all that it had to say before.
+        rohrpost::output::flush();
+    }
+}
+
 impl<V> Bridge<V> {
     /// Looks for what has begun to run since the last time.
     fn find(&mut self, context: &mut Context, survey: &Survey) -> Result<(), ModuleError> {
@@ -158,15 +203,17 @@ impl<V> Bridge<V> {
             let process = survey.module(name).and_then(|module| module.process.as_ref());
             process.is_some_and(|process| matches!(process.state, Some(ModuleState::On | ModuleState::Off)))
         };
-        let mut spoken = None;
-        let more = self.subjects.find(context, runs, |name| {
+        let more = self.subjects.find(context, &self.node, runs, |name| {
             if Some(name.class()) == collector {
-                spoken = Some(name);
+                self.collector = Some(name);
             }
         })?;
-        let Some(scene) = self.scene.as_mut().filter(|_| more) else { return Ok(()) };
-        scene.arrange(self.subjects.layout());
-        if let Some(collector) = spoken {
+        let Some(scene) = self.scene.as_mut() else { return Ok(()) };
+        if more {
+            scene.arrange(self.subjects.layout());
+        }
+        if let Some(collector) = self.collector.filter(|name| self.lines_wanted && runs(*name)) {
+            self.lines_wanted = false;
             earlier_lines(scene, collector, context);
         }
         Ok(())
@@ -187,13 +234,14 @@ fn newest(data: &MailboxSpec) -> Shape {
 /// Draws what was said before the bridge began to listen; a line that comes twice does no harm.
 fn earlier_lines(scene: &mut Scene, collector: Name, context: &Context) {
     let proxy = CollectorProxy::new(context.link(), collector).with_timeout(PATIENCE);
-    let mut next = 0;
+    let (mut next, mut end) = (0, None);
     while let Ok(page) = proxy.lines_from(next) {
         for line in &page.lines {
             views::draw_line(scene, context.installation(), line);
         }
         next = page.first + page.lines.len() as u64;
-        if page.lines.is_empty() || next >= page.next {
+        // What is said meanwhile comes by itself; to follow it here might have no end.
+        if page.lines.is_empty() || next >= *end.get_or_insert(page.next) {
             break;
         }
     }

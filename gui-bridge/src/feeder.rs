@@ -2,12 +2,16 @@
 //!
 //! It takes what is due from the store and hands it to a stream of its own, until it is given up or the store is closed.
 //! Others see from outside whether it is in a call, and for how long; and whether the stream's own threads move.
+//!
+//! Rerun's thread that writes a file ends at the first error, as when the disk is full, and takes rows ever after without
+//! a word. Only who flushes hears of it. So a file is flushed as often as it is written anyway.
 
 use crate::blueprint;
-use crate::sink::{self, Canvas, CloseError, OpenError};
+use crate::sink::{self, Canvas, CloseError, OpenError, Surface};
 use crate::store::{Order, Store};
 use rerun::RecordingStream;
 use rerun::log::PendingRow;
+use rerun::sink::SinkFlushError;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -17,6 +21,8 @@ use std::time::{Duration, Instant};
 const PULSE: Duration = Duration::from_millis(250);
 /// Writing the end of a file takes no longer than this, or it is not waited for.
 const FLUSH: Duration = Duration::from_secs(5);
+/// A file is flushed so often; as [`sink::open`] has it written.
+const FLUSH_PERIOD: Duration = Duration::from_secs(2);
 
 /// What a feeder and those who watch it share. Times are ns since `began`, plus one, so that 0 is none.
 struct Shared {
@@ -29,6 +35,8 @@ struct Shared {
     stop: AtomicBool,
     /// Nor does it write what is under way.
     hurry: AtomicBool,
+    /// All that was known at its beginning is in the file.
+    repeated: AtomicBool,
     failure: Mutex<Option<FeedError>>,
 }
 
@@ -40,7 +48,27 @@ pub(crate) enum FeedError {
     #[error("Rerun refused the layout: {0}")]
     Layout(#[from] rerun::RecordingStreamError),
     #[error(transparent)]
-    Close(#[from] CloseError),
+    Write(#[from] SinkFlushError),
+}
+
+impl FeedError {
+    /// Whether trying again is in vain. `first`: there was no stream before.
+    pub(crate) fn needs_a_person(&self, first: bool) -> bool {
+        match self {
+            Self::Layout(_) => true,
+            Self::Open(error) => first && !error.is_for_want_of_room(),
+            Self::Write(_) => false,
+        }
+    }
+
+    /// The same for whoever closes the drawing.
+    pub(crate) fn into_close(self) -> CloseError {
+        match self {
+            Self::Layout(error) => error.into(),
+            Self::Write(error) => error.into(),
+            Self::Open(error) => CloseError::Failed(error.to_string()),
+        }
+    }
 }
 
 /// See the module's text.
@@ -62,6 +90,7 @@ impl Feeder {
             pulse_asked: AtomicU64::new(0),
             stop: AtomicBool::new(false),
             hurry: AtomicBool::new(false),
+            repeated: AtomicBool::new(false),
             failure: Mutex::new(None),
         });
         let own = shared.clone();
@@ -90,6 +119,11 @@ impl Feeder {
         self.finish();
     }
 
+    /// Whether all that was known at its beginning is in the file.
+    pub(crate) fn has_repeated(&self) -> bool {
+        self.shared.repeated.load(Ordering::Relaxed)
+    }
+
     pub(crate) fn has_ended(&self) -> bool {
         self.thread.is_finished()
     }
@@ -107,19 +141,38 @@ impl Shared {
         while !may_begin() && !stop() {
             std::thread::sleep(Duration::from_millis(10));
         }
-        let mut pulse_at = Instant::now();
-        while let Some(order) = store.next(stop) {
-            self.call(|| draw(&stream, order))?;
-            if pulse_at.elapsed() >= PULSE && self.pulse_asked.load(Ordering::Relaxed) == 0 {
-                pulse_at = Instant::now();
-                self.ask_for_pulse(&stream);
-            }
-        }
+        let drawn = self.draw_all(&stream, canvas, store, stop);
         let hurry = self.hurry.load(Ordering::Relaxed);
-        let closed = self.call(|| if hurry { Ok(()) } else { close(&stream, store) });
+        let closed = self.call(|| if hurry { Ok(()) } else { drawn.and_then(|()| close(&stream, store)) });
         // Dropping it waits until all is written, too.
         self.call(|| drop(stream));
-        Ok(closed?)
+        closed
+    }
+
+    fn draw_all(
+        self: &Arc<Self>,
+        stream: &RecordingStream,
+        canvas: &Canvas,
+        store: &Store,
+        stop: impl Fn() -> bool,
+    ) -> Result<(), FeedError> {
+        let is_file = matches!(canvas.surface, Surface::File { .. });
+        let (mut pulse_at, mut flush_at) = (Instant::now(), Instant::now());
+        while let Some(order) = store.next(&stop) {
+            self.call(|| draw(stream, order))?;
+            if pulse_at.elapsed() >= PULSE && self.pulse_asked.load(Ordering::Relaxed) == 0 {
+                pulse_at = Instant::now();
+                self.ask_for_pulse(stream);
+            }
+            if is_file && flush_at.elapsed() >= FLUSH_PERIOD {
+                // Asked first: what comes while it is flushed need not be in it.
+                let repeated = store.has_repeated();
+                let whole = self.call(|| flush(stream))?;
+                self.repeated.fetch_or(repeated && whole, Ordering::Relaxed);
+                flush_at = Instant::now();
+            }
+        }
+        Ok(())
     }
 
     /// A call of Rerun's, during which the watch is on.
@@ -154,9 +207,19 @@ fn draw(stream: &RecordingStream, order: Order) -> Result<(), FeedError> {
 
 /// Writes all. The layout comes once more, at the end: a view takes its bounds from what is loaded when it first appears,
 /// and the views of the layout at the beginning may have seen but a part of it.
-fn close(stream: &RecordingStream, store: &Store) -> Result<(), CloseError> {
+fn close(stream: &RecordingStream, store: &Store) -> Result<(), FeedError> {
     if let Some(layout) = store.layout() {
         blueprint::send(stream, &layout)?;
     }
-    Ok(stream.flush_with_timeout(FLUSH)?)
+    flush(stream)?;
+    Ok(())
+}
+
+/// Writes what Rerun has; false if that takes long: who stands still has not failed.
+fn flush(stream: &RecordingStream) -> Result<bool, SinkFlushError> {
+    match stream.flush_with_timeout(FLUSH) {
+        Ok(()) => Ok(true),
+        Err(SinkFlushError::Timeout) => Ok(false),
+        Err(error) => Err(error),
+    }
 }

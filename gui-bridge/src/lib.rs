@@ -9,14 +9,17 @@
 //! knows nothing of mailboxes: who receives packages calls one of its methods for each. This is the only crate that knows
 //! Rerun.
 //!
-//! **Invariants:** nothing that a viewer or a disk does makes the module's thread wait; and the bridge holds a bounded
-//! amount however long it runs: what the store holds, and one stream of Rerun's.
+//! **Invariants:** nothing that a viewer or a disk does makes the module's thread wait, also when it is switched on or off:
+//! files are made and ended by the pen's threads. At its end alone the process waits for the end of the drawing, for
+//! some seconds. And the bridge holds a bounded amount however long it runs: what the store holds, one stream of Rerun's,
+//! and, while a drawing that was switched off does not end, that one's store.
 #![forbid(unsafe_code)]
 
 mod blueprint;
 mod bridge;
 mod charts;
 mod feeder;
+mod files;
 pub mod generic;
 mod line;
 mod palette;
@@ -35,7 +38,7 @@ pub use blueprint::{Layout, Tab};
 pub use bridge::{Bridge, Drawing, DrawingInterface, DrawingProxy};
 /// The version of Rerun that the bridge is made with: archetypes for [`Scene::log`], and blueprints for [`Tab::own`].
 pub use rerun;
-pub use scene::{DrawError, RATE_HZ, Scene, entity};
+pub use scene::{DrawError, RATE_HZ, RATE_HZ_MIN, Scene, entity};
 pub use sink::{CloseError, OpenError, Sink};
 pub use states::Level;
 pub use store::{BYTES_MAX, DrawingCounts, ENTITIES_MAX, LINE_BYTES_MAX, LINES_MAX};

@@ -39,6 +39,7 @@ impl Line {
         let mut failure = io::Error::new(io::ErrorKind::NotFound, "its name has no address");
         for address in (host, port).to_socket_addrs()? {
             match TcpStream::connect_timeout(&address, patience) {
+                Ok(viewer) if is_itself(&viewer) => failure = io::ErrorKind::ConnectionRefused.into(),
                 Ok(viewer) => return Self::over(viewer),
                 Err(error) => failure = error,
             }
@@ -77,6 +78,12 @@ impl Line {
     pub(crate) fn cut(&self) {
         self.shared.cut();
     }
+}
+
+/// Where nobody listens on a port of this computer from which connections are made, too, the system now and then connects a
+/// socket to itself. It would take that port from the viewer, and hear its own words as an answer.
+fn is_itself(viewer: &TcpStream) -> bool {
+    matches!((viewer.local_addr(), viewer.peer_addr()), (Ok(here), Ok(there)) if here == there)
 }
 
 impl Drop for Line {
@@ -134,5 +141,33 @@ impl Shared {
             }
         }
         self.cut();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PATIENCE: Duration = Duration::from_secs(10);
+
+    #[test]
+    fn who_is_connected_to_itself_has_no_viewer() {
+        let range = std::fs::read_to_string("/proc/sys/net/ipv4/ip_local_port_range").unwrap();
+        let ports: Vec<u16> = range.split_whitespace().map(|port| port.parse().unwrap()).collect();
+        // Linux chooses from every second one of these for who connects, so after a while the one that is asked for.
+        let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port();
+        let port = free - (free - ports[0]) % 2;
+        let tries = 4 * u32::from(ports[1] - ports[0]);
+        let itself = (0..tries).find_map(|_| TcpStream::connect_timeout(&([127, 0, 0, 1], port).into(), PATIENCE).ok());
+        let itself = itself.filter(|socket| socket.local_addr().unwrap().port() == port);
+        let Some(itself) = itself else {
+            println!("SKIPPED: in {tries} attempts this system connected no socket to itself");
+            return;
+        };
+        assert!(is_itself(&itself));
+        drop(itself);
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let line = Line::open("127.0.0.1", listener.local_addr().unwrap().port(), PATIENCE).unwrap();
+        assert!(!is_itself(&line.shared.viewer));
     }
 }

@@ -4,22 +4,27 @@
 //!   away ──connected──▶ asked ──answered──▶ draws ──gone, or stands still: cut──▶ away, after a while
 //! ```
 //!
-//! A thread of its own connects, starts the [`Feeder`], and looks at it every [`LOOK`]. There is never more than one feeder:
-//! before the next begins, the last one's line is cut and it has ended. So at any time the bridge holds one stream, with
-//! [`crate::sink`]'s bound on what waits in it, and one store, with its own.
+//! A thread of its own connects, or opens the file, starts the [`Feeder`], and looks at it every [`LOOK`]. There is never more
+//! than one feeder: before the next begins, the last one's line is cut and it has ended, however long that takes. So at any
+//! time the bridge holds one stream, with [`crate::sink`]'s bound on what waits in it. A pen that is told to end does so by
+//! itself, and nobody need wait for it; the next one waits for its [`Turn`].
+//!
+//! What a disk does is no failure either: one that stands still is waited for, and one that is full is tried again, with a
+//! file that is new. Only what a person has to put right is one: a file that cannot be made.
 //!
 //! Nothing is counted by the clock but by looks: on a computer that has no time for the bridge, nobody looks either, and what
 //! is merely late is not taken for stuck.
 
 use crate::feeder::{FeedError, Feeder};
+use crate::files::{self, Room};
 use crate::line::Line;
 use crate::sink::{self, Address, Canvas, CloseError, Sink, Surface};
 use crate::store::Store;
 use rerun::ApplicationId;
 use rerun::external::re_log_types::RecordingId;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -37,14 +42,21 @@ const LOOKS_AT_PULSE: u32 = 60;
 const CONNECT: Duration = Duration::from_secs(1);
 /// Waits between attempts to connect.
 const BACKOFF: std::ops::RangeInclusive<Duration> = Duration::from_millis(200)..=Duration::from_secs(4);
+/// The longest wait until a disk that was full is tried again: that writes all that is known.
+const BACKOFF_FILE: Duration = Duration::from_secs(10);
 /// A stream that drew for so long was a good one: the next attempt need not wait long.
 const GOOD: Duration = Duration::from_secs(5);
-/// A feeder whose line was cut has ended by then.
-const END: Duration = Duration::from_secs(10);
+/// Looks at a stream that has to end before it is told that something waits for it: 3 s.
+const LOOKS_AT_END: u32 = 60;
 /// What a viewer has not taken by then when drawing ends, it does not get.
 const LAST_TO_VIEWER: Duration = Duration::from_secs(1);
 /// The same for a file, the time in which it is flushed included.
 const LAST_TO_FILE: Duration = Duration::from_secs(6);
+/// Who waits for the end of a drawing waits no longer.
+pub(crate) const LAST: Duration = LAST_TO_FILE.saturating_add(LAST_TO_VIEWER);
+
+/// Pens that share one draw one after the other: two that write to one file would spoil it.
+pub(crate) type Turn = Arc<Mutex<()>>;
 
 struct Shared {
     store: Arc<Store>,
@@ -72,33 +84,37 @@ enum End {
 }
 
 impl Pen {
-    /// Begins to draw what comes to the store.
-    pub(crate) fn begin(sink: Sink, application: ApplicationId, store: Arc<Store>) -> Result<Self, sink::OpenError> {
+    /// Begins to draw what comes to the store, when it is its turn.
+    pub(crate) fn begin(
+        sink: Sink,
+        application: ApplicationId,
+        store: Arc<Store>,
+        turn: Turn,
+    ) -> Result<Self, sink::OpenError> {
         let address = match &sink {
             Sink::Viewer(url) => Some(Address::parse(url)?),
             Sink::Window => Some(Address::of_window()),
-            Sink::File { path, .. } => {
-                // Before anything else, so that a wrong path is told to whoever wrote it.
-                let made = put_aside(path).and_then(|()| std::fs::File::create(path));
-                made.map_err(|cause| sink::OpenError::File { path: path.clone(), cause })?;
-                None
-            }
+            Sink::File { .. } => None,
         };
         let recording = RecordingId::random();
         let shared = Arc::new(Shared { store, closing: AtomicBool::new(false), failure: Mutex::new(None) });
         let canvas = move |surface| Canvas { application: application.clone(), recording: recording.clone(), surface };
         let mut work = Work { shared: shared.clone(), canvas: Box::new(canvas), streams: 0, lenience: 1 };
-        let run = move || match (sink, address) {
-            (Sink::File { path, bytes_max }, _) => work.files(&path, bytes_max),
-            (Sink::Window, Some(address)) => match sink::start_window() {
-                Ok(()) => work.viewer(&address),
-                Err(error) => {
-                    work.fail(&error);
-                    Ok(())
-                }
-            },
-            (_, Some(address)) => work.viewer(&address),
-            (_, None) => Ok(()),
+        let run = move || {
+            let Some(_turn) = work.turn(&turn) else { return Err(CloseError::Stuck) };
+            let ended = match (sink, address) {
+                (Sink::File { path, bytes_max }, _) => work.files(&path, bytes_max),
+                (Sink::Window, Some(address)) => match sink::start_window() {
+                    Ok(()) => work.viewer(&address),
+                    Err(error) => work.fail(&error),
+                },
+                (_, Some(address)) => work.viewer(&address),
+                (_, None) => Ok(()),
+            };
+            if let Err(error @ (CloseError::Flush(_) | CloseError::Torn)) = &ended {
+                tracing::warn!("{error}");
+            }
+            ended
         };
         let thread = std::thread::Builder::new().name("pen".into()).spawn(run)?;
         Ok(Self { shared, thread })
@@ -109,36 +125,29 @@ impl Pen {
         self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Draws what waits, and ends; within [`LAST_TO_FILE`], whatever the sink does.
-    pub(crate) fn close(self) -> Result<(), CloseError> {
+    /// It draws what waits, and ends by itself; nobody waits here.
+    pub(crate) fn leave(&self) {
         self.shared.store.close();
         self.shared.closing.store(true, Ordering::Relaxed);
         self.thread.thread().unpark();
-        let deadline = Instant::now() + LAST_TO_FILE + LAST_TO_VIEWER;
-        while !self.thread.is_finished() {
+    }
+
+    pub(crate) fn has_ended(&self) -> bool {
+        self.thread.is_finished()
+    }
+
+    /// Draws what waits, and ends. Waits until `deadline` for that, whatever the sink does: what it has not taken by then it may
+    /// still take as long as the process lives.
+    pub(crate) fn close_by(self, deadline: Instant) -> Result<(), CloseError> {
+        self.leave();
+        while !self.has_ended() {
             if Instant::now() >= deadline {
-                // It holds one stream, and ends when the disk comes back, or with the process.
                 return Err(CloseError::Stuck);
             }
             std::thread::sleep(Duration::from_millis(5));
         }
         self.thread.join().unwrap_or(Err(CloseError::Stuck))
     }
-}
-
-/// Where a drawing goes when another begins in its place.
-fn old(path: &Path) -> PathBuf {
-    path.with_extension("old.rrd")
-}
-
-/// Keeps the drawing of an earlier run: a bridge that is started again must not destroy what it drew before.
-fn put_aside(path: &Path) -> std::io::Result<()> {
-    // Devices and pipes stay where they are, and an empty file is no loss.
-    if path.metadata().is_ok_and(|file| file.is_file() && file.len() > 0) {
-        std::fs::rename(path, old(path))?;
-        tracing::info!("the drawing before is {} now", old(path).display());
-    }
-    Ok(())
 }
 
 /// What the thread has.
@@ -150,39 +159,67 @@ struct Work {
 }
 
 impl Work {
+    /// Waits until the pen before this one has ended; none if this one has to end first.
+    fn turn<'a>(&self, turn: &'a Mutex<()>) -> Option<MutexGuard<'a, ()>> {
+        for looks in 0u32.. {
+            match turn.try_lock() {
+                Ok(guard) => return Some(guard),
+                Err(TryLockError::Poisoned(guard)) => return Some(guard.into_inner()),
+                Err(TryLockError::WouldBlock) if self.is_closing() => return None,
+                Err(TryLockError::WouldBlock) => {}
+            }
+            if looks == LOOKS_AT_END {
+                tracing::warn!("the last drawing has not ended yet; this one begins when it has");
+            }
+            std::thread::park_timeout(LOOK);
+        }
+        None
+    }
+
     /// One file after the other, each the whole picture from its first moment on.
     fn files(&mut self, path: &Path, bytes_max: u64) -> Result<(), CloseError> {
+        let mut backoff = *BACKOFF.start();
+        let mut told = false;
+        // What was there before the first, and what is full, is put aside in any case.
+        let mut aside_from = 1;
         loop {
-            let feeder = match self.feeder(Surface::File(path.into()), || true, true) {
+            let began = Instant::now();
+            let surface = Surface::File { path: path.into(), aside_from };
+            let feeder = match self.feeder(surface, || true, true) {
                 Ok(feeder) => feeder,
-                Err(error) => {
-                    self.fail(&error);
-                    return Ok(());
-                }
+                Err(error) => return self.fail(&error),
             };
-            let is_full = || path.metadata().is_ok_and(|file| file.len() >= bytes_max);
-            let end = self.watch(&feeder, None, &is_full);
+            let room = Room::new(path, bytes_max);
+            let end = self.watch(&feeder, None, &|| room.is_full(feeder.has_repeated()));
             feeder.finish();
-            if !ended_within(&feeder, LAST_TO_FILE) {
-                self.fail(&format_args!("{} does not take the end of the drawing", path.display()));
-                return Err(CloseError::Stuck);
-            }
+            self.until_ended(
+                &feeder,
+                "the disk has not taken the end of the drawing yet; what comes next waits for it",
+            );
             match (end, feeder.failure()) {
-                (_, Some(FeedError::Close(error))) => return Err(error),
+                (_, Some(error)) if error.needs_a_person(self.streams == 1) => return self.fail(&error),
                 (_, Some(error)) => {
-                    self.fail(&error);
-                    return Ok(());
-                }
-                (End::Full, None) => {
-                    let old = old(path);
-                    if let Err(error) = std::fs::rename(path, &old) {
-                        self.fail(&format_args!("cannot rename {} to {}: {error}", path.display(), old.display()));
-                        return Ok(());
+                    self.shared.store.count(|counts| counts.stuck += 1);
+                    if self.is_closing() {
+                        return Err(error.into_close());
                     }
-                    tracing::info!("the drawing is full; it is {} now, and a new one begins", old.display());
+                    if began.elapsed() >= GOOD {
+                        (backoff, told) = (*BACKOFF.start(), false);
+                    }
+                    self.tell_once(&mut told, path, &error);
+                    aside_from = files::WORTH.min(bytes_max);
+                    self.rest(&mut backoff, BACKOFF_FILE);
                 }
-                _ => return Ok(()),
+                (End::Full, None) => aside_from = 1,
+                (_, None) => return if files::is_whole(path) { Ok(()) } else { Err(CloseError::Torn) },
             }
+        }
+    }
+
+    fn tell_once(&self, told: &mut bool, path: &Path, error: &dyn std::fmt::Display) {
+        if !std::mem::replace(told, true) {
+            let path = path.display();
+            tracing::warn!("{path} takes nothing more ({error}); a new drawing begins there when there is room");
         }
     }
 
@@ -203,17 +240,14 @@ impl Work {
                         tracing::warn!("no viewer at {url} yet ({error}); drawing begins when it comes");
                         told = "absent";
                     }
-                    self.rest(&mut backoff);
+                    self.rest(&mut backoff, *BACKOFF.end());
                     continue;
                 }
             };
             let (watched, store) = (line.clone(), self.shared.store.clone());
             let feeder = match self.feeder(Surface::Line(line.url()), move || watched.has_answered(), lines) {
                 Ok(feeder) => feeder,
-                Err(error) => {
-                    self.fail(&error);
-                    return Ok(());
-                }
+                Err(error) => return self.fail(&error),
             };
             if self.answers(&feeder, &line) && told != "draws" {
                 tracing::info!("draws to the viewer at {url}");
@@ -223,14 +257,10 @@ impl Work {
             let (was_broken, had_answered) = (line.is_broken(), line.has_answered());
             feeder.give_up();
             line.cut();
-            if !ended_within(&feeder, END) {
-                self.fail(&"Rerun does not come back from a call; switch this module off and on");
-                return Err(CloseError::Stuck);
-            }
+            self.until_ended(&feeder, "Rerun has not come back from a call yet; drawing goes on when it has");
             match (end, feeder.failure()) {
                 (_, Some(error @ (FeedError::Layout(_) | FeedError::Open(_)))) if !was_broken => {
-                    self.fail(&error);
-                    return Ok(());
+                    return self.fail(&error);
                 }
                 (End::Still, _) => {
                     store.count(|counts| counts.stuck += 1);
@@ -254,7 +284,7 @@ impl Work {
             } else if had_answered && told == "still" {
                 self.lenience = (self.lenience * 2).min(LENIENCE_MAX);
             }
-            self.rest(&mut backoff);
+            self.rest(&mut backoff, *BACKOFF.end());
         }
         Ok(())
     }
@@ -328,32 +358,35 @@ impl Work {
         }
     }
 
-    fn rest(&self, backoff: &mut Duration) {
+    /// However long it takes: what comes meanwhile replaces what waits.
+    fn until_ended(&self, feeder: &Feeder, why: &str) {
+        let mut looks = 0;
+        while !feeder.has_ended() {
+            looks += 1;
+            if looks == LOOKS_AT_END {
+                self.shared.store.count(|counts| counts.stuck += 1);
+                tracing::warn!("{why}");
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    fn rest(&self, backoff: &mut Duration, most: Duration) {
         let until = Instant::now() + *backoff;
         while !self.is_closing() && Instant::now() < until {
             std::thread::park_timeout(until.saturating_duration_since(Instant::now()));
         }
-        *backoff = (*backoff * 2).min(*BACKOFF.end());
+        *backoff = (*backoff * 2).min(most);
     }
 
     fn is_closing(&self) -> bool {
         self.shared.closing.load(Ordering::Relaxed)
     }
 
-    fn fail(&self, why: &dyn std::fmt::Display) {
+    fn fail(&self, why: &dyn std::fmt::Display) -> Result<(), CloseError> {
         *self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(why.to_string());
+        Err(CloseError::Failed(why.to_string()))
     }
-}
-
-fn ended_within(feeder: &Feeder, time: Duration) -> bool {
-    let deadline = Instant::now() + time;
-    while !feeder.has_ended() {
-        if Instant::now() >= deadline {
-            return false;
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    true
 }
 
 #[cfg(test)]

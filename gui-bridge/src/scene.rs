@@ -1,6 +1,6 @@
 //! A drawing in Rerun: opened once, told the time, then told what happens. Nothing here waits for Rerun.
 
-use crate::pen::Pen;
+use crate::pen::{self, Pen, Turn};
 use crate::sink::{CloseError, OpenError, Sink};
 use crate::store::{DrawingCounts, Row, Store};
 use crate::{blueprint::Layout, charts::Charts, generic::Texts, states::States, world::World};
@@ -10,6 +10,9 @@ use std::time::{Duration, Instant};
 
 /// An entity is drawn at most so often a second, unless somebody says otherwise.
 pub const RATE_HZ: f64 = 20.0;
+
+/// The lowest limit: once in a hundred seconds.
+pub const RATE_HZ_MIN: f64 = 0.01;
 
 /// The timeline of system time: nanoseconds since 1970, as all nodes of an installation agree on it.
 pub(crate) const SYSTEM_TIME: &str = "system_time";
@@ -100,16 +103,29 @@ pub struct Scene {
 
 impl Scene {
     /// Opens a drawing of `installation` in `sink`; robot time 0 is `system_time_ns`. No entity is drawn more often than
-    /// `rate_hz`; 0 is no limit. A viewer need not be there yet.
+    /// `rate_hz`; 0 is no limit, and what is less than [`RATE_HZ_MIN`] is taken for that. Neither a viewer need be there yet,
+    /// nor a disk: [`Scene::failure`] tells of a file that cannot be made.
     ///
     /// # Errors
-    /// When the file cannot be written, or the address is none.
+    /// When the address is none.
     pub fn open(installation: &str, sink: Sink, rate_hz: f64, system_time_ns: u64) -> Result<Self, OpenError> {
+        Self::open_in_turn(installation, sink, rate_hz, system_time_ns, Turn::default())
+    }
+
+    /// The same, after all others that had that turn.
+    pub(crate) fn open_in_turn(
+        installation: &str,
+        sink: Sink,
+        rate_hz: f64,
+        system_time_ns: u64,
+        turn: Turn,
+    ) -> Result<Self, OpenError> {
         // Viewers keep a layout for each application: what somebody arranged for one installation stays with it.
         let application = ApplicationId::new_or_unknown(format!("rohrpost-{installation}"));
-        let period = if rate_hz > 0.0 { Duration::try_from_secs_f64(1.0 / rate_hz).ok() } else { None };
-        let store = Arc::new(Store::new(period.unwrap_or_default()));
-        let pen = Pen::begin(sink, application, store.clone())?;
+        let limit = rate_hz > 0.0;
+        let period = if limit { Duration::from_secs_f64(1.0 / rate_hz.max(RATE_HZ_MIN)) } else { Duration::ZERO };
+        let store = Arc::new(Store::new(period));
+        let pen = Pen::begin(sink, application, store.clone(), turn)?;
         let mut scene = Self::over(store.clone(), system_time_ns);
         scene.drawing = Some((store, pen));
         Ok(scene)
@@ -177,7 +193,14 @@ impl Scene {
     /// # Errors
     /// When the last of it did not arrive.
     pub fn close(mut self) -> Result<(), CloseError> {
-        self.drawing.take().map_or(Ok(()), |(_, pen)| pen.close())
+        self.drawing.take().map_or(Ok(()), |(_, pen)| pen.close_by(Instant::now() + pen::LAST))
+    }
+
+    /// Ends it without waiting: its pen draws what waits, and ends by itself.
+    pub(crate) fn leave(mut self) -> Option<Pen> {
+        let (_, pen) = self.drawing.take()?;
+        pen.leave();
+        Some(pen)
     }
 
     /// Draws at the present time: any of Rerun's archetypes.
@@ -201,7 +224,7 @@ impl Drop for Scene {
     fn drop(&mut self) {
         if let Some((_, pen)) = self.drawing.take() {
             // Who wants to know closes it.
-            let _ = pen.close();
+            let _ = pen.close_by(Instant::now() + pen::LAST);
         }
     }
 }

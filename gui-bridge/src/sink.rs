@@ -1,9 +1,11 @@
 //! Where a drawing goes.
 
+use crate::files;
 use rerun::external::re_log_types::RecordingId;
 use rerun::external::re_uri;
 use rerun::log::ChunkBatcherConfig;
 use rerun::{ApplicationId, RecordingStream, RecordingStreamBuilder, SpawnError, SpawnOptions};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -13,7 +15,8 @@ const BYTES_IN_FLIGHT: u64 = 8 * 1024 * 1024;
 /// Where a drawing goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sink {
-    /// A new `.rrd` file, to be opened with `rerun FILE`. Whole only after the scene was closed.
+    /// A new `.rrd` file, to be opened with `rerun FILE`. Whole only after the scene was closed. One that is there already
+    /// becomes `NAME.old.rrd`.
     File {
         /// Where it is.
         path: PathBuf,
@@ -45,6 +48,16 @@ pub enum OpenError {
         /// What the system says.
         cause: std::io::Error,
     },
+    /// A drawing is there already, and stays where it is.
+    #[error("cannot rename {path} to {old}: {cause}")]
+    PutAside {
+        /// The file asked for.
+        path: PathBuf,
+        /// Where it should go.
+        old: PathBuf,
+        /// What the system says.
+        cause: std::io::Error,
+    },
     /// Rerun does not write to the file.
     #[error("Rerun cannot write the drawing: {0}")]
     Save(rerun::RecordingStreamError),
@@ -70,6 +83,14 @@ pub enum OpenError {
     System(#[from] std::io::Error),
 }
 
+impl OpenError {
+    /// Whether it comes right when there is room again.
+    pub(crate) fn is_for_want_of_room(&self) -> bool {
+        let Self::File { cause, .. } = self else { return false };
+        matches!(cause.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
+    }
+}
+
 /// Why the last of a drawing may be missing.
 #[derive(Debug, thiserror::Error)]
 pub enum CloseError {
@@ -79,6 +100,12 @@ pub enum CloseError {
     /// Rerun could not take the layout: a bug in this crate.
     #[error("Rerun refused the layout: {0}")]
     Layout(#[from] rerun::RecordingStreamError),
+    /// Rerun writes the end of a file when nobody asks any more, and does not say when it cannot.
+    #[error("the end of the drawing is not in its file, as if the disk were full; the rest can be read")]
+    Torn,
+    /// Nothing was drawn any more.
+    #[error("it was not drawn: {0}")]
+    Failed(String),
     /// It stands still.
     #[error("the end of the drawing did not arrive: its sink stands still")]
     Stuck,
@@ -124,7 +151,8 @@ pub(crate) struct Canvas {
 /// Where one stream goes.
 #[derive(Clone)]
 pub(crate) enum Surface {
-    File(PathBuf),
+    /// What is there is put aside if it has so many bytes.
+    File { path: PathBuf, aside_from: u64 },
     /// The near end of a [`crate::line::Line`].
     Line(String),
 }
@@ -134,7 +162,7 @@ pub(crate) fn open(canvas: &Canvas) -> Result<RecordingStream, OpenError> {
     // A chunk costs more than a kilobyte besides its rows. So a file gets large ones, and a crash of the bridge loses two
     // seconds; a viewer is shown changes within a blink.
     let flush_tick = Duration::from_millis(match canvas.surface {
-        Surface::File(_) => 2000,
+        Surface::File { .. } => 2000,
         Surface::Line(_) => 40,
     });
     let batching =
@@ -143,7 +171,10 @@ pub(crate) fn open(canvas: &Canvas) -> Result<RecordingStream, OpenError> {
         .recording_id(canvas.recording.clone())
         .batcher_config(batching);
     match &canvas.surface {
-        Surface::File(path) => builder.save(path).map_err(OpenError::Save),
+        Surface::File { path, aside_from } => {
+            files::begin(path, *aside_from)?;
+            builder.save(path).map_err(OpenError::Save)
+        }
         Surface::Line(url) => builder.connect_grpc_opts(url.as_str()).map_err(OpenError::Connect),
     }
 }
@@ -216,8 +247,18 @@ mod tests {
 
     #[test]
     fn sinks_that_cannot_be_say_why() {
+        let scene = Scene::open("lab", Sink::file("/no/such/folder/scene.rrd"), 0.0, 0).unwrap();
+        let start = std::time::Instant::now();
+        let why = loop {
+            assert!(start.elapsed() < Duration::from_secs(60));
+            if let Some(why) = scene.failure() {
+                break why;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        assert!(why.starts_with("cannot write the drawing to /no/such/folder/scene.rrd: "), "{why}");
+        assert!(matches!(scene.close(), Err(CloseError::Failed(told)) if told == why));
         for (sink, why) in [
-            (Sink::file("/no/such/folder/scene.rrd"), "cannot write the drawing to /no/such/folder/scene.rrd: "),
             (Sink::Viewer("localhost".into()), "`localhost` is no viewer's address: "),
             (Sink::Viewer("rerun+https://x:1/proxy".into()), "`rerun+https://x:1/proxy` is no viewer's address: "),
         ] {

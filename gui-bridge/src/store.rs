@@ -8,7 +8,10 @@
 //!
 //! An entity has one pending row: a newer one replaces it, component by component, and is taken when the entity's time has
 //! come. Lines of text are things that happen, so they wait in a ring that drops the oldest. Whatever comes in, and
-//! whatever the feeder does, no more than [`BYTES_MAX`], [`ENTITIES_MAX`] and [`LINES_MAX`] are held.
+//! whatever the feeder does, no more than [`BYTES_MAX`] is held: lines and paths are counted, too.
+//!
+//! When there is no room, the newest still wins: an entity that is known gives up what was drawn of it for what is to be
+//! drawn, so it can always change. Entities that are new find less room than those that are known.
 
 use crate::blueprint::Layout;
 use rerun::{EntityPath, SerializedComponentBatch, TimePoint};
@@ -18,10 +21,20 @@ use std::time::{Duration, Instant};
 
 /// Entities that a drawing has at most: a map of 4096 tiles, and room for all else.
 pub const ENTITIES_MAX: usize = 16_384;
-/// What all of them together may hold.
+/// What is held, entities and lines together.
 pub const BYTES_MAX: usize = 64 * 1024 * 1024;
 /// Lines of text that wait, and as many that are kept for a viewer that comes later.
 pub const LINES_MAX: usize = 1000;
+/// What lines may hold of [`BYTES_MAX`]; entities have the rest.
+const LINES_BYTES_MAX: usize = 8 * 1024 * 1024;
+/// What entities may hold.
+const ENTITIES_BYTES_MAX: usize = BYTES_MAX - LINES_BYTES_MAX;
+/// Room into which an entity may grow, but no new one may come.
+const RESERVE: usize = 8 * 1024 * 1024;
+/// A row besides its arrays: its time on two timelines, a tree.
+const ROW_BYTES: usize = 512;
+/// An entity besides its rows and its name: its places in index and queue, with the room that those leave empty.
+const ENTITY_BYTES: usize = 2 * size_of::<Entity>() + 256;
 
 /// A line is no longer than this.
 pub const LINE_BYTES_MAX: usize = 16 * 1024;
@@ -36,7 +49,15 @@ pub(crate) struct Row {
 
 impl Row {
     fn bytes(&self) -> usize {
-        self.components.iter().map(|batch| batch.array.get_array_memory_size()).sum()
+        ROW_BYTES + self.components.iter().map(batch_bytes).sum::<usize>()
+    }
+
+    /// What it holds of components that the other speaks of, too.
+    fn bytes_shared_with(&self, other: &Self) -> usize {
+        let spoken_of = |batch: &&SerializedComponentBatch| {
+            other.components.iter().any(|component| component.descriptor == batch.descriptor)
+        };
+        self.components.iter().filter(spoken_of).map(batch_bytes).sum()
     }
 
     fn speaks_of(&self, other: &Self) -> bool {
@@ -54,6 +75,19 @@ impl Row {
             }
         }
     }
+}
+
+fn batch_bytes(batch: &SerializedComponentBatch) -> usize {
+    size_of::<SerializedComponentBatch>() + batch.array.get_array_memory_size()
+}
+
+/// Its parts are among Rerun's names, too.
+fn path_bytes(path: &EntityPath) -> usize {
+    path.iter().map(|part| 64 + 2 * part.unescaped_str().len()).sum()
+}
+
+fn line_bytes((path, row): &(EntityPath, Row)) -> usize {
+    path_bytes(path) + row.bytes()
 }
 
 /// What the feeder does next.
@@ -74,7 +108,7 @@ pub struct DrawingCounts {
     pub dropped: u64,
     /// Times that drawing began anew: a viewer that was restarted, a file that was full.
     pub rebuilt: u64,
-    /// Times that the viewer or the disk stood still.
+    /// Times that the viewer or the disk stood still, or that the disk took no more.
     pub stuck: u64,
 }
 
@@ -83,6 +117,27 @@ pub struct DrawingCounts {
 struct Half {
     pending: Option<Row>,
     last: Option<Row>,
+}
+
+impl Half {
+    fn bytes(&self) -> usize {
+        [&self.pending, &self.last].into_iter().flatten().map(Row::bytes).sum()
+    }
+
+    /// What it holds when `row` has come.
+    fn bytes_with(&self, row: &Row) -> usize {
+        let replaced = self.pending.as_ref().map_or(0, |pending| ROW_BYTES + pending.bytes_shared_with(row));
+        self.bytes() + row.bytes() - replaced
+    }
+
+    /// What was drawn and what is to be drawn become one row, that is to be drawn.
+    fn fold(&mut self) {
+        let Some(mut row) = self.last.take() else { return };
+        if let Some(newer) = self.pending.take() {
+            row.replace_by(newer);
+        }
+        self.pending = Some(row);
+    }
 }
 
 struct Entity {
@@ -100,7 +155,11 @@ struct Inner {
     /// Entities with something pending: when it is due, its turn, which.
     due: BTreeSet<(Instant, u64, usize)>,
     turns: u64,
+    /// What a new stream gets has its turn by then, and so many lines.
+    repeated_at: (u64, usize),
+    /// What entities hold.
     bytes: usize,
+    lines_bytes: usize,
     lines: VecDeque<(EntityPath, Row)>,
     lines_kept: VecDeque<(EntityPath, Row)>,
     /// Whether a line has its turn before the next row.
@@ -126,7 +185,9 @@ impl Store {
             index: HashMap::new(),
             due: BTreeSet::new(),
             turns: 0,
+            repeated_at: (0, 0),
             bytes: 0,
+            lines_bytes: 0,
             lines: VecDeque::new(),
             lines_kept: VecDeque::new(),
             line_next: false,
@@ -157,10 +218,16 @@ impl Store {
             return;
         }
         if inner.lines.len() == LINES_MAX {
-            inner.lines.pop_front();
-            inner.counts.dropped += 1;
+            inner.drop_line();
         }
-        inner.lines.push_back((path, row));
+        let line = (path, row);
+        inner.lines_bytes += line_bytes(&line);
+        inner.lines.push_back(line);
+        while inner.lines_bytes > LINES_BYTES_MAX {
+            if !inner.forget_line() {
+                inner.drop_line();
+            }
+        }
         drop(inner);
         self.changed.notify_one();
     }
@@ -186,22 +253,25 @@ impl Store {
         for at in 0..inner.entities.len() {
             let entity = &mut inner.entities[at];
             (entity.due, entity.drawn) = (None, None);
-            for half in [&mut entity.fixed, &mut entity.moving] {
-                let Some(mut row) = half.last.take() else { continue };
-                if let Some(newer) = half.pending.take() {
-                    row.replace_by(newer);
-                }
-                half.pending = Some(row);
-            }
+            entity.fixed.fold();
+            entity.moving.fold();
             inner.queue(at, Duration::ZERO);
         }
         if lines {
+            while inner.lines_kept.len() + inner.lines.len() > LINES_MAX && inner.forget_line() {}
             let mut kept = std::mem::take(&mut inner.lines_kept);
             kept.append(&mut inner.lines);
-            kept.drain(..kept.len().saturating_sub(LINES_MAX));
             inner.lines = kept;
         }
         inner.bytes = inner.entities.iter().map(Entity::bytes).sum();
+        inner.repeated_at = (inner.turns, inner.lines.len());
+    }
+
+    /// Whether the stream has got all that was known when it began.
+    pub(crate) fn has_repeated(&self) -> bool {
+        let inner = self.lock();
+        let (turn_then, lines) = inner.repeated_at;
+        lines == 0 && inner.due.first().is_none_or(|(_, turn, _)| *turn > turn_then)
     }
 
     /// What is next, as soon as there is something; none when `give_up` says so or the store is closed and empty.
@@ -249,38 +319,54 @@ impl Store {
 
 impl Entity {
     fn bytes(&self) -> usize {
-        let rows = [&self.fixed.pending, &self.fixed.last, &self.moving.pending, &self.moving.last];
-        rows.into_iter().flatten().map(Row::bytes).sum()
+        ENTITY_BYTES + path_bytes(&self.path) + self.fixed.bytes() + self.moving.bytes()
     }
 }
 
 impl Inner {
     fn put(&mut self, path: EntityPath, row: Row, period: Duration) {
-        let bytes = row.bytes();
         let known = self.index.get(&path).copied();
-        if self.bytes + bytes > BYTES_MAX || known.is_none() && self.entities.len() == ENTITIES_MAX {
+        let Some(at) = known.or_else(|| self.begin_entity(path, &row)) else {
             self.counts.dropped += 1;
             return;
-        }
-        let at = known.unwrap_or_else(|| {
-            let (fixed, moving) = (Half::default(), Half::default());
-            self.entities.push(Entity { path: path.clone(), fixed, moving, due: None, drawn: None });
-            self.index.insert(path, self.entities.len() - 1);
-            self.entities.len() - 1
-        });
+        };
         let entity = &mut self.entities[at];
-        let before = entity.bytes();
         let half = if row.time.is_none() { &mut entity.fixed } else { &mut entity.moving };
-        match &mut half.pending {
-            Some(pending) => {
-                // Another component, such as the place of a picture, replaces nothing.
-                self.counts.replaced += u64::from(pending.speaks_of(&row));
-                pending.replace_by(row);
-            }
-            none => *none = Some(row),
+        let mut before = half.bytes();
+        if self.bytes - before + half.bytes_with(&row) > ENTITIES_BYTES_MAX {
+            half.fold();
+            self.bytes = self.bytes - before + half.bytes();
+            before = half.bytes();
         }
-        self.bytes = self.bytes + entity.bytes() - before;
+        if self.bytes - before + half.bytes_with(&row) > ENTITIES_BYTES_MAX {
+            self.counts.dropped += 1;
+        } else {
+            match &mut half.pending {
+                Some(pending) => {
+                    // Another component, such as the place of a picture, replaces nothing.
+                    self.counts.replaced += u64::from(pending.speaks_of(&row));
+                    pending.replace_by(row);
+                }
+                none => *none = Some(row),
+            }
+            self.bytes = self.bytes - before + half.bytes();
+        }
         self.queue(at, period);
+    }
+
+    /// Makes room for an entity that comes with its first row, if there is some.
+    fn begin_entity(&mut self, path: EntityPath, row: &Row) -> Option<usize> {
+        let (fixed, moving) = (Half::default(), Half::default());
+        let entity = Entity { path: path.clone(), fixed, moving, due: None, drawn: None };
+        let bytes = entity.bytes();
+        let at = self.entities.len();
+        if at == ENTITIES_MAX || self.bytes + bytes + row.bytes() > ENTITIES_BYTES_MAX - RESERVE {
+            return None;
+        }
+        self.bytes += bytes;
+        self.entities.push(entity);
+        self.index.insert(path, at);
+        Some(at)
     }
 
     /// Puts an entity with something pending into the queue.
@@ -313,11 +399,27 @@ impl Inner {
 
     fn take_line(&mut self) -> Option<(EntityPath, Row)> {
         let line = self.lines.pop_front()?;
+        self.repeated_at.1 = self.repeated_at.1.saturating_sub(1);
         if self.lines_kept.len() == LINES_MAX {
-            self.lines_kept.pop_front();
+            self.forget_line();
         }
         self.lines_kept.push_back(line.clone());
         Some(line)
+    }
+
+    /// The oldest line that waits is never drawn.
+    fn drop_line(&mut self) {
+        let Some(line) = self.lines.pop_front() else { return };
+        self.lines_bytes -= line_bytes(&line);
+        self.repeated_at.1 = self.repeated_at.1.saturating_sub(1);
+        self.counts.dropped += 1;
+    }
+
+    /// The oldest line that was drawn is not kept any longer; false if there is none.
+    fn forget_line(&mut self) -> bool {
+        let Some(line) = self.lines_kept.pop_front() else { return false };
+        self.lines_bytes -= line_bytes(&line);
+        true
     }
 
     fn take_row(&mut self, now: Instant) -> Option<(EntityPath, Row)> {
@@ -337,8 +439,12 @@ impl Inner {
         }
         self.bytes = self.bytes + entity.bytes() - before;
         let path = entity.path.clone();
-        // Its other half may be waiting still.
+        // Its other half may be waiting still; for a new stream it is a part of what was known.
+        let turns = self.turns;
         self.queue(at, Duration::ZERO);
+        if turn <= self.repeated_at.0 && self.turns > turns {
+            self.repeated_at.0 = self.turns;
+        }
         Some((path, row))
     }
 }

@@ -7,15 +7,13 @@ use rohrpost::config::Show;
 use rohrpost::description::{DataItem, Description};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
-use rohrpost::mailbox::local;
+use rohrpost::mailbox::{Node, local};
 use rohrpost::{Context, ContextError, Name, Rate, Received, Subscription};
 use std::time::{Duration, Instant};
 
 /// The mailbox for what tells how things are now: while the bridge stands still, a newer package takes an older one's place. Its
 /// data mailbox has all that must come in order and without gaps.
 pub(crate) const NEWEST: u8 = 3;
-/// A module whose description is wanted answers within this time, or is asked again later.
-const PATIENCE: Duration = Duration::from_millis(300);
 /// A module is asked at most so often to send everything once more.
 const REPAIR: Duration = Duration::from_secs(5);
 
@@ -87,23 +85,18 @@ impl Subjects {
         Self { views, entries, subjects: Vec::new() }
     }
 
-    /// Asks modules that run for descriptions that are missing, and subscribes to what they tell; arranges the views anew when
-    /// there are more.
+    /// Reads the descriptions that are missing of modules that run, and subscribes to what they tell; whether there is more than
+    /// before. Modules note their descriptions beside their mailboxes, so nobody is asked, and nobody waited for.
     pub(crate) fn find(
         &mut self,
         context: &mut Context,
+        node: &Node,
         runs: impl Fn(Name) -> bool,
         mut found: impl FnMut(Name),
     ) -> Result<bool, ContextError> {
         let before = self.subjects.len();
         for entry in self.entries.iter_mut().filter(|entry| !entry.answered && runs(entry.from)) {
-            let description = match rohrpost::describe(&mut context.link().borrow_mut(), entry.from, PATIENCE) {
-                Ok(description) => description,
-                Err(error) => {
-                    tracing::debug!("{} does not describe itself yet: {error}", entry.module);
-                    continue;
-                }
-            };
+            let Some(description) = Description::noted(node, entry.from) else { continue };
             entry.answered = true;
             let items = entry.items(&description, &self.views);
             for item in items {
@@ -155,6 +148,13 @@ impl Subjects {
         let datum = Datum { from: *from, module, item, installation, bytes: data.value };
         if let Err(error) = self.views[*view].draw(scene, &datum) {
             tracing::warn!("{error}");
+        }
+    }
+
+    /// Nothing is known of what was sent before: all have to send everything once more.
+    pub(crate) fn want_repair(&mut self) {
+        for repair in self.subjects.iter_mut().filter_map(|subject| subject.repair.as_mut()) {
+            (repair.wanted, repair.asked) = (true, None);
         }
     }
 

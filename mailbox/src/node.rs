@@ -15,10 +15,11 @@
 //! `node`: the kernel drops that lock with the process, whatever killed it.
 
 use crate::doorbell;
-use crate::entry::{Entry, PARTICIPANTS_MAX, ParticipantInfo};
+use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, Held};
 use crate::memory::Mapping;
+use crate::name::Name;
 use crate::step::step;
 use crate::word::Claimant;
 use std::fs::{self, File, OpenOptions};

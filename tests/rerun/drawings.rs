@@ -87,9 +87,10 @@ fn a_log_is_drawn() {
     assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
     assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);
     assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
-    // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out.
-    drawing.has("/world/scan/laser.0", 18..=22);
-    drawing.has("/world/robot/mapper.0", 18..=24);
+    // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that come together
+    // after the computer had no time, the newest alone are drawn.
+    drawing.has("/world/scan/laser.0", 5..=22);
+    drawing.has("/world/robot/mapper.0", 5..=24);
     drawing.has("/world/map/mapper.0", 4..=2000);
     drawing.has_robot(&["output.0", "mapper.0", "gui.0", "player.0"], &["mapper", "gui"], 4..=30);
     drawing.has("/output/player.0", 1..=3);

@@ -5,9 +5,13 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod drawings;
+mod launched;
+mod load;
 mod own_view;
+mod picture;
 mod programs;
 mod robot;
 mod stopped;
+mod switching;
 mod torture;
 mod viewer;

@@ -1,10 +1,10 @@
 //! A bridge with a view of a user's own: the example `own_view` draws a type that only it knows.
 
-use super::programs::{bridge, ok, rerun, rows, rrd};
+use super::launched::Launched;
+use super::programs::{bridge, rerun, rows, rrd};
 use super::robot::wait;
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError};
-use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// What the example draws: the type counts, not who declares it.
@@ -84,21 +84,9 @@ show = [{{ from = "camera.0", data = "fires" }}, {{ from = "camera.0", data = "h
 "#
     );
     std::fs::write(folder.path().join("fires.toml"), config).unwrap();
-    let command = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_rohrpost"));
-        command.args(arguments).env("ROHRPOST_DIR", folder.path().join("nodes")).current_dir(folder.path());
-        command.stdin(Stdio::null());
-        command
-    };
-    let launch = command(&["launch", "fires.toml"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    wait("something is drawn", || {
-        let counts = command(&["call", "gui.0", "counts", "--json"]).output().unwrap();
-        let counts: serde_json::Value = serde_json::from_slice(&counts.stdout).ok()?;
-        (counts["drawn"].as_u64()? > 60).then_some(())
-    });
-    let pid = nix::unistd::Pid::from_raw(launch.id() as i32);
-    nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM).unwrap();
-    ok("launch", &launch.wait_with_output().unwrap());
+    let launch = Launched::start(folder.path(), "fires.toml");
+    wait("something is drawn", || (launch.count("drawn")? > 60).then_some(()));
+    launch.end();
     let rows = rows(&rrd(&rerun(), "print", &folder.path().join("fires.rrd")));
     for entity in ["/world/fires/camera.0", "/data/camera.0/heat"] {
         assert!(rows.get(entity).is_some_and(|rows| *rows > 5), "{entity}: {rows:#?}");

@@ -2,6 +2,7 @@
 //!
 //! Both are this test program itself, started by launch with the one test [`module`] to run.
 
+use super::load::on_one_processor;
 use super::programs::bridge;
 use rohrpost::common::GET_DATA;
 use rohrpost::config::Installation;
@@ -29,7 +30,8 @@ const FLOOD: u64 = 8;
 fn module() {
     let Some(name) = std::env::var_os("ROHRPOST_MODULE") else { return };
     let is_source = name.to_string_lossy().starts_with("source");
-    let code = if is_source { rohrpost::run::<Source>() } else { rohrpost::run::<Sink>() };
+    let run = || if is_source { rohrpost::run::<Source>() } else { rohrpost::run::<Sink>() };
+    let code = on_one_processor(run);
     std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
 }
 

@@ -127,7 +127,7 @@ fn whatever_comes_what_is_held_is_bounded() {
     let store = store(20);
     let points = vec![[0.0f32, 0.0]; 100_000];
     let large = row(0, &Points2D::new(points));
-    let fit = BYTES_MAX / large.bytes();
+    let fit = (ENTITIES_BYTES_MAX - RESERVE) / large.bytes();
     for round in 0..3 {
         for entity in 0..2 * fit {
             store.put(format!("{entity}").into(), large.clone());
@@ -137,7 +137,7 @@ fn whatever_comes_what_is_held_is_bounded() {
         let inner = store.lock();
         let bytes: usize = inner.entities.iter().map(Entity::bytes).sum();
         assert_eq!(bytes, inner.bytes, "round {round}");
-        assert!(bytes <= BYTES_MAX, "{bytes}");
+        assert!(bytes <= ENTITIES_BYTES_MAX, "{bytes}");
         assert!(inner.counts.dropped >= fit as u64);
     }
     let many = Store::new(Duration::ZERO);
@@ -147,6 +147,91 @@ fn whatever_comes_what_is_held_is_bounded() {
     assert_eq!(many.counts().dropped, 10);
     many.put("0".into(), number(1));
     assert_eq!(many.counts().dropped, 10, "those that are known go on");
+}
+
+/// As many entities as there is room for, each with a row of so many points.
+fn full(store: &Store, points: usize) -> usize {
+    let large = row(0, &Points2D::new(vec![[0.0f32, 0.0]; points]));
+    let mut entity = 0;
+    while store.counts().dropped == 0 {
+        store.put(format!("tile{entity}").into(), large.clone());
+        entity += 1;
+    }
+    entity - 1
+}
+
+#[test]
+fn when_there_is_no_room_what_is_known_still_changes() {
+    let store = Store::new(Duration::ZERO);
+    store.put("pose".into(), number(0));
+    let tiles = full(&store, 100_000);
+    due(&store);
+    // A map that is sent once more while nothing is drawn: more than fits twice.
+    let large = row(1, &Points2D::new(vec![[1.0f32, 1.0]; 100_000]));
+    for round in 0..3 {
+        for tile in 0..tiles {
+            store.put(format!("tile{tile}").into(), large.clone());
+        }
+        store.put("pose".into(), number(1 + round));
+    }
+    assert_eq!(store.counts().dropped, 1, "the one that was too much");
+    let seen = due(&store);
+    assert!(seen.contains(&("/pose".into(), 3)), "{seen:?}");
+    let second = |(entity, second): &(String, i64)| !entity.starts_with("/tile") || *second == 1;
+    assert!(seen.len() == tiles + 1 && seen.iter().all(second), "{seen:?}");
+}
+
+#[test]
+fn one_entity_that_grows_does_not_push_out_the_others() {
+    let store = Store::new(Duration::ZERO);
+    store.put("pose".into(), number(0));
+    let tiles = full(&store, 50_000);
+    let huge = row(1, &Points2D::new(vec![[1.0f32, 1.0]; BYTES_MAX / 8]));
+    store.put("tile0".into(), huge);
+    assert_eq!(store.counts().dropped, 2, "there is no room for it");
+    store.put("pose".into(), number(1));
+    let seen = due(&store);
+    assert!(seen.contains(&("/pose".into(), 1)) && seen.contains(&("/tile0".into(), 0)), "{seen:?}");
+    assert_eq!(seen.len(), tiles + 1);
+}
+
+#[test]
+fn lines_that_are_long_are_counted_by_what_they_hold() {
+    let store = Store::new(Duration::ZERO);
+    for line in 0..2 * LINES_MAX {
+        store.line("log".into(), row(line as i64, &TextLog::new("x".repeat(LINE_BYTES_MAX / 2))));
+        if line == LINES_MAX {
+            due(&store);
+        }
+    }
+    let inner = store.lock();
+    let all: usize = inner.lines.iter().chain(&inner.lines_kept).map(line_bytes).sum();
+    assert_eq!(all, inner.lines_bytes);
+    assert!(all <= LINES_BYTES_MAX && all > LINES_BYTES_MAX - LINE_BYTES_MAX, "{all}");
+    assert!(inner.lines_kept.is_empty(), "what was drawn goes first");
+}
+
+#[test]
+fn a_new_stream_has_all_when_what_was_known_has_had_its_turn() {
+    let store = Store::new(Duration::ZERO);
+    for entity in ["a", "b"] {
+        store.put(entity.into(), number(0));
+        store.put(entity.into(), Row { time: None, ..number(0) });
+    }
+    store.line("log".into(), row(0, &TextLog::new("hello")));
+    due(&store);
+    store.again(true);
+    for taken in 0..5 {
+        assert!(!store.has_repeated(), "{taken} of 5");
+        // A flood of others does not count.
+        store.put(format!("new {taken}").into(), number(1));
+        store.lock().take(Instant::now()).unwrap();
+    }
+    for _ in 0..5 {
+        store.put("newer".into(), number(2));
+        store.lock().take(Instant::now()).unwrap();
+    }
+    assert!(store.has_repeated() && !store.is_empty(), "the flood goes on");
 }
 
 #[test]
