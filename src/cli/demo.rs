@@ -11,6 +11,7 @@ use rohrpost::config::Installation;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CartographerInterface, MapCounts, PlayerInterface, Progress};
 use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost::mailbox::{ClassTraffic, saturating_sum};
 use rohrpost::{Class, Name};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -131,8 +132,8 @@ fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interf
 fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
     let survey = launch.survey()?;
     let mut text = print_classes(launch.installation(), &survey.classes);
-    let received: u64 = survey.classes.iter().map(|class| class.received).sum();
-    let lost: u64 = survey.classes.iter().map(rohrpost::mailbox::ClassTraffic::lost_in_all).sum();
+    let received = saturating_sum(survey.classes.iter().map(|class| class.received));
+    let lost = saturating_sum(survey.classes.iter().map(ClassTraffic::lost_in_all));
     text.push_str("(data and replies carry the class of the module that asked for them)\n");
     text.push_str(&format!("\n{received} packages received, {lost} lost\n"));
     let mut well = true;

@@ -5,7 +5,7 @@ use super::table::table;
 use super::target::Target;
 use super::{Failure, say};
 use rohrpost::config::Installation;
-use rohrpost::mailbox::{Loss, MailboxInfo};
+use rohrpost::mailbox::{Loss, MailboxInfo, saturating_sum};
 use rohrpost::survey::{Survey, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
@@ -78,7 +78,7 @@ pub(super) fn mailbox_lines(installation: &Installation, mailboxes: &[MailboxInf
 }
 
 fn mailbox_line(installation: &Installation, mailbox: &MailboxInfo) -> MailboxLine {
-    let lost = |cause: Loss| mailbox.classes.iter().map(|class| class.lost(cause)).sum();
+    let lost = |cause: Loss| saturating_sum(mailbox.classes.iter().map(|class| class.lost(cause)));
     MailboxLine {
         mailbox: installation.classes.format_full(mailbox.name),
         purpose: purpose(mailbox.name.local()),
@@ -89,7 +89,7 @@ fn mailbox_line(installation: &Installation, mailbox: &MailboxInfo) -> MailboxLi
         waiting: mailbox.depth,
         waiting_max: mailbox.depth_max,
         sent: mailbox.sent,
-        received: mailbox.classes.iter().map(|class| class.received).sum(),
+        received: saturating_sum(mailbox.classes.iter().map(|class| class.received)),
         losses: Losses::new(&Loss::ALL.map(lost)),
         lost_text: losses(lost),
     }

@@ -4,7 +4,7 @@ use super::table::{table, time};
 use rohrpost::Name;
 use rohrpost::config::Installation;
 use rohrpost::launch::Phase;
-use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, ParticipantInfo};
+use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, ParticipantInfo, saturating_sum};
 use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -120,7 +120,11 @@ impl Losses {
     pub(super) fn new(counts: &[u64; Loss::ALL.len()]) -> Self {
         let missed = Loss::ALL.into_iter().filter(|cause| cause.is_missed() && counts[*cause as usize] > 0);
         let lost_by_cause: BTreeMap<_, _> = missed.map(|cause| (cause.name(), counts[cause as usize])).collect();
-        Self { lost: lost_by_cause.values().sum(), lost_by_cause, replaced: counts[Loss::Replaced as usize] }
+        Self {
+            lost: saturating_sum(lost_by_cause.values().copied()),
+            lost_by_cause,
+            replaced: counts[Loss::Replaced as usize],
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use super::super::summary::{Losses, ModuleLine};
 use super::process::Usage;
 use rohrpost::Name;
 use rohrpost::config::Installation;
-use rohrpost::mailbox::{FlowInfo, Loss, ModuleState};
+use rohrpost::mailbox::{FlowInfo, Loss, ModuleState, saturating_sum};
 use rohrpost::survey::{ModuleSurvey, Survey};
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
@@ -143,9 +143,11 @@ impl Model {
         let modules: Vec<Row> = rows.collect();
         let mut states = BTreeMap::new();
         modules.iter().for_each(|row| *states.entry(row.line.state.clone()).or_default() += 1);
-        let received = |sample: &Sample| sample.survey.classes.iter().map(|class| class.received).sum();
+        let received = |sample: &Sample| saturating_sum(sample.survey.classes.iter().map(|class| class.received));
         let losses = |sample: &Sample| {
-            Losses::new(&Loss::ALL.map(|cause| sample.survey.classes.iter().map(|class| class.lost(cause)).sum()))
+            Losses::new(
+                &Loss::ALL.map(|cause| saturating_sum(sample.survey.classes.iter().map(|class| class.lost(cause)))),
+            )
         };
         let lost_since = |before: &Sample, interval| per_s(losses(now).lost, losses(before).lost, interval);
         let since = earlier.zip(interval);
