@@ -1,6 +1,8 @@
 use crate::{RATE_HZ, Scene, Sink};
 use std::io::{Read, Write};
 use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -75,10 +77,44 @@ fn slow_file(folder: &tempfile::TempDir) -> std::path::PathBuf {
     path
 }
 
-/// Lets it move again, to its end; how many bytes came.
-fn read_all(path: &std::path::Path) -> std::thread::JoinHandle<u64> {
-    let mut file = std::fs::File::open(path).unwrap();
-    std::thread::spawn(move || std::io::copy(&mut file, &mut std::io::sink()).unwrap())
+/// Takes all that is written to a slow file, whoever opens and closes it meanwhile.
+struct Reader {
+    path: std::path::PathBuf,
+    bytes: Arc<AtomicU64>,
+    over: Arc<AtomicBool>,
+}
+
+impl Reader {
+    /// Lets the file move again.
+    fn new(path: &std::path::Path) -> Self {
+        // For writing, too: so there is no end between one writer and the next, and nobody waits to open it.
+        let mut file = std::fs::File::options().read(true).write(true).open(path).unwrap();
+        let reader = Self { path: path.into(), bytes: Arc::default(), over: Arc::default() };
+        let (bytes, over) = (reader.bytes.clone(), reader.over.clone());
+        std::thread::spawn(move || {
+            let mut room = [0; 4096];
+            while !over.load(Ordering::Acquire) {
+                bytes.fetch_add(file.read(&mut room).unwrap() as u64, Ordering::Relaxed);
+            }
+        });
+        reader
+    }
+
+    /// Waits until more than so many bytes have come.
+    fn wait_for(&self, bytes: u64) {
+        let start = Instant::now();
+        while self.bytes.load(Ordering::Relaxed) <= bytes {
+            assert!(start.elapsed() < PATIENCE, "no more than {bytes} bytes");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+impl Drop for Reader {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Release);
+        std::fs::File::options().write(true).open(&self.path).unwrap().write_all(b"wakes it").unwrap();
+    }
 }
 
 #[test]
@@ -100,13 +136,13 @@ fn a_disk_that_stands_still_is_waited_for_and_keeps_nobody_waiting() {
     let ended = second.close_by(Instant::now() + PATIENCE);
     assert!(matches!(ended, Err(crate::CloseError::Stuck)), "it never had its turn: {ended:?}");
     assert!(!first.has_ended());
-    let reader = read_all(&path);
+    let reader = Reader::new(&path);
     first.close_by(Instant::now() + PATIENCE).unwrap();
-    assert!(reader.join().unwrap() > 1000, "what the first drew");
-    let reader = read_all(&path);
+    reader.wait_for(1000);
+    let from_first = reader.bytes.load(Ordering::Relaxed);
     until(&mut third, "the third has its turn", |scene| scene.counts().drawn > 0);
     third.close().unwrap();
-    assert!(reader.join().unwrap() > 1000, "what the third drew");
+    reader.wait_for(from_first + 1000);
 }
 
 #[test]
@@ -117,7 +153,7 @@ fn who_closes_a_drawing_waits_no_longer_than_it_says() {
     let pen = scene.leave().unwrap();
     let ended = pen.close_by(Instant::now() + Duration::from_millis(50));
     assert!(matches!(ended, Err(crate::CloseError::Stuck)), "{ended:?}");
-    read_all(&path);
+    drop(Reader::new(&path));
 }
 
 /// Runs a test once more with a disk of its own, of 8 MiB; tells whether this is that run, and its folder.
