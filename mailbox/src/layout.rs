@@ -3,8 +3,8 @@
 //! ```text
 //!     0  Identity   what this is: written once, before the segment gets its name; then only read
 //!    64  Owner      who receives: changed on adoption
-//!   128  Hot        ticket, sleeping, retired, ready hints
-//!   320  Counters   ten rows of 320 bytes
+//!   128  Hot        ticket, ready hints, what the receiver says, alert: 128 bytes each
+//!   640  Counters   ten rows of 320 bytes
 //!  4096  words      one a slot, 64 B apart up to 64 slots, 8 B above
 //!     …  slots      each: published (u64 ns, monotonic), head (16 B), body; a multiple of 64 B
 //! ```
@@ -14,7 +14,7 @@
 use crate::counters::{Counters, ROWS};
 use crate::name::Name;
 use crate::package::{BODY_BYTES_MAX, HEAD_BYTES};
-use crate::slots::{Full, Hot, SLOTS_MAX};
+use crate::slots::{Full, Hot, ReceiverSays, SLOTS_MAX};
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 use std::time::Duration;
@@ -22,7 +22,7 @@ use std::time::Duration;
 /// `rohrpost` in ASCII, little-endian.
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"rohrpost");
 /// Raised with every change of a layout in shared memory.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 pub(crate) const PAGE: usize = 4096;
 /// Bytes of a slot before its body: time of publishing and head.
 pub(crate) const SLOT_PREFIX: usize = 8 + HEAD_BYTES;
@@ -109,7 +109,7 @@ impl Shape {
 }
 
 /// 0 is kept for none.
-fn stored_ns(age: Duration) -> u64 {
+pub(crate) fn stored_ns(age: Duration) -> u64 {
     u64::try_from(age.as_nanos()).unwrap_or(u64::MAX).max(1)
 }
 
@@ -192,8 +192,10 @@ pub(crate) struct Page {
 const _: () = {
     assert!(size_of::<Identity>() == 64 && offset_of!(Identity, max_age_ns) == 32);
     assert!(size_of::<Owner>() == 64);
-    assert!(size_of::<Hot>() == 192 && offset_of!(Hot, sleeping) == 8 && offset_of!(Hot, ready) == 16);
-    assert!(offset_of!(Page, hot) == 128 && offset_of!(Page, counters) == 320);
+    assert!(size_of::<Hot>() == 512 && offset_of!(Hot, ready) == 128);
+    assert!(offset_of!(Hot, receiver) == 256 && offset_of!(Hot, alert) == 384);
+    assert!(offset_of!(ReceiverSays, level) == 4 && offset_of!(ReceiverSays, retired) == 8);
+    assert!(offset_of!(Page, hot) == 128 && offset_of!(Page, counters) == 640);
     assert!(size_of::<Counters>() == ROWS * 320 && size_of::<Page>() <= PAGE);
 };
 

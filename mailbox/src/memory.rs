@@ -62,11 +62,13 @@ impl Mapping {
     ///
     /// # Panics
     /// When it does not lie inside the mapping or is not aligned: offsets come from checked layouts.
+    #[inline]
     pub(crate) fn at<T: Shared>(&self, offset: usize) -> &T {
         &self.slice(offset, 1)[0]
     }
 
     /// `count` values from `offset` on. Panics as [`Mapping::at`] does.
+    #[inline]
     pub(crate) fn slice<T: Shared>(&self, offset: usize, count: usize) -> &[T] {
         let first = self.bytes_at(offset, count * size_of::<T>()).cast::<T>();
         assert!(first.is_aligned());
@@ -76,6 +78,7 @@ impl Mapping {
     }
 
     /// The address of `count` bytes from `offset` on. Panics as [`Mapping::at`] does.
+    #[inline]
     pub(crate) fn bytes_at(&self, offset: usize, count: usize) -> NonNull<u8> {
         assert!(offset.checked_add(count).is_some_and(|end| end <= self.bytes));
         // SAFETY: stays inside the mapping, as just asserted.

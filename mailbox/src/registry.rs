@@ -132,7 +132,7 @@ impl Participant {
                 let counters = &segment.page().counters;
                 counters.carry_over(&old.page().counters);
                 // Not the old one's tickets: those of packages that their senders took back were never accepted.
-                segment.page().hot.ticket.store(counters.accepted(), Ordering::Relaxed);
+                segment.page().hot.ticket.0.store(counters.accepted(), Ordering::Relaxed);
                 step!("create: carried over");
             }
             fs::rename(&unfinished, &path)?;
@@ -234,7 +234,7 @@ impl Node {
             adoptions: page.owner.adoptions.load(Ordering::Relaxed),
             depth: (0..slots.count()).filter(waits).count() as u32,
             depth_max: page.owner.depth_max.load(Ordering::Relaxed),
-            sent: page.hot.ticket.load(Ordering::Relaxed),
+            sent: page.hot.ticket.0.load(Ordering::Relaxed),
             classes: page.counters.read(),
         })
     }
