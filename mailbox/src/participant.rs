@@ -32,7 +32,7 @@ impl Participant {
     /// # Errors
     /// [`NodeError::Crowded`] when there is none.
     pub fn join(node: &Arc<Node>, module: Name) -> Result<Arc<Self>, NodeError> {
-        let failed = |error| NodeError::Io(node.path().into(), error);
+        let failed = |error| NodeError::of(node.path(), error);
         let file = open_shared(&node.path().join("node"), false).map_err(failed)?;
         for participant in 0..PARTICIPANTS_MAX as u16 {
             if !lock::try_lock(&file, u64::from(participant)).map_err(failed)? {

@@ -8,7 +8,7 @@ use crate::counters::{ClassTraffic, Loss};
 use crate::layout::{Shape, ShapeError};
 use crate::lock::{self, Held};
 use crate::name::Name;
-use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock, allocate, open_shared};
+use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock, allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;
@@ -16,6 +16,7 @@ use crate::segment::{BadSegment, Segment, name_of, path_of};
 use crate::step::step;
 use std::fs;
 use std::io;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -39,17 +40,45 @@ pub enum CreateError {
     Owned(Name, u32),
     /// The node cannot be used.
     #[error(transparent)]
-    Node(#[from] NodeError),
+    Node(NodeError),
     /// No memory, most likely.
-    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is /dev/shm full (df /dev/shm)?")]
+    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is it full (df {})?", .node.display())]
     Memory {
         /// Which mailbox.
         name: Name,
         /// How much it needs.
         bytes: usize,
+        /// The node's directory.
+        node: PathBuf,
         /// What the system said.
         source: io::Error,
     },
+    /// As many files are open as may be.
+    #[error(
+        "mailbox {0}: this process, or the computer, has no file descriptor left, and each mailbox that a process receives \
+         from takes one; raise the limit (ulimit -n, or LimitNOFILE= of a service), or use several processes"
+    )]
+    Descriptors(Name),
+    /// Its file cannot be used.
+    #[error("mailbox {0}: its file {1}: {2}")]
+    File(Name, PathBuf, io::Error),
+}
+
+impl CreateError {
+    /// What the system said of a mailbox's file.
+    fn of(node: &Node, name: Name, shape: &Shape, source: io::Error) -> Self {
+        if is_lack_of_memory(&source) {
+            return Self::Memory { name, bytes: shape.segment_bytes(), node: node.path().into(), source };
+        }
+        if is_lack_of_descriptors(&source) {
+            return Self::Descriptors(name);
+        }
+        Self::File(name, path_of(node.path(), name), source)
+    }
+
+    fn of_node(name: Name, error: NodeError) -> Self {
+        if matches!(error, NodeError::Descriptors(_)) { Self::Descriptors(name) } else { Self::Node(error) }
+    }
 }
 
 impl Participant {
@@ -64,7 +93,8 @@ impl Participant {
         }
         shape.check().map_err(|error| CreateError::Shape(name, error))?;
         let shape = shape.as_stored();
-        let _registry = RegistryLock::take(self.node().path())?;
+        let taken = RegistryLock::take(self.node().path());
+        let _registry = taken.map_err(|error| CreateError::of_node(name, error))?;
         let (segment, lock) = match self.take_over(name, shape)? {
             Predecessor::Same(segment, lock) => (segment, lock),
             Predecessor::Other(old) => self.make(name, shape, Some(&old))?,
@@ -85,18 +115,18 @@ impl Participant {
     /// Looks at what is there, as its owner, and adopts it if it is the same.
     fn take_over(&self, name: Name, shape: Shape) -> Result<Predecessor, CreateError> {
         let path = path_of(self.node().path(), name);
-        let memory = |source| CreateError::Memory { name, bytes: shape.segment_bytes(), source };
+        let failed = |source| CreateError::of(self.node(), name, &shape, source);
         let file = match open_shared(&path, false) {
             Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
-            Err(error) => return Err(memory(error)),
+            Err(error) => return Err(failed(error)),
         };
         let old = match Segment::check(&file, name) {
             Ok(old) => Some(old),
             Err(BadSegment::Foreign | BadSegment::Version(_)) => None,
-            Err(BadSegment::Io(error)) => return Err(memory(error)),
+            Err(BadSegment::Io(error)) => return Err(failed(error)),
         };
-        let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(memory)? else {
+        let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else {
             let pid = old.map_or(0, |old| old.page().owner.pid.load(Ordering::Relaxed));
             return Err(CreateError::Owned(name, pid));
         };
@@ -141,7 +171,7 @@ impl Participant {
         };
         made().map_err(|source| {
             let _ = fs::remove_file(&unfinished);
-            CreateError::Memory { name, bytes: shape.segment_bytes(), source }
+            CreateError::of(node, name, &shape, source)
         })
     }
 }

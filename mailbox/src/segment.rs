@@ -1,7 +1,7 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
 use crate::clock::monotonic_ns;
-use crate::layout::{Page, SLOT_PREFIX, Shape, VERSION};
+use crate::layout::{Identity, Page, SLOT_PREFIX, Shape, VERSION};
 use crate::memory::Mapping;
 use crate::name::Name;
 use crate::node::{open_shared, open_to_read};
@@ -9,6 +9,7 @@ use crate::package::{HEAD_BYTES, Head};
 use crate::slots::Slots;
 use std::fs::File;
 use std::io;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
 
@@ -74,17 +75,20 @@ impl Segment {
         Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), true)?, name, shape })
     }
 
+    /// What a file says that it is. Read, not mapped: a map costs more than all of the rest.
     fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
-        if file.metadata()?.len() < size_of::<Page>() as u64 {
+        let there = file.metadata()?;
+        if !there.is_file() || there.len() < size_of::<Page>() as u64 {
             return Err(BadSegment::Foreign);
         }
-        let front = Mapping::new(file, size_of::<Page>(), false)?;
-        let identity = &front.at::<Page>(0).identity;
+        let mut first = [0; size_of::<Identity>()];
+        file.read_exact_at(&mut first, 0)?;
+        let identity = Identity::from_bytes(&first);
         if let Some(other) = identity.other_version() {
             return Err(BadSegment::Version(other));
         }
         let (found, shape) = identity.read().ok_or(BadSegment::Foreign)?;
-        if found != name || file.metadata()?.len() < shape.segment_bytes() as u64 {
+        if found != name || there.len() < shape.segment_bytes() as u64 {
             return Err(BadSegment::Foreign);
         }
         Ok(shape)

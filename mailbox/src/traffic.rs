@@ -147,7 +147,7 @@ impl Table {
             Ok(mapping) => Ok(Self { mapping, path, writers: AtomicU32::new(0) }),
             Err(error) => {
                 let _ = fs::remove_file(&unfinished);
-                Err(NodeError::Io(path, error))
+                Err(NodeError::of(&path, error))
             }
         }
     }
