@@ -37,7 +37,7 @@ impl Receiver {
         };
         write().map_err(|error: io::Error| {
             let _ = fs::remove_file(&unfinished);
-            NodeError::Io(path, error)
+            NodeError::of(&path, error)
         })
     }
 }

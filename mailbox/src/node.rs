@@ -16,14 +16,14 @@
 
 use crate::doorbell;
 use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
-use crate::layout::{MAGIC, VERSION};
+use crate::layout::{MAGIC, PAGE, VERSION};
 use crate::lock::{self, Held};
-use crate::memory::Mapping;
+use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::step::step;
 use crate::word::Claimant;
 use std::fs::{self, File, OpenOptions};
-use std::io;
+use std::io::{self, IoSlice, Write};
 use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -35,6 +35,9 @@ const LAUNCH_BYTE: u64 = 1 << 20;
 const REGISTRY_BYTE: u64 = LAUNCH_BYTE + 1;
 /// Changing the registry takes microseconds; who holds it longer is stopped.
 pub(crate) const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
+/// Between two tries: as long as making a mailbox takes, then longer and longer.
+const REGISTRY_PAUSE: Duration = Duration::from_micros(50);
+const REGISTRY_PAUSE_MAX: Duration = Duration::from_millis(1);
 
 /// The file `node`.
 #[repr(C)]
@@ -198,7 +201,7 @@ impl Node {
         // Not to be read, only to find pipes by.
         let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
         let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
-        let mapping = Mapping::new(&file, size_of::<NodePage>(), true).map_err(failed)?;
+        let mapping = Mapping::new(&file, size_of::<NodePage>(), Use::Share).map_err(failed)?;
         let there = file.metadata().map_err(failed)?;
         let node = Self { path: path.into(), mapping, identity: (there.dev(), there.ino()), file, directory };
         if maker.is_some() {
@@ -362,11 +365,13 @@ impl RegistryLock {
         let failed = |error| NodeError::of(path, error);
         let file = open_shared(&path.join("node"), false).map_err(failed)?;
         let start = Instant::now();
+        let mut pause = REGISTRY_PAUSE;
         while !lock::try_lock(&file, REGISTRY_BYTE).map_err(failed)? {
             if patience.is_zero() || start.elapsed() > patience {
                 return Err(NodeError::Busy(path.into()));
             }
-            std::thread::sleep(Duration::from_micros(200));
+            std::thread::sleep(pause);
+            pause = (pause * 2).min(REGISTRY_PAUSE_MAX);
         }
         Ok(Self { file })
     }
@@ -424,14 +429,22 @@ pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
     OpenOptions::new().read(true).custom_flags(flags).open(path)
 }
 
-/// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later.
-pub(crate) fn allocate(file: &File, bytes: usize) -> io::Result<()> {
-    let length = libc::off_t::try_from(bytes).map_err(|_| io::ErrorKind::InvalidInput)?;
-    loop {
-        match nix::fcntl::posix_fallocate(file, 0, length) {
-            // A signal came; its handler has run.
-            Err(nix::errno::Errno::EINTR) => {}
-            result => return Ok(result?),
+/// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later. Written, since memory that is only
+/// reserved (fallocate) is cleared page by page when it is mapped, which takes half as long again. Its position is its beginning.
+pub(crate) fn allocate(mut file: &File, bytes: usize) -> io::Result<()> {
+    /// Pages that one call writes.
+    const AT_ONCE: usize = 64;
+    static ZEROES: [u8; PAGE] = [0; PAGE];
+    let mut left = bytes;
+    while left > 0 {
+        let pages: [IoSlice<'_>; AT_ONCE] =
+            std::array::from_fn(|at| IoSlice::new(&ZEROES[..left.saturating_sub(at * PAGE).min(PAGE)]));
+        match file.write_vectored(&pages) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(written) => left -= written,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
         }
     }
+    Ok(())
 }

@@ -7,8 +7,11 @@ use crate::about;
 use crate::counters::{ClassTraffic, Loss};
 use crate::layout::{Shape, ShapeError};
 use crate::lock::{self, Held};
+use crate::memory::Use;
 use crate::name::Name;
-use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock, allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
+use crate::node::{
+    Node, NodeError, REGISTRY_PATIENCE, RegistryLock, allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared,
+};
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;
@@ -107,8 +110,6 @@ impl Participant {
         owner.pid.store(std::process::id(), Ordering::Relaxed);
         // ORDERING: Release; a sender that sees `sleeping` set by this owner sees whose bell to ring.
         owner.participant.store(u32::from(self.claimant().participant), Ordering::Release);
-        // Refused when the memlock limit is small; the pages are present all the same.
-        let _ = segment.lock_in_memory();
         Ok(Receiver::new(self.clone(), segment, lock))
     }
 
@@ -121,7 +122,7 @@ impl Participant {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
             Err(error) => return Err(failed(error)),
         };
-        let old = match Segment::check(&file, name) {
+        let old = match Segment::check(&file, name, Use::Keep) {
             Ok(old) => Some(old),
             Err(BadSegment::Foreign | BadSegment::Version(_)) => None,
             Err(BadSegment::Io(error)) => return Err(failed(error)),
@@ -290,7 +291,7 @@ impl Node {
         let failed = |error| NodeError::Io(path.clone(), error);
         let registry = RegistryLock::take_within(self.path(), patience)?;
         let Ok(file) = open_shared(&path, false) else { return Ok(false) };
-        let old = Segment::check(&file, name);
+        let old = Segment::check(&file, name, Use::Share);
         let Some(_owner) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else { return Ok(false) };
         if let Ok(old) = old {
             retire(&old);

@@ -2,7 +2,7 @@
 
 use crate::clock::monotonic_ns;
 use crate::layout::{Identity, Page, SLOT_PREFIX, Shape, VERSION};
-use crate::memory::Mapping;
+use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::node::{open_shared, open_to_read};
 use crate::package::{HEAD_BYTES, Head};
@@ -51,7 +51,7 @@ pub(crate) fn name_of(path: &Path) -> Option<Name> {
 impl Segment {
     /// Maps a file that was just made, and writes what it is.
     pub(crate) fn format(file: &File, name: Name, shape: Shape) -> io::Result<Self> {
-        let mapping = Mapping::new(file, shape.segment_bytes(), true)?;
+        let mapping = Mapping::new(file, shape.segment_bytes(), Use::Keep)?;
         let segment = Self { mapping, name, shape };
         segment.page().identity.write(name, &shape);
         Ok(segment)
@@ -59,20 +59,20 @@ impl Segment {
 
     /// Maps the mailbox of this name as it stands.
     pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
-        Self::check(&open_shared(&path_of(node, name), false)?, name)
+        Self::check(&open_shared(&path_of(node, name), false)?, name, Use::Share)
     }
 
     /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.
     pub(crate) fn look_at(node: &Path, name: Name) -> Result<(Self, File), BadSegment> {
         let file = open_to_read(&path_of(node, name))?;
         let shape = Self::identify(&file, name)?;
-        Ok((Self { mapping: Mapping::new(&file, shape.slots_offset(), false)?, name, shape }, file))
+        Ok((Self { mapping: Mapping::new(&file, shape.slots_offset(), Use::Look)?, name, shape }, file))
     }
 
     /// Maps a file and checks that it is this mailbox, whole.
-    pub(crate) fn check(file: &File, name: Name) -> Result<Self, BadSegment> {
+    pub(crate) fn check(file: &File, name: Name, used: Use) -> Result<Self, BadSegment> {
         let shape = Self::identify(file, name)?;
-        Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), true)?, name, shape })
+        Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), used)?, name, shape })
     }
 
     /// What a file says that it is. Read, not mapped: a map costs more than all of the rest.
@@ -92,10 +92,6 @@ impl Segment {
             return Err(BadSegment::Foreign);
         }
         Ok(shape)
-    }
-
-    pub(crate) fn lock_in_memory(&self) -> bool {
-        self.mapping.lock_in_memory()
     }
 
     pub(crate) fn page(&self) -> &Page {

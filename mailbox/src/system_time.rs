@@ -6,7 +6,7 @@
 //! are measured by the monotonic clock.
 
 use crate::clock::{monotonic_ns, realtime_ns};
-use crate::memory::Mapping;
+use crate::memory::{Mapping, Use};
 use crate::node::{Node, NodeError, allocate, open_shared};
 use crate::step::step;
 use std::path::Path;
@@ -196,7 +196,7 @@ fn map(node: &Path, create: bool) -> std::io::Result<Mapping> {
     if create && file.metadata()?.len() < bytes as u64 {
         allocate(&file, bytes)?;
     }
-    Mapping::new(&file, bytes, create)
+    Mapping::new(&file, bytes, if create { Use::Share } else { Use::Look })
 }
 
 /// Reads a node's system time; without a time page, this computer's wall clock is taken.
@@ -250,7 +250,7 @@ impl TimeKeeper {
     /// # Errors
     /// When the page cannot be made.
     pub fn begin(node: &Arc<Node>, source: TimeSource, system_ns: u64, pace: f64) -> Result<Self, NodeError> {
-        let failed = |error| NodeError::Io(node.path().join("time"), error);
+        let failed = |error| NodeError::of(&node.path().join("time"), error);
         let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);

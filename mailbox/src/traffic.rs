@@ -13,7 +13,7 @@
 //! A new participant of the same index makes a new file: readers of the old one are not confused.
 
 use crate::layout::{MAGIC, VERSION};
-use crate::memory::Mapping;
+use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::node::{Node, NodeError, allocate, open_shared};
 use crate::package::Type;
@@ -129,7 +129,7 @@ impl Table {
             let file = open_shared(&unfinished, true)?;
             step!("traffic: file");
             allocate(&file, size_of::<TrafficPage>())?;
-            let mapping = Mapping::new(&file, size_of::<TrafficPage>(), true)?;
+            let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Keep)?;
             let header = &mapping.at::<TrafficPage>(0).header;
             header.version.store(VERSION, Ordering::Relaxed);
             header.participant.store(me.participant.into(), Ordering::Relaxed);
@@ -139,8 +139,6 @@ impl Table {
             step!("traffic: formatted");
             fs::rename(&unfinished, &path)?;
             step!("traffic: named");
-            // Refused when the memlock limit is small; the pages are present all the same.
-            let _ = mapping.lock_in_memory();
             Ok(mapping)
         };
         match made() {
@@ -219,7 +217,7 @@ impl TableView {
     /// The table of this participant, if it is there, whole, and of this use of the index.
     pub(crate) fn open(node: &Path, who: Claimant) -> Option<Self> {
         let file = crate::node::open_to_read(&path_of(node, who.participant)).ok()?;
-        let mapping = Mapping::new(&file, size_of::<TrafficPage>(), false).ok()?;
+        let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Look).ok()?;
         let header = &mapping.at::<TrafficPage>(0).header;
         let said = [&header.version, &header.participant, &header.incarnation, &header.rows];
         let expected = [VERSION, who.participant.into(), who.incarnation, FLOWS as u32];
