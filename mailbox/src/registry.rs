@@ -1,12 +1,12 @@
-//! Making, adopting, replacing, listing and removing mailboxes: the files of a node's directory are the registry.
+//! Making, adopting, replacing and removing mailboxes (`inspect` looks at them): the files of a node's directory are the registry.
 //!
 //! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A file
 //! gets its name last, whole; so nobody ever opens half a mailbox.
 
 use crate::about;
-use crate::counters::{ClassTraffic, Loss};
+use crate::counters::Loss;
 use crate::layout::{Shape, ShapeError};
-use crate::lock::{self, Held};
+use crate::lock::Held;
 use crate::memory::Use;
 use crate::name::Name;
 use crate::node::{
@@ -15,7 +15,7 @@ use crate::node::{
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;
-use crate::segment::{BadSegment, Segment, name_of, path_of};
+use crate::segment::{BadSegment, Segment, path_of};
 use crate::step::step;
 use std::fs;
 use std::io;
@@ -25,7 +25,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// The byte of a segment's file that its owner locks.
-const OWNER_BYTE: u64 = 0;
+pub(crate) const OWNER_BYTE: u64 = 0;
 
 /// Why a mailbox could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -214,62 +214,7 @@ fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeE
     Ok(())
 }
 
-/// A mailbox seen from outside. Looking changes nothing.
-#[derive(Clone, Debug)]
-pub struct MailboxInfo {
-    /// Its name.
-    pub name: Name,
-    /// Its shape.
-    pub shape: Shape,
-    /// Process that receives, if one does now.
-    pub owner: Option<u32>,
-    /// Times a new owner took over.
-    pub adoptions: u32,
-    /// Packages that wait or are in hand now.
-    pub depth: u32,
-    /// Most that its receiver ever found waiting.
-    pub depth_max: u32,
-    /// Packages ever accepted; after a sender was killed in the act, one more.
-    pub sent: u64,
-    /// By class: received, lost, latency.
-    pub classes: Vec<ClassTraffic>,
-}
-
 impl Node {
-    /// Names of all mailboxes of this node, in order.
-    ///
-    /// # Errors
-    /// When its directory cannot be read.
-    pub fn mailboxes(&self) -> Result<Vec<Name>, NodeError> {
-        let failed = |error| NodeError::Io(self.path().into(), error);
-        let entries = fs::read_dir(self.path()).map_err(failed)?;
-        let mut names: Vec<Name> = entries.filter_map(|entry| name_of(&entry.ok()?.path())).collect();
-        names.sort_unstable();
-        Ok(names)
-    }
-
-    /// A mailbox as it is now; none when it does not exist (any more).
-    pub fn look_at(&self, name: Name) -> Option<MailboxInfo> {
-        let (segment, file) = Segment::look_at(self.path(), name).ok()?;
-        let page = segment.page();
-        let slots = segment.slots();
-        let waits = |slot: &usize| {
-            use crate::word::State;
-            matches!(slots.load(*slot).state(), State::Ready | State::Taken)
-        };
-        let owned = lock::is_locked(&file, OWNER_BYTE).unwrap_or(false);
-        Some(MailboxInfo {
-            name,
-            shape: segment.shape,
-            owner: owned.then(|| page.owner.pid.load(Ordering::Relaxed)),
-            adoptions: page.owner.adoptions.load(Ordering::Relaxed),
-            depth: (0..slots.count()).filter(waits).count() as u32,
-            depth_max: page.owner.depth_max.load(Ordering::Relaxed),
-            sent: page.hot.ticket.load(Ordering::Relaxed),
-            classes: page.counters.read(),
-        })
-    }
-
     /// Removes a mailbox that nobody owns; false when somebody does, or it is gone.
     ///
     /// # Errors
