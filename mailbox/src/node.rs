@@ -84,6 +84,11 @@ pub enum NodeError {
          of a service)"
     )]
     Descriptors(PathBuf),
+    /// Another user's.
+    #[error(
+        "node {0}: permission denied; be the user whose node it is, or have its `mode` in the configuration let you in"
+    )]
+    Denied(PathBuf),
     /// Cut off, or somebody else's.
     #[error("node {0}: its file `node` is damaged, or not Rohrpost's; stop what runs there and remove the directory")]
     Damaged(PathBuf),
@@ -138,6 +143,7 @@ impl NodeError {
     pub(crate) fn of(path: &Path, source: io::Error) -> Self {
         match &source {
             error if is_lack_of_memory(error) => Self::Memory { path: path.into(), source },
+            error if error.kind() == io::ErrorKind::PermissionDenied => Self::Denied(path.into()),
             error if is_lack_of_descriptors(error) => Self::Descriptors(path.into()),
             _ => Self::Io(path.into(), source),
         }

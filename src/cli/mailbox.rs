@@ -297,12 +297,12 @@ fn print(installation: &Installation, detail: &MailboxDetail, seen: &Seen) -> St
         Some(party) if party.alive => party.text(),
         Some(party) => format!("nobody; the last was {}", party.text()),
     };
-    let age = shape.max_age.map_or("any age".into(), |age| format!("until it has waited {}", time(age)));
+    let age = shape.max_age.map_or("nothing for its age".into(), |age| format!("what has waited {}", time(age)));
     let mut facts = vec![
         ("receiver", receiver),
         ("slots", format!("{} x {} B, {} B of shared memory", seen.slots, seen.body_bytes_max, seen.memory_bytes)),
         ("when full", when_full.into()),
-        ("receives", age),
+        ("drops", age),
         ("claims", format!("{} a sender", seen.claims)),
         ("waiting", format!("{} (most {})", seen.waiting, seen.waiting_max)),
         ("sent", seen.sent.to_string()),
