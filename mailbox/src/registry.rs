@@ -19,7 +19,7 @@ use crate::segment::{BadSegment, Segment, path_of};
 use crate::step::step;
 use std::fs;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -68,15 +68,16 @@ pub enum CreateError {
 }
 
 impl CreateError {
-    /// What the system said of a mailbox's file.
-    fn of(node: &Node, name: Name, shape: &Shape, source: io::Error) -> Self {
+    /// What the system said of a mailbox's file, which lies in the node's directory.
+    fn of(file: &Path, name: Name, shape: &Shape, source: io::Error) -> Self {
         if is_lack_of_memory(&source) {
-            return Self::Memory { name, bytes: shape.segment_bytes(), node: node.path().into(), source };
+            let node = file.parent().unwrap_or(file).into();
+            return Self::Memory { name, bytes: shape.segment_bytes(), node, source };
         }
         if is_lack_of_descriptors(&source) {
             return Self::Descriptors(name);
         }
-        Self::File(name, path_of(node.path(), name), source)
+        Self::File(name, file.into(), source)
     }
 
     fn of_node(name: Name, error: NodeError) -> Self {
@@ -116,7 +117,7 @@ impl Participant {
     /// Looks at what is there, as its owner, and adopts it if it is the same.
     fn take_over(&self, name: Name, shape: Shape) -> Result<Predecessor, CreateError> {
         let path = path_of(self.node().path(), name);
-        let failed = |source| CreateError::of(self.node(), name, &shape, source);
+        let failed = |source| CreateError::of(&path, name, &shape, source);
         let file = match open_shared(&path, false) {
             Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
@@ -172,7 +173,7 @@ impl Participant {
         };
         made().map_err(|source| {
             let _ = fs::remove_file(&unfinished);
-            CreateError::of(node, name, &shape, source)
+            CreateError::of(&unfinished, name, &shape, source)
         })
     }
 }

@@ -72,7 +72,7 @@ impl TimeRecord {
     /// System time at this moment of the monotonic clock.
     pub fn at(&self, monotonic_ns: u64) -> SystemTime {
         let since = i128::from(monotonic_ns) - i128::from(self.monotonic_ns);
-        let system = i128::from(self.system_ns) + since * i128::from(self.pace_ppb) / BILLION;
+        let system = i128::from(self.system_ns) + since.saturating_mul(self.pace_ppb.into()) / BILLION;
         let age_ns = monotonic_ns.saturating_sub(self.monotonic_ns);
         let drift = u128::from(age_ns) * u128::from(self.drift_ns_s) / BILLION as u128;
         SystemTime {
@@ -175,7 +175,7 @@ impl TimePage {
 
     /// Writes the record that the index does not name.
     fn fill(&self, record: &TimeRecord) {
-        let next = self.index.load(Ordering::Relaxed) + 1;
+        let next = self.index.load(Ordering::Relaxed).wrapping_add(1);
         // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
         fence(Ordering::Release);
         self.records[(next % 2) as usize].store(record);
@@ -183,7 +183,7 @@ impl TimePage {
 
     /// Makes the record just filled the valid one.
     fn turn(&self) {
-        let next = self.index.load(Ordering::Relaxed) + 1;
+        let next = self.index.load(Ordering::Relaxed).wrapping_add(1);
         // ORDERING: Release (B); pairs with (A).
         self.index.store(next, Ordering::Release);
         step!("time: turned");
@@ -254,7 +254,7 @@ impl TimeKeeper {
         let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
-        let epoch = page.read().map_or(1, |last| last.epoch + 1);
+        let epoch = page.read().map_or(1, |last| last.epoch.saturating_add(1));
         page.fill(&TimeRecord {
             epoch,
             source,
