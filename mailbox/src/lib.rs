@@ -35,6 +35,7 @@ mod clock;
 mod counters;
 mod doorbell;
 mod entry;
+mod files;
 mod flows;
 mod inspect;
 mod latest;

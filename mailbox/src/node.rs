@@ -16,14 +16,15 @@
 
 use crate::doorbell;
 use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
-use crate::layout::{MAGIC, PAGE, VERSION};
+use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
+use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, Held};
 use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::step::step;
 use crate::word::Claimant;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, IoSlice, Write};
+use std::io;
 use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -150,16 +151,6 @@ impl NodeError {
     }
 }
 
-pub(crate) fn is_lack_of_descriptors(error: &io::Error) -> bool {
-    matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE))
-}
-
-/// Whether it is about memory, and not about names, rights or descriptors. A limit of file sizes looks like a full file system.
-pub(crate) fn is_lack_of_memory(error: &io::Error) -> bool {
-    use io::ErrorKind::{FileTooLarge, OutOfMemory, QuotaExceeded, StorageFull};
-    matches!(error.kind(), FileTooLarge | OutOfMemory | QuotaExceeded | StorageFull)
-}
-
 impl Node {
     /// Opens a node, making its directory with this mode (0o700 unless configured otherwise) if there is none.
     ///
@@ -199,15 +190,16 @@ impl Node {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(NodeError::Missing(path.into())),
             opened => opened.map_err(failed)?,
         };
-        // Only who makes it whole needs the registry to itself.
+        // Only who makes it whole needs the registry to itself; somebody else may have done so before it was had.
         let maker = if is_whole(path, &file)? { None } else { Some(RegistryLock::take(path)?) };
-        if maker.is_some() && file.metadata().map_err(failed)?.len() == 0 {
-            allocate(&file, size_of::<NodePage>()).map_err(failed)?;
+        let bytes = size_of::<NodePage>();
+        if maker.is_some() && !is_whole(path, &file)? && file.metadata().map_err(failed)?.len() < bytes as u64 {
+            allocate(&file, bytes).map_err(failed)?;
         }
         // Not to be read, only to find pipes by.
         let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
         let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
-        let mapping = Mapping::new(&file, size_of::<NodePage>(), Use::Share).map_err(failed)?;
+        let mapping = Mapping::new(&file, bytes, Use::Share).map_err(failed)?;
         let there = file.metadata().map_err(failed)?;
         let node = Self { path: path.into(), mapping, identity: (there.dev(), there.ino()), file, directory };
         if maker.is_some() {
@@ -389,68 +381,22 @@ impl Drop for RegistryLock {
     }
 }
 
-/// Opens a file of the node's directory, never through a link. A new file may be used by whom the directory's mode lets in.
-pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    options.read(true).write(true).mode(0o600).custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW);
-    if !create {
-        return options.open(path);
-    }
-    match options.clone().create_new(true).open(path) {
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => options.open(path),
-        Err(error) => Err(error),
-        Ok(file) => {
-            let around = path.parent().map_or(Ok(0o700), |folder| fs::metadata(folder).map(|found| found.mode()))?;
-            // By the file, not by its name: neither the umask nor anybody else has a say.
-            file.set_permissions(fs::Permissions::from_mode(around & 0o666))?;
-            Ok(file)
-        }
-    }
-}
-
 /// Whether a node's file is finished; false when it was just begun, or its maker died. Every version begins its files with
 /// the magic number, which is written last, and its version.
 fn is_whole(path: &Path, file: &File) -> Result<bool, NodeError> {
     let failed = |error| NodeError::of(path, error);
-    let there = file.metadata().map_err(failed)?;
-    let (mut magic, mut version) = ([0; 8], [0; 4]);
-    if !there.is_file() || (1..12).contains(&there.len()) {
-        return Err(NodeError::Damaged(path.into()));
-    }
-    if there.len() == 0 {
-        return Ok(false);
+    let (there, mut magic, mut version) = (file.metadata().map_err(failed)?, [0; 8], [0; 4]);
+    match there.len() {
+        0 if there.is_file() => return Ok(false),
+        12.. if there.is_file() => {}
+        _ => return Err(NodeError::Damaged(path.into())),
     }
     file.read_exact_at(&mut magic, 0).map_err(failed)?;
     file.read_exact_at(&mut version, 8).map_err(failed)?;
     match (u64::from_ne_bytes(magic), u32::from_ne_bytes(version)) {
+        (0, _) => Ok(false),
+        (MAGIC, VERSION) if there.len() >= size_of::<NodePage>() as u64 => Ok(true),
         (MAGIC, other) if other != VERSION => Err(NodeError::Version(path.into(), other)),
-        (magic @ (MAGIC | 0), _) if there.len() >= size_of::<NodePage>() as u64 => Ok(magic == MAGIC),
         _ => Err(NodeError::Damaged(path.into())),
     }
-}
-
-/// Opens a file of the node's directory to look at it: never through a link, never waiting for a pipe's other end.
-pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
-    let flags = libc::O_CLOEXEC | libc::O_NOFOLLOW | libc::O_NONBLOCK;
-    OpenOptions::new().read(true).custom_flags(flags).open(path)
-}
-
-/// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later. Written, since memory that is only
-/// reserved (fallocate) is cleared page by page when it is mapped, which takes half as long again. Its position is its beginning.
-pub(crate) fn allocate(mut file: &File, bytes: usize) -> io::Result<()> {
-    /// Pages that one call writes.
-    const AT_ONCE: usize = 64;
-    static ZEROES: [u8; PAGE] = [0; PAGE];
-    let mut left = bytes;
-    while left > 0 {
-        let pages: [IoSlice<'_>; AT_ONCE] =
-            std::array::from_fn(|at| IoSlice::new(&ZEROES[..left.saturating_sub(at * PAGE).min(PAGE)]));
-        match file.write_vectored(&pages) {
-            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
-            Ok(written) => left -= written,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
 }

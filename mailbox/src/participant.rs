@@ -2,9 +2,10 @@
 
 use crate::doorbell;
 use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX};
+use crate::files::open_shared;
 use crate::lock;
 use crate::name::Name;
-use crate::node::{Node, NodeError, open_shared};
+use crate::node::{Node, NodeError};
 use crate::step::step;
 use crate::traffic::Table;
 use crate::word::Claimant;

@@ -5,13 +5,12 @@
 
 use crate::about;
 use crate::counters::Loss;
+use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{Shape, ShapeError};
 use crate::lock::Held;
 use crate::memory::Use;
 use crate::name::Name;
-use crate::node::{
-    Node, NodeError, REGISTRY_PATIENCE, RegistryLock, allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared,
-};
+use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock};
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;

@@ -1,10 +1,10 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
 use crate::clock::monotonic_ns;
+use crate::files::{open_shared, open_to_read};
 use crate::layout::{Identity, Page, SLOT_PREFIX, Shape, VERSION};
 use crate::memory::{Mapping, Use};
 use crate::name::Name;
-use crate::node::{open_shared, open_to_read};
 use crate::package::{HEAD_BYTES, Head};
 use crate::slots::Slots;
 use std::fs::File;

@@ -6,8 +6,9 @@
 //! are measured by the monotonic clock.
 
 use crate::clock::{monotonic_ns, realtime_ns};
+use crate::files::{allocate, open_shared};
 use crate::memory::{Mapping, Use};
-use crate::node::{Node, NodeError, allocate, open_shared};
+use crate::node::{Node, NodeError};
 use crate::step::step;
 use std::path::Path;
 use std::sync::Arc;

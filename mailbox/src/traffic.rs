@@ -12,10 +12,11 @@
 //! A value published that finds none is not counted, since it is no package; those that carry it to subscribers are.
 //! A new participant of the same index makes a new file: readers of the old one are not confused.
 
+use crate::files::{allocate, open_shared, open_to_read};
 use crate::layout::{MAGIC, VERSION};
 use crate::memory::{Mapping, Use};
 use crate::name::Name;
-use crate::node::{Node, NodeError, allocate, open_shared};
+use crate::node::{Node, NodeError};
 use crate::package::Type;
 use crate::step::step;
 use crate::word::Claimant;
@@ -216,7 +217,7 @@ pub(crate) struct TableView(Mapping);
 impl TableView {
     /// The table of this participant, if it is there, whole, and of this use of the index.
     pub(crate) fn open(node: &Path, who: Claimant) -> Option<Self> {
-        let file = crate::node::open_to_read(&path_of(node, who.participant)).ok()?;
+        let file = open_to_read(&path_of(node, who.participant)).ok()?;
         let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Look).ok()?;
         let header = &mapping.at::<TrafficPage>(0).header;
         let said = [&header.version, &header.participant, &header.incarnation, &header.rows];

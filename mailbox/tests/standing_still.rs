@@ -14,7 +14,10 @@ fn role() {
     let mut receiver = ground.join().receiver(MAILBOX, Shape { full, ..shape(4) }).unwrap();
     tell("there");
     while let Some(package) = receiver.receive_timeout(PATIENCE) {
-        tell(package.head().id);
+        let id = package.head().id;
+        // Stopped from here on, it has none in hand.
+        drop(package);
+        tell(id);
     }
 }
 

@@ -274,6 +274,13 @@ impl SlotLine {
         }
     }
 
+    /// Whether the next slot is free as this one, or has the package that was sent after this one's.
+    fn goes_on_in(&self, next: &Self) -> bool {
+        let same = (self.state, &self.class, self.redelivered) == (next.state, &next.class, next.redelivered);
+        let is_next = self.ticket.map(|ticket| ticket + 1) == next.ticket;
+        same && self.by.is_none() && is_next
+    }
+
     fn remark(&self) -> String {
         let by = self.by.as_ref().map(|by| format!("by {}", by.text()));
         let victim = self.victim.as_ref().map(|victim| {
@@ -308,7 +315,7 @@ fn print(installation: &Installation, detail: &MailboxDetail, seen: &Seen) -> St
         ("sent", seen.sent.to_string()),
         ("received", seen.received.to_string()),
         ("lost", losses(|cause| lost(&detail.info.classes, cause))),
-        ("adopted", format!("{} times", seen.adoptions)),
+        ("adoptions", seen.adoptions.to_string()),
     ];
     if seen.retired {
         facts.push(("retired", "nobody sends here any more; the next receiver makes it anew".into()));
@@ -337,18 +344,18 @@ fn print_bars(class: &ClassLine) -> String {
     table([">from", ">to", ">packages", &head], rows)
 }
 
-/// Slots, one a line; free ones that follow each other on one.
+/// Slots, one a line; those that go on as the one before are on its line.
 fn print_slots(slots: &[SlotLine]) -> String {
-    let runs = slots.chunk_by(|one, next| one.state == "free" && next.state == "free");
+    let range = |first: String, last: String| if first == last { first } else { format!("{first}-{last}") };
+    let runs = slots.chunk_by(SlotLine::goes_on_in);
     let rows = runs.filter_map(|run| {
         let (first, last) = (run.first()?, run.last()?);
-        let at = if run.len() == 1 { first.slot.to_string() } else { format!("{}-{}", first.slot, last.slot) };
         let package = first.class.as_ref().zip(first.priority);
         Some([
-            at,
+            range(first.slot.to_string(), last.slot.to_string()),
             first.state.into(),
             package.map_or(String::new(), |(class, priority)| format!("{class} ({priority})")),
-            first.ticket.map_or(String::new(), |ticket| ticket.to_string()),
+            first.ticket.zip(last.ticket).map_or(String::new(), |(a, b)| range(a.to_string(), b.to_string())),
             first.remark(),
         ])
     });
