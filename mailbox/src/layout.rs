@@ -128,6 +128,22 @@ pub(crate) struct Identity {
 }
 
 impl Identity {
+    /// As the first bytes of a file have it. Nobody changes it once the file has its name, so a copy is as good.
+    pub(crate) fn from_bytes(bytes: &[u8; size_of::<Self>()]) -> Self {
+        let long = |at: usize| AtomicU64::new(u64::from_ne_bytes(std::array::from_fn(|i| bytes[at + i])));
+        let short = |at: usize| AtomicU32::new(u32::from_ne_bytes(std::array::from_fn(|i| bytes[at + i])));
+        Self {
+            magic: long(offset_of!(Self, magic)),
+            version: short(offset_of!(Self, version)),
+            name: short(offset_of!(Self, name)),
+            slots: short(offset_of!(Self, slots)),
+            body_bytes_max: short(offset_of!(Self, body_bytes_max)),
+            full: short(offset_of!(Self, full)),
+            claims: short(offset_of!(Self, claims)),
+            max_age_ns: long(offset_of!(Self, max_age_ns)),
+        }
+    }
+
     /// Before the segment has its name, so that nobody else can see it.
     pub(crate) fn write(&self, name: Name, shape: &Shape) {
         use std::sync::atomic::Ordering::Relaxed;

@@ -1,14 +1,15 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
 use crate::clock::monotonic_ns;
-use crate::layout::{Page, SLOT_PREFIX, Shape, VERSION};
-use crate::memory::Mapping;
+use crate::files::{open_shared, open_to_read};
+use crate::layout::{Identity, Page, SLOT_PREFIX, Shape, VERSION};
+use crate::memory::{Mapping, Use};
 use crate::name::Name;
-use crate::node::{open_shared, open_to_read};
 use crate::package::{HEAD_BYTES, Head};
 use crate::slots::{Bodies, Slots};
 use std::fs::File;
 use std::io;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
 
@@ -54,27 +55,27 @@ pub(crate) fn name_of(path: &Path) -> Option<Name> {
 impl Segment {
     /// Maps a file that was just made, and writes what it is.
     pub(crate) fn format(file: &File, name: Name, shape: Shape) -> io::Result<Self> {
-        let segment = Self::new(Mapping::new(file, shape.segment_bytes(), true)?, name, shape);
+        let segment = Self::new(Mapping::new(file, shape.segment_bytes(), Use::Keep)?, name, shape);
         segment.page().identity.write(name, &shape);
         Ok(segment)
     }
 
     /// Maps the mailbox of this name as it stands.
     pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
-        Self::check(&open_shared(&path_of(node, name), false)?, name)
+        Self::check(&open_shared(&path_of(node, name), false)?, name, Use::Share)
     }
 
     /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.
     pub(crate) fn look_at(node: &Path, name: Name) -> Result<(Self, File), BadSegment> {
         let file = open_to_read(&path_of(node, name))?;
         let shape = Self::identify(&file, name)?;
-        Ok((Self::new(Mapping::new(&file, shape.slots_offset(), false)?, name, shape), file))
+        Ok((Self::new(Mapping::new(&file, shape.slots_offset(), Use::Look)?, name, shape), file))
     }
 
     /// Maps a file and checks that it is this mailbox, whole.
-    pub(crate) fn check(file: &File, name: Name) -> Result<Self, BadSegment> {
+    pub(crate) fn check(file: &File, name: Name, used: Use) -> Result<Self, BadSegment> {
         let shape = Self::identify(file, name)?;
-        Ok(Self::new(Mapping::new(file, shape.segment_bytes(), true)?, name, shape))
+        Ok(Self::new(Mapping::new(file, shape.segment_bytes(), used)?, name, shape))
     }
 
     fn new(mapping: Mapping, name: Name, shape: Shape) -> Self {
@@ -82,24 +83,23 @@ impl Segment {
         Self { mapping, name, shape, word_stride, slots_offset, slot_bytes }
     }
 
+    /// What a file says that it is. Read, not mapped: a map costs more than all of the rest.
     fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
-        if file.metadata()?.len() < size_of::<Page>() as u64 {
+        let there = file.metadata()?;
+        if !there.is_file() || there.len() < size_of::<Page>() as u64 {
             return Err(BadSegment::Foreign);
         }
-        let front = Mapping::new(file, size_of::<Page>(), false)?;
-        let identity = &front.at::<Page>(0).identity;
+        let mut first = [0; size_of::<Identity>()];
+        file.read_exact_at(&mut first, 0)?;
+        let identity = Identity::from_bytes(&first);
         if let Some(other) = identity.other_version() {
             return Err(BadSegment::Version(other));
         }
         let (found, shape) = identity.read().ok_or(BadSegment::Foreign)?;
-        if found != name || file.metadata()?.len() < shape.segment_bytes() as u64 {
+        if found != name || there.len() < shape.segment_bytes() as u64 {
             return Err(BadSegment::Foreign);
         }
         Ok(shape)
-    }
-
-    pub(crate) fn lock_in_memory(&self) -> bool {
-        self.mapping.lock_in_memory()
     }
 
     #[inline]

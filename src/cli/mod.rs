@@ -16,6 +16,7 @@ mod hz;
 mod launch;
 mod list;
 mod log;
+mod mailbox;
 mod manager;
 mod new;
 mod param;
@@ -64,6 +65,8 @@ enum Command {
     Start(control::Arguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
+    /// Show one mailbox: its slots, losses and waits; disturbs nobody.
+    Mailbox(mailbox::Arguments),
     /// Watch modules, and switch them on and off.
     Top(top::Arguments),
     /// Ask modules how they are.
@@ -114,6 +117,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Stop(arguments) => control::run(&arguments, control::Order::Stop),
         Command::Start(arguments) => control::run(&arguments, control::Order::Start),
         Command::List(arguments) => list::run(&arguments),
+        Command::Mailbox(arguments) => mailbox::run(&arguments),
         Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),

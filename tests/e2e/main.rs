@@ -15,6 +15,7 @@ mod demo;
 mod doctor;
 mod harness;
 mod launch;
+mod mailbox;
 mod mailboxes;
 mod measure;
 mod new;
