@@ -1,6 +1,7 @@
 //! The cases. To add one: something that has a name and gives rows, and a line in [`all`].
 
 mod latency;
+mod rivals;
 
 use crate::harness::Failure;
 use crate::rounds::Row;
@@ -21,4 +22,9 @@ pub trait Case {
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
     latency::cases()
+}
+
+/// The few that tell in seconds how this computer does: blocking and spinning beside the two floors.
+pub fn self_test() -> Vec<Box<dyn Case>> {
+    latency::self_test()
 }
