@@ -19,6 +19,7 @@ pub mod harness;
 pub mod ours;
 #[cfg(feature = "peers")]
 pub mod peers;
+pub mod report;
 pub mod rounds;
 pub mod settings;
 pub mod statistics;
