@@ -151,7 +151,7 @@ pub fn human_environment(environment: &Environment) -> String {
     let count = processors.len();
     let pair = processors.iter().take(2).map(ToString::to_string).collect::<Vec<_>>().join(" and ");
     let granted = match refusals.as_slice() {
-        [] => format!("pinned to processors {pair}, SCHED_FIFO 50, memory locked"),
+        [] => format!("granted: processors {pair}, SCHED_FIFO 50, locked memory"),
         refusals => format!(
             "REFUSED: {}; what follows is measured without, and its tails are other programs' work",
             refusals.join("; ")

@@ -4,4 +4,4 @@ mod hand_over;
 mod queue;
 
 pub use hand_over::{HandOver, Lanes, Wake};
-pub use queue::{QueueEnd, Queues, queue};
+pub use queue::{Queue, QueueEnd, Queues};
