@@ -62,8 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         ));
     }
     let settings = Settings { rounds: ROUNDS, ..Settings::default() };
-    let waits = || warn("waiting: another bench runs on this computer");
-    let report = report::run(&settings, &cases::self_test(scheduling), arguments.json, say, waits)?;
+    let report = report::run(&settings, &cases::self_test(scheduling), arguments.json, say)?;
     if !arguments.json {
         say(format!("\n{}", meaning(&report, scheduling, &Hints::look())));
     }
