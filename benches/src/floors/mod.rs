@@ -1,0 +1,7 @@
+//! What the computer gives at best: bare shared memory, and the kernel's own queue.
+
+mod hand_over;
+mod queue;
+
+pub use hand_over::{HandOver, Lanes, Wake};
+pub use queue::{Queue, QueueEnd, Queues};
