@@ -3,6 +3,11 @@
 #![allow(dead_code, reason = "each test binary uses its part")]
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+pub(crate) mod board;
+pub(crate) mod crew;
+pub(crate) mod load;
+pub(crate) mod random;
+
 use rohrpost_mailbox::{Full, Label, Loss, MailboxInfo, Name, Node, Participant, Priority, Sender, Shape, Type};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -33,6 +38,12 @@ pub(crate) struct Ground {
 impl Ground {
     pub(crate) fn new() -> Self {
         let directory = tempfile::tempdir().unwrap();
+        Self { path: directory.path().join("node"), _directory: Some(directory) }
+    }
+
+    /// In shared memory, as real nodes are: for tests that send millions of packages, which a disk would want to keep.
+    pub(crate) fn in_memory() -> Self {
+        let directory = tempfile::Builder::new().prefix("rohrpost-test-").tempdir_in("/dev/shm").unwrap();
         Self { path: directory.path().join("node"), _directory: Some(directory) }
     }
 
