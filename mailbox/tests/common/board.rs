@@ -219,6 +219,16 @@ impl Board {
         }
     }
 
+    /// What one sender had accepted.
+    pub(crate) fn accepted_of(&self, run: usize, mailbox: usize) -> u64 {
+        self.runs[run].accepted[mailbox].iter().map(|count| u64::from(count.load(SeqCst))).sum()
+    }
+
+    /// What of one sender and key was received.
+    pub(crate) fn received_of(&self, run: usize, mailbox: usize, key: usize) -> u64 {
+        self.runs[run].received[mailbox][key].load(SeqCst) >> 32
+    }
+
     /// What all senders and receivers have written down about a mailbox.
     pub(crate) fn tally(&self, mailbox: usize) -> Tally {
         let mut tally = Tally::default();
