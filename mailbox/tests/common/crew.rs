@@ -91,6 +91,11 @@ impl Actor {
         kill(self.pid, Signal::SIGCONT).unwrap();
     }
 
+    /// Somebody else has waited for its end.
+    pub(crate) fn has_ended(mut self) {
+        self.ended = true;
+    }
+
     /// Until it ends by itself, well.
     pub(crate) fn finish(mut self) {
         self.ended = true;

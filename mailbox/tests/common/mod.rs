@@ -5,6 +5,7 @@
 
 pub(crate) mod board;
 pub(crate) mod crew;
+pub(crate) mod hands;
 pub(crate) mod load;
 pub(crate) mod random;
 
