@@ -17,6 +17,7 @@ use common::load::{Listener, Talker, Way, Weather};
 use common::random::Random;
 use common::{Ground, PATIENCE, label, received, shape, tell, until};
 use rohrpost_mailbox::{Full, Loss, MailboxInfo, Node, Participant, SendError, Shape};
+use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -34,7 +35,7 @@ fn shapes(full: Full, which: usize) -> [Shape; MAILBOXES.len()] {
 }
 
 fn kills() -> u64 {
-    std::env::var("ROHRPOST_STORM_KILLS").map_or(500, |kills| kills.parse().expect("a number of kills"))
+    std::env::var("ROHRPOST_STORM_KILLS").map_or(1_000, |kills| kills.parse().expect("a number of kills"))
 }
 
 #[test]
@@ -225,12 +226,7 @@ impl Storm {
     fn wait(&self, what: &str, done: impl Fn(&Self) -> bool) {
         while !done(self) {
             self.actors.iter().for_each(Actor::assert_alive);
-            assert!(
-                Instant::now() < self.deadline,
-                "after {} kills: waited too long until {what}: {:#?}",
-                self.kills,
-                self.look()
-            );
+            assert!(Instant::now() < self.deadline, "{self}: waited too long until {what}: {:#?}", self.look());
             std::thread::sleep(Duration::from_micros(100));
         }
     }
@@ -270,36 +266,28 @@ impl Storm {
                 Err(SendError::Full(_)) => self.board.refused(&mark),
                 Err(error) => panic!("{error}"),
             }
-            assert_eq!(number > u32::from(shape.slots), sent.is_err(), "after {} kills: slot {number}", self.kills);
+            assert_eq!(number > u32::from(shape.slots), sent.is_err(), "{self}: slot {number}");
         }
         assert_eq!(self.look()[mailbox].depth, u32::from(shape.slots));
     }
 
     /// Nothing waits. What was accepted was received or counted as lost, each package of it; and too much was counted at most
-    /// once for each process killed in flight, and for each sender when a mailbox was replaced.
-    fn check_accounts(&self) {
-        let too_many_at_most = self.in_flight + SENDERS as u64 * self.shaped.replacements;
+    /// once for each process killed in flight, and for each sender when a mailbox was replaced. Returns how much it was.
+    fn check_accounts(&self) -> u64 {
+        let (mut too_many, mut off) = (0, 0);
         for (mailbox, info) in self.look().into_iter().enumerate() {
             let tally = self.board.tally(mailbox);
             let (accepted, lost): (u64, u64) = (tally.accepted.iter().sum(), missing(&info));
-            let found = tally.received + lost;
-            assert!(
-                (accepted..=accepted + too_many_at_most).contains(&found),
-                "after {} kills, {} of them in flight, and {} replacements: {accepted} were accepted, but {} received and \
-                 {lost} counted as lost: {info:#?}",
-                self.kills,
-                self.in_flight,
-                self.shaped.replacements,
-                tally.received,
-            );
-            let accounted = common::accounted(&info);
-            assert!(
-                info.sent.abs_diff(accounted) <= too_many_at_most,
-                "{} kills: {} sent, {accounted} accounted for",
-                self.kills,
-                info.sent
-            );
+            let more = (tally.received + lost).checked_sub(accepted);
+            too_many += more.unwrap_or_else(|| {
+                let received = tally.received;
+                panic!("{self}: {accepted} accepted, only {received} received and {lost} counted as lost: {info:#?}")
+            });
+            off += info.sent.abs_diff(common::accounted(&info));
         }
+        let most = self.in_flight + SENDERS as u64 * self.shaped.replacements;
+        assert!(too_many <= most && off <= most, "{self}: {too_many} too many, {off} off: {:#?}", self.look());
+        too_many
     }
 
     /// A storm in which little happens would prove little.
@@ -311,18 +299,22 @@ impl Storm {
             Full::Reject => Loss::Refused,
         };
         let lost = |cause| infos.iter().map(|info| common::lost(info, cause)).sum::<u64>();
-        let (received, lost) = (infos.iter().map(received).sum::<u64>(), lost(cause));
+        let (received, gone) = (infos.iter().map(received).sum::<u64>(), lost(cause));
         let adoptions: u32 = infos.iter().map(|info| info.adoptions).sum();
+        let [unfinished, poison] = [Loss::Unfinished, Loss::Poison].map(lost);
+        let (cause, too_many) = (cause.name(), self.check_accounts());
         tell(format_args!(
-            "{} kills, {} in flight, {} replacements, {adoptions} adoptions: {received} received, {lost} {}, {} unfinished, {} poison",
-            self.kills,
-            self.in_flight,
-            self.shaped.replacements,
-            cause.name(),
-            infos.iter().map(|info| common::lost(info, Loss::Unfinished)).sum::<u64>(),
-            infos.iter().map(|info| common::lost(info, Loss::Poison)).sum::<u64>(),
+            "{self}, {adoptions} adoptions since the last: {received} received, {gone} {cause}, {unfinished} unfinished, {poison} \
+             poison; {too_many} counted too many"
         ));
-        assert!(received > kills && lost > kills / 10 && self.in_flight > kills / 10, "too quiet to prove anything");
+        assert!(received > kills && gone > kills / 10 && self.in_flight > kills / 10, "too quiet to prove anything");
+    }
+}
+
+impl fmt::Display for Storm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kills, in_flight, replacements) = (self.kills, self.in_flight, self.shaped.replacements);
+        write!(f, "{}: {kills} kills, {in_flight} in flight, {replacements} replacements", self.full.name())
     }
 }
 

@@ -154,7 +154,7 @@ impl Board {
     /// In memory that what this process forks from now on shares. It stays until the process ends.
     pub(crate) fn new(runs: usize) -> Self {
         let base = map(size_of::<Front>() + runs * size_of::<Run>());
-        const { assert!(size_of::<Front>() % align_of::<Run>() == 0) };
+        const { assert!(size_of::<Front>().is_multiple_of(align_of::<Run>())) };
         // SAFETY: the mapping is page-aligned, large enough, zero, which is a valid atomic, and never unmapped.
         unsafe {
             let after = base.cast::<Front>().add(1).cast::<Run>();

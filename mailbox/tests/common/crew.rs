@@ -133,11 +133,12 @@ pub(crate) fn is_asleep(pid: Pid) -> bool {
 }
 
 /// Runs a role of this test binary as a master and waits for its end. It has to [`tell`](super::tell) something now and then, and
-/// `done` when all is well: one that says nothing for [`PATIENCE`] hangs, and what it forked dies with it.
+/// `done` when all is well: one that says nothing for a long time hangs, and what it forked dies with it.
 pub(crate) fn alone(ground: &Ground, role: &str) {
     let master = ground.start(role);
     loop {
-        match master.told.recv_timeout(PATIENCE) {
+        // Longer than it waits for others: then it says itself for whom.
+        match master.told.recv_timeout(2 * PATIENCE) {
             Ok(told) if told == "done" => return master.finish(),
             Ok(told) => println!("{role}: {told}"),
             Err(error) => panic!("{role}: it found something wrong (see above), or hangs: {error}"),
