@@ -15,7 +15,7 @@ use common::board::{Board, MAILBOXES, Mark, PRIORITIES, missing};
 use common::crew::{Actor, alone, master};
 use common::load::{Listener, Talker, Way, Weather};
 use common::random::Random;
-use common::{Ground, PATIENCE, label, received, shape, tell, until};
+use common::{Ground, PATIENCE, label, received, shape, tell};
 use rohrpost_mailbox::{Full, Loss, MailboxInfo, Node, Participant, SendError, Shape};
 use std::fmt;
 use std::sync::Arc;
@@ -41,13 +41,8 @@ fn kills() -> u64 {
 #[test]
 fn role() {
     let Some((role, ground)) = common::role() else { return };
-    let (what, full) = role.split_once(", ").unwrap();
-    let full = Full::ALL.into_iter().find(|one| one.name() == full).unwrap();
-    master(|| match what {
-        "storm" => Storm::new(ground, full).rage(kills()),
-        "stops" => stop_and_go(&ground, full),
-        other => panic!("no role {other}"),
-    });
+    let full = Full::ALL.into_iter().find(|full| role.ends_with(full.name())).unwrap();
+    master(|| Storm::new(ground, full).rage(kills()));
     tell("done");
 }
 
@@ -64,13 +59,6 @@ fn kills_under_reject_leave_nothing_torn_stuck_or_hidden() {
 #[test]
 fn kills_under_latest_leave_nothing_torn_stuck_or_hidden() {
     alone(&Ground::in_memory(), "storm, latest");
-}
-
-#[test]
-fn who_is_stopped_anywhere_holds_nobody_up() {
-    for full in Full::ALL {
-        alone(&Ground::in_memory(), &format!("stops, {}", full.name()));
-    }
 }
 
 /// Which shapes the mailboxes have, as far as the master knows.
@@ -316,64 +304,4 @@ impl fmt::Display for Storm {
         let (kills, in_flight, replacements) = (self.kills, self.in_flight, self.shaped.replacements);
         write!(f, "{}: {kills} kills, {in_flight} in flight, {replacements} replacements", self.full.name())
     }
-}
-
-/// Senders and then the receiver are stopped at random moments: all others go on, and nothing is lost when they do too.
-fn stop_and_go(ground: &Ground, full: Full) {
-    const STOPS: u64 = 100;
-    let board = Board::new(SENDERS + 1);
-    let mut random = Random::from_environment();
-    let shape = Shape { full, ..shape(SENDERS as u16 + 2) };
-    drop(Listener::new(board, &ground.join(), &[shape], Way::Polling));
-    let actors: Vec<Actor> = (0..=SENDERS)
-        .map(|seat| {
-            let way = Way::ALL[random.below(Way::ALL.len() as u64) as usize];
-            let path = ground.path();
-            Actor::new(|| {
-                let me = Participant::join(&Node::open(path).unwrap(), rohrpost_mailbox::Name::NONE).unwrap();
-                if seat < SENDERS {
-                    let senders = vec![me.sender(MAILBOXES[0]).unwrap()];
-                    return Talker::new(board, seat, seat as u32, full, senders, Weather::Calm).talk();
-                }
-                let mut listener = Listener::new(board, &me, &[shape], way);
-                board.seat(seat).set_ready();
-                while !board.is_ended() {
-                    board.seat(seat).operate(|| listener.once());
-                }
-                listener.drain();
-            })
-        })
-        .collect();
-    until("all are ready", || (0..=SENDERS).all(|seat| board.seat(seat).is_ready()));
-    for round in 0..STOPS {
-        std::thread::sleep(Duration::from_micros(random.below(500)));
-        // One to all but one; the receiver among them every third time.
-        let mut stopped: Vec<usize> = (0..SENDERS).filter(|_| random.one_in(2)).take(SENDERS - 1).collect();
-        if round % 3 == 0 {
-            stopped.push(RECEIVER);
-        }
-        stopped.iter().for_each(|seat| actors[*seat].stop());
-        let others: Vec<usize> = (0..=SENDERS).filter(|seat| !stopped.contains(seat)).collect();
-        let before = others.iter().map(|seat| board.seat(*seat).operations()).collect::<Vec<_>>();
-        until("those who were not stopped go on", || {
-            actors.iter().for_each(|actor| actor.assert_alive());
-            others.iter().zip(&before).all(|(seat, before)| board.seat(*seat).operations() >= before + 20)
-        });
-        stopped.iter().for_each(|seat| actors[*seat].go_on());
-    }
-    board.end();
-    // Who still sends, or sleeps, sees that it is the end when somebody rings.
-    for (seat, actor) in actors.into_iter().enumerate() {
-        if seat == RECEIVER {
-            ground.node().announce_death();
-        }
-        actor.finish();
-    }
-    let mut listener = Listener::new(board, &ground.join(), &[shape], Way::Polling);
-    listener.drain();
-    let (info, tally) = (ground.look(), board.tally(0));
-    let accepted: u64 = tally.accepted.iter().sum();
-    assert_eq!((info.sent, tally.received + missing(&info)), (accepted, accepted), "{info:#?}");
-    assert_eq!((received(&info), common::lost(&info, Loss::Refused)), (tally.received, tally.refused.iter().sum()));
-    tell(format_args!("{STOPS} stops: {accepted} accepted, {} received", tally.received));
 }

@@ -99,8 +99,8 @@ fn trace(doer: Actor) -> Vec<Traced> {
 /// The system call that it is about to make; none when it comes back from one.
 fn entered(pid: Pid) -> Option<(libc::c_long, [u64; 6])> {
     let info = ptrace::syscall_info(pid).unwrap();
-    // SAFETY: the kernel says that it filled this one.
-    let entry = (info.op == libc::PTRACE_SYSCALL_INFO_ENTRY).then(|| unsafe { info.u.entry })?;
+    // SAFETY: numbers, whichever member the kernel filled; it says whether it was this one.
+    let entry = (info.op == libc::PTRACE_SYSCALL_INFO_ENTRY).then_some(unsafe { info.u.entry })?;
     Some((entry.nr as libc::c_long, entry.args))
 }
 
