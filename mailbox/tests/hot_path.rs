@@ -4,7 +4,9 @@
 
 mod common;
 
-use common::{Ground, HIGH, LOW, MAILBOX, label, shape};
+use common::crew::{Actor, alone, master};
+use common::hands::{OPERATIONS, do_all};
+use common::{Ground, HIGH, LOW, MAILBOX, label, shape, tell};
 use rohrpost_mailbox::{Full, Interest, Shape, Waiting, Watches};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -35,7 +37,25 @@ unsafe impl GlobalAlloc for Counting {
 }
 
 #[test]
-fn the_hot_paths_do_not_touch_the_heap() {
+fn role() {
+    let Some((_, ground)) = common::role() else { return };
+    let around = |at: usize, operate: &mut dyn FnMut()| {
+        let before = USES.with(Cell::get);
+        operate();
+        assert_eq!(USES.with(Cell::get), before, "{}: used the heap", OPERATIONS[at].name);
+    };
+    let start = || assert!(USES.with(Cell::get) > 0, "counts");
+    master(|| do_all(&ground, start, around, Actor::finish));
+    tell("done");
+}
+
+#[test]
+fn no_hot_path_touches_the_heap_also_when_somebody_sleeps() {
+    alone(&Ground::in_memory(), "all operations");
+}
+
+#[test]
+fn many_types_and_other_descriptors_do_not_touch_the_heap() {
     a_round_again_and_again(Full::Displace);
     a_round_again_and_again(Full::Latest);
 }

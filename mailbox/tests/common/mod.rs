@@ -3,6 +3,12 @@
 #![allow(dead_code, reason = "each test binary uses its part")]
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+pub(crate) mod board;
+pub(crate) mod crew;
+pub(crate) mod hands;
+pub(crate) mod load;
+pub(crate) mod random;
+
 use rohrpost_mailbox::{Full, Label, Loss, MailboxInfo, Name, Node, Participant, Priority, Sender, Shape, Type};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -36,6 +42,12 @@ impl Ground {
     }
 
     pub(crate) fn within(directory: TempDir) -> Self {
+        Self { path: directory.path().join("node"), _directory: Some(directory) }
+    }
+
+    /// In shared memory, as real nodes are: for tests that send millions of packages, which a disk would want to keep.
+    pub(crate) fn in_memory() -> Self {
+        let directory = tempfile::Builder::new().prefix("rohrpost-test-").tempdir_in("/dev/shm").unwrap();
         Self { path: directory.path().join("node"), _directory: Some(directory) }
     }
 

@@ -1,0 +1,268 @@
+//! Every hot path of sending and receiving, with other processes to wake and to be woken by. What an operation must not do, the
+//! tests say that have it done: take from the heap (`hot_path`), or call the kernel (`system_calls`).
+
+use super::board::{Board, shared};
+use super::crew::{Actor, is_asleep};
+use super::{Ground, HIGH, LOW, MAILBOX, OTHER, PATIENCE, label, shape, until};
+use nix::unistd::Pid;
+use rohrpost_mailbox::{
+    Full, Interest, Name, Priority, Receiver, SendError, Sender, Shape, Waiting, Watches, monotonic_ns, wait_any,
+};
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
+use std::time::{Duration, Instant};
+
+const SLEEPER: Name = Name::new(1, 202, 1, 0);
+const POLLER: Name = Name::new(1, 203, 1, 0);
+/// What the answerer is asked for: a package at once, or when who asks sleeps.
+const AT_ONCE: u32 = 1;
+const WHEN_ASLEEP: u32 = 2;
+/// Often enough that nothing is left out that comes every so many times, such as looking at a word without a hint.
+const OFTEN: u64 = 200;
+/// Where somebody has to fall asleep first.
+const SLEEPS: u64 = 20;
+const SPIN: Waiting = Waiting { spin: PATIENCE, deadline: None };
+
+/// Something that is done again and again.
+pub(crate) struct Operation {
+    pub(crate) name: &'static str,
+    pub(crate) times: u64,
+    prepare: fn(&mut Hands),
+    operate: fn(&mut Hands),
+}
+
+const fn operation(name: &'static str, times: u64, prepare: fn(&mut Hands), operate: fn(&mut Hands)) -> Operation {
+    Operation { name, times, prepare, operate }
+}
+
+pub(crate) const OPERATIONS: &[Operation] = &[
+    operation("read the clock", OFTEN, nothing, |_| {
+        assert!(monotonic_ns() > 0 && Instant::now().elapsed() < PATIENCE);
+    }),
+    operation("send to a receiver that is awake", OFTEN, Hands::empty, Hands::send),
+    operation("loan, fill and send", OFTEN, Hands::empty, |hands| {
+        let mut loan = hands.sender.loan(LOW).unwrap();
+        loan.body()[..40].fill(7);
+        loan.send(&label(LOW, 1), 40).unwrap();
+    }),
+    operation("loan and drop", OFTEN, nothing, |hands| drop(hands.sender.loan(LOW).unwrap())),
+    operation("send and displace", OFTEN, |hands| hands.fill(LOW), |hands| hands.send_as(HIGH)),
+    operation(
+        "send and be refused",
+        OFTEN,
+        |hands| hands.fill(HIGH),
+        |hands| assert!(matches!(hands.sender.send(&label(LOW, 1), &[]), Err(SendError::Full(_)))),
+    ),
+    operation("send what is too large", OFTEN, nothing, |hands| {
+        assert!(matches!(hands.sender.send(&label(LOW, 1), &[&[0; 1000]]), Err(SendError::TooLarge { .. })));
+    }),
+    operation("send and replace one's own older", OFTEN, |hands| hands.states(&[1]), |hands| hands.state(1)),
+    operation("send into one's own older slot", OFTEN, |hands| hands.states(&[1, 2]), |hands| hands.state(2)),
+    operation("try_receive with a package there", OFTEN, Hands::send, Hands::take),
+    operation("try_receive with none there", OFTEN, nothing, |hands| assert!(hands.receiver.try_receive().is_none())),
+    operation("receive with a package there", OFTEN, Hands::send, |hands| drop(hands.receiver.receive())),
+    operation("receive with a timeout and a package there", OFTEN, Hands::send, |hands| {
+        assert!(hands.receiver.receive_timeout(PATIENCE).is_some());
+    }),
+    operation("wait for several with a package there", OFTEN, Hands::send, |hands| {
+        hands.wait_for_both(Waiting::default())
+    }),
+    operation(
+        "spin until a package comes",
+        SLEEPS,
+        |hands| hands.ask(AT_ONCE),
+        |hands| assert!(hands.receiver.receive_timeout(SPIN).is_some()),
+    ),
+    operation(
+        "spin for several until a package comes",
+        SLEEPS,
+        |hands| hands.ask(AT_ONCE),
+        |hands| hands.wait_for_both(SPIN),
+    ),
+    operation(
+        "sleep until a package comes",
+        SLEEPS,
+        |hands| hands.ask(WHEN_ASLEEP),
+        |hands| drop(hands.receiver.receive()),
+    ),
+    operation(
+        "sleep for several until a package comes",
+        SLEEPS,
+        |hands| hands.ask(WHEN_ASLEEP),
+        |hands| hands.wait_for_both(Waiting::default()),
+    ),
+    operation("sleep until a time has passed", SLEEPS, nothing, |hands| {
+        assert!(hands.receiver.receive_timeout(Duration::from_millis(1)).is_none());
+    }),
+    operation(
+        "sleep in poll until a package comes",
+        SLEEPS,
+        |hands| hands.ask(WHEN_ASLEEP),
+        |hands| {
+            hands.watches.wait_any(&mut [&mut hands.receiver], None, || false);
+            hands.take();
+        },
+    ),
+    operation("send to a receiver that sleeps", SLEEPS, |hands| hands.asleep(0), |hands| hands.wake(0)),
+    operation(
+        "loan and send to a receiver that sleeps",
+        SLEEPS,
+        |hands| hands.asleep(0),
+        |hands| hands.to[0].loan(LOW).unwrap().send(&label(LOW, 1), 8).unwrap(),
+    ),
+    operation("send to a receiver that sleeps in poll", SLEEPS, |hands| hands.asleep(1), |hands| hands.wake(1)),
+];
+
+fn nothing(_: &mut Hands) {}
+
+/// Does all [`OPERATIONS`] in a process of its own, in which `start` is called first, then `around` each time with the index of an
+/// operation and what does it. `look` gets the process and waits for its end. In a master only.
+pub(crate) fn do_all(
+    ground: &Ground,
+    start: impl FnOnce(),
+    mut around: impl FnMut(usize, &mut dyn FnMut()),
+    look: impl FnOnce(Actor),
+) {
+    let (board, asked) = (Board::new(1), shared());
+    let others = [SLEEPER, POLLER].map(|name| Actor::new(|| receive_for_ever(ground, board, name)));
+    until("they receive", || (0..2).all(|seat| board.seat(seat).is_ready()));
+    let pids = others.each_ref().map(Actor::pid);
+    let doer = Actor::new(|| {
+        start();
+        let mut hands = Hands::new(ground, board, asked, pids);
+        for (at, operation) in OPERATIONS.iter().enumerate() {
+            // The first time memory is touched, and tables learn of it.
+            (operation.prepare)(&mut hands);
+            (operation.operate)(&mut hands);
+            for _ in 0..operation.times {
+                (operation.prepare)(&mut hands);
+                around(at, &mut || (operation.operate)(&mut hands));
+            }
+            hands.empty();
+        }
+    });
+    let pid = doer.pid();
+    let _answerer = Actor::new(|| answer(ground, asked, pid));
+    look(doer);
+}
+
+/// A receiver that sleeps, in `poll` if it is the poller.
+fn receive_for_ever(ground: &Ground, board: Board, name: Name) {
+    let me = ground.join();
+    let mut receiver = me.receiver(name, shape(4)).unwrap();
+    let mut watches = Watches::new(&me).unwrap();
+    let (_far, near) = UnixStream::pair().unwrap();
+    watches.add(&near, Interest::Read).unwrap();
+    let seat = board.seat(usize::from(name == POLLER));
+    seat.set_ready();
+    loop {
+        if let Some(package) = receiver.try_receive() {
+            seat.operate(|| drop(package));
+        } else if name == POLLER {
+            watches.wait_any(&mut [&mut receiver], None, || false);
+        } else {
+            wait_any(&mut [&mut receiver], None, || false);
+        }
+    }
+}
+
+/// Sends a package to this process whenever it asks.
+fn answer(ground: &Ground, asked: &AtomicU32, pid: Pid) {
+    let me = ground.join();
+    until("it asks", || asked.load(SeqCst) != 0);
+    let mut sender = me.sender(MAILBOX).unwrap();
+    loop {
+        match asked.swap(0, SeqCst) {
+            0 => std::thread::yield_now(),
+            when => {
+                until("it sleeps", || when == AT_ONCE || is_asleep(pid));
+                sender.send(&label(HIGH, 0), &[b"asked for"]).unwrap();
+            }
+        }
+    }
+}
+
+/// All that the one has who does the operations.
+struct Hands {
+    board: Board,
+    asked: &'static AtomicU32,
+    /// Of the sleeper and the poller.
+    pids: [Pid; 2],
+    to: [Sender; 2],
+    /// Packages that they were sent.
+    sent: [u64; 2],
+    receiver: Receiver,
+    sender: Sender,
+    /// A mailbox of two slots, of which only the newest of each state counts.
+    newest: Receiver,
+    newest_sender: Sender,
+    watches: Watches,
+    _far: UnixStream,
+}
+
+impl Hands {
+    fn new(ground: &Ground, board: Board, asked: &'static AtomicU32, pids: [Pid; 2]) -> Self {
+        let me = ground.join();
+        let receiver = me.receiver(MAILBOX, shape(8)).unwrap();
+        let newest = me.receiver(OTHER, Shape { full: Full::Latest, ..shape(2) }).unwrap();
+        let mut watches = Watches::new(&me).unwrap();
+        let (far, near) = UnixStream::pair().unwrap();
+        watches.add(&near, Interest::Read).unwrap();
+        let [sender, newest_sender] = [MAILBOX, OTHER].map(|name| me.sender(name).unwrap());
+        let to = [SLEEPER, POLLER].map(|name| me.sender(name).unwrap());
+        Self { board, asked, pids, to, sent: [0; 2], receiver, sender, newest, newest_sender, watches, _far: far }
+    }
+
+    fn send(&mut self) {
+        self.send_as(LOW);
+    }
+
+    fn send_as(&mut self, priority: Priority) {
+        self.sender.send(&label(priority, 1), &[b"a", b" body"]).unwrap();
+    }
+
+    fn take(&mut self) {
+        assert!(!self.receiver.try_receive().unwrap().body().is_empty());
+    }
+
+    fn empty(&mut self) {
+        while self.receiver.try_receive().is_some() {}
+        while self.newest.try_receive().is_some() {}
+    }
+
+    /// All slots in use by packages of this priority.
+    fn fill(&mut self, priority: Priority) {
+        self.empty();
+        (0..self.receiver.shape().slots).for_each(|_| self.send_as(priority));
+    }
+
+    fn state(&mut self, id: u16) {
+        self.newest_sender.send(&label(LOW, id), &[b"state"]).unwrap();
+    }
+
+    /// These wait, and no others.
+    fn states(&mut self, ids: &[u16]) {
+        self.empty();
+        ids.iter().for_each(|id| self.state(*id));
+    }
+
+    fn ask(&mut self, when: u32) {
+        self.asked.store(when, SeqCst);
+    }
+
+    fn wait_for_both(&mut self, waiting: Waiting) {
+        wait_any(&mut [&mut self.receiver, &mut self.newest], waiting, || false);
+        self.take();
+    }
+
+    /// Waits until the sleeper, or the poller, has received all and sleeps.
+    fn asleep(&mut self, who: usize) {
+        until("it has received all", || self.board.seat(who).operations() == self.sent[who]);
+        until("it sleeps", || is_asleep(self.pids[who]));
+        self.sent[who] += 1;
+    }
+
+    fn wake(&mut self, who: usize) {
+        self.to[who].send(&label(LOW, 1), &[b"wake up"]).unwrap();
+    }
+}
