@@ -1,0 +1,3 @@
+//! Cases.
+pub mod many;
+pub mod startup;
