@@ -1,3 +1,0 @@
-//! Cases.
-pub mod many;
-pub mod startup;
