@@ -1,0 +1,24 @@
+//! The cases. To add one: something that has a name and gives rows, and a line in [`all`].
+
+mod latency;
+
+use crate::harness::Failure;
+use crate::rounds::Row;
+use crate::settings::Settings;
+
+/// Something that is measured, against whom, and with which target.
+pub trait Case {
+    /// As `--only` and the table call it.
+    fn name(&self) -> String;
+
+    /// Measures. A contender that fails or is skipped is a row that says so; `Err` is for what hits the whole case.
+    ///
+    /// # Errors
+    /// When the case cannot be begun.
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure>;
+}
+
+/// All cases, in the order in which they are measured.
+pub fn all() -> Vec<Box<dyn Case>> {
+    latency::cases()
+}

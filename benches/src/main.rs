@@ -1,0 +1,79 @@
+//! `cargo run --release -p rohrpost-bench -- local`
+
+use clap::{Parser, Subcommand};
+use rohrpost_bench::environment::{self, Environment};
+use rohrpost_bench::{Failure, Settings, cases, table};
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// Rohrpost's mailboxes beside the floors of this computer, and beside what else could be used.
+#[derive(Parser)]
+#[command(name = "rohrpost-bench")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Mailboxes between processes of one computer.
+    Local(Local),
+}
+
+#[derive(clap::Args)]
+struct Local {
+    /// One JSON object a line.
+    #[arg(long)]
+    json: bool,
+    /// Rounds; in each, every contender has its turn.
+    #[arg(long, default_value_t = Settings::default().rounds)]
+    rounds: usize,
+    /// Only cases whose names contain one of these.
+    #[arg(long, num_args = 1.., value_name = "CASE")]
+    only: Vec<String>,
+    /// A few hundred messages a turn, one round: whether everything runs.
+    #[arg(long)]
+    quick: bool,
+}
+
+fn main() -> ExitCode {
+    let Command::Local(arguments) = Arguments::parse().command;
+    match local(&arguments) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            let _ = writeln!(io::stderr(), "{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// False when a contender failed.
+fn local(arguments: &Local) -> Result<bool, Failure> {
+    let rounds = if arguments.quick { arguments.rounds.min(1) } else { arguments.rounds };
+    let settings = Settings { rounds, only: arguments.only.clone(), quick: arguments.quick };
+    let say = |text: String| writeln!(io::stdout(), "{text}").map_err(|error| Failure::of("output", error));
+    let environment = Environment::look()?;
+    say(if arguments.json {
+        table::json_environment(&environment).to_string()
+    } else {
+        table::human_environment(&environment)
+    })?;
+    let mut sound = true;
+    for case in cases::all() {
+        if !settings.wants(&case.name()) {
+            continue;
+        }
+        let rows = case.run(&settings)?;
+        sound &= !rows.iter().any(|row| matches!(row.result, Err(Failure::Failed(_))));
+        if arguments.json {
+            rows.iter().try_for_each(|row| say(table::json(row).to_string()))?;
+        } else {
+            say(format!("\n{}", table::human(&rows)))?;
+        }
+    }
+    if !arguments.json {
+        say(format!("\nload afterwards  {}", environment::load()))?;
+    }
+    Ok(sound)
+}

@@ -1,0 +1,1 @@
+//! Other systems that do a part of what mailboxes do, by their own public interfaces.
