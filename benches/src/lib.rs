@@ -16,6 +16,7 @@ pub mod cases;
 pub mod environment;
 pub mod floors;
 pub mod harness;
+pub mod one_way;
 pub mod ours;
 #[cfg(feature = "peers")]
 pub mod peers;

@@ -1,12 +1,108 @@
 //! A node with many mailboxes: opening one by name and sending there, and listing all.
+//!
+//! Each turn makes its node anew, in a process of its own.
 
+use super::Case;
+use crate::harness::{End, Failure, Placement, Samples, Scheduling, sample_in_child, settle};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::Summary;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Shape, Type, monotonic_ns, node_directory};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::time::Duration;
 
 type Done<T> = Result<T, Box<dyn Error>>;
+
+const MAILBOXES: usize = 1_000;
+/// Times that all are listed in a turn.
+const LISTINGS: usize = 11;
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let what = [What::FirstSend, What::Survey, What::List];
+    what.map(|what| -> Box<dyn Case> { Box::new(what) }).into_iter().collect()
+}
+
+/// What is done with the mailboxes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum What {
+    /// Each is opened by name and gets its first package.
+    FirstSend,
+    /// The library looks at all of them.
+    Survey,
+    /// The command lists all of them.
+    List,
+}
+
+impl What {
+    fn limit(self) -> (&'static str, f64) {
+        match self {
+            Self::FirstSend => ("100 us", 100.0),
+            Self::Survey | Self::List => ("50 ms", 50_000.0),
+        }
+    }
+
+    fn turn(self, settings: &Settings, samples: &Samples) -> Done<()> {
+        // Before the node is made: what a turn cannot do without is not there.
+        let rohrpost = if self == Self::List { Some(rohrpost(settings)?) } else { None };
+        let mut many = Many::new(settings.count(MAILBOXES))?;
+        settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
+        let all_ns = match self {
+            Self::FirstSend => many.first_sends_ns()?,
+            Self::Survey => (0..settings.count(LISTINGS)).map(|_| many.survey_ns()).collect::<Done<_>>()?,
+            Self::List => {
+                let rohrpost = rohrpost.unwrap_or_default();
+                (0..settings.count(LISTINGS)).map(|_| many.list_ns(&rohrpost)).collect::<Done<_>>()?
+            }
+        };
+        all_ns.into_iter().for_each(|ns| samples.push(ns as f64 / 1000.0));
+        Ok(())
+    }
+}
+
+impl Case for What {
+    fn name(&self) -> String {
+        match self {
+            Self::FirstSend => "many-first-send",
+            Self::Survey => "many-survey",
+            Self::List => "many-list",
+        }
+        .into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let ours = Contender::sampled("rohrpost", || {
+            sample_in_child(PATIENCE, |samples| {
+                self.turn(settings, samples).map_err(|error| match error.downcast::<Failure>() {
+                    Ok(failure) => *failure,
+                    Err(error) => Failure::of("many mailboxes", error),
+                })
+            })
+        });
+        let (name, limit_us) = self.limit();
+        let limit = Contender {
+            name,
+            turn: Box::new(move || Ok(Summary { p99: Some(limit_us), ..Summary::single(limit_us) })),
+        };
+        let subject = Subject { case: self.name(), bytes: Some(BODY.len()), unit: "us" };
+        let target = Some(Target::AtMost(1.0));
+        Ok(compare(settings, &subject, &[ours, limit], &[Versus { name, p50: target, p99: target }]))
+    }
+}
+
+/// The command: the one that was named, or the one beside this program.
+fn rohrpost(settings: &Settings) -> Done<PathBuf> {
+    let beside = std::env::current_exe()?.with_file_name("rohrpost");
+    let path = settings.rohrpost.clone().unwrap_or(beside);
+    if path.is_file() {
+        return Ok(path);
+    }
+    Err(Box::new(Failure::Skipped(format!("no {}; build it, or name it with --rohrpost", path.display()))))
+}
 
 const INSTALLATION: &str = "bench";
 const NODE: &str = "main";
@@ -27,7 +123,7 @@ builtin = "output"
 const BODY: &[u8] = &[7; 64];
 
 /// A node and the receivers of all its mailboxes, each of the default shape.
-pub struct Many {
+struct Many {
     directory: tempfile::TempDir,
     node: Arc<Node>,
     receivers: Vec<Receiver>,
@@ -35,10 +131,7 @@ pub struct Many {
 
 impl Many {
     /// Makes them. All belong to one participant of this process.
-    ///
-    /// # Errors
-    /// When that cannot be; each takes a file descriptor and some 40 KiB.
-    pub fn new(count: usize) -> Done<Self> {
+    fn new(count: usize) -> Done<Self> {
         let directory = tempfile::Builder::new().prefix("rohrpost-bench-").tempdir_in("/dev/shm")?;
         let node = Node::create(&path_in(directory.path()), 0o700)?;
         let participant = Participant::join(&node, Name::NONE)?;
@@ -49,10 +142,7 @@ impl Many {
 
     /// For each mailbox, as a participant that has never seen it: nanoseconds to open it by name and to have sent there.
     /// The receivers then check that each got its package.
-    ///
-    /// # Errors
-    /// When anything fails.
-    pub fn first_sends_ns(&mut self) -> Done<Vec<u64>> {
+    fn first_sends_ns(&mut self) -> Done<Vec<u64>> {
         let participant = Participant::join(&Node::open(self.node.path())?, Name::NONE)?;
         let label = Label { kind: Type::data(0), priority: Priority(100), ..Label::default() };
         let mut senders = Vec::with_capacity(self.receivers.len());
@@ -75,10 +165,7 @@ impl Many {
     }
 
     /// Nanoseconds that the library takes to open the node and to look at every mailbox.
-    ///
-    /// # Errors
-    /// When a mailbox is not found.
-    pub fn survey_ns(&self) -> Done<u64> {
+    fn survey_ns(&self) -> Done<u64> {
         let began_ns = monotonic_ns();
         let node = Node::open(self.node.path())?;
         let seen = node.mailboxes()?.into_iter().filter_map(|name| node.look_at(name)).count();
@@ -87,10 +174,7 @@ impl Many {
     }
 
     /// Nanoseconds from exec to the end of `rohrpost list --mailboxes`, everything read.
-    ///
-    /// # Errors
-    /// When the command fails or does not list all.
-    pub fn list_ns(&self, rohrpost: &Path) -> Done<u64> {
+    fn list_ns(&self, rohrpost: &Path) -> Done<u64> {
         let config = self.directory.path().join("bench.toml");
         std::fs::write(&config, CONFIGURATION)?;
         let mut command = Command::new(rohrpost);

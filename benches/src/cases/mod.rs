@@ -1,6 +1,14 @@
 //! The cases. To add one: something that has a name and gives rows, and a line in [`all`].
 
+mod cost;
+mod flood;
 mod latency;
+mod many;
+mod memory;
+mod rates;
+mod startup;
+
+pub use startup::run_hidden_program;
 
 use crate::harness::Failure;
 use crate::rounds::Row;
@@ -20,5 +28,14 @@ pub trait Case {
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    latency::cases()
+    let all = [
+        latency::cases(),
+        rates::cases(),
+        flood::cases(),
+        cost::cases(),
+        memory::cases(),
+        many::cases(),
+        startup::cases(),
+    ];
+    all.into_iter().flatten().collect()
 }

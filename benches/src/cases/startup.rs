@@ -4,32 +4,54 @@
 //!  bench: takes the time ──exec──▶ program: main ─ opens, makes its mailbox ─ says hello to the hub ─ has the answer: time
 //!                                                                               hub (bench) opens the mailbox, answers
 //! ```
-//! `new` is as drawn: the mailbox is made and its first package comes from a process that has to find it. `waiting` is a
-//! program that was started again: its mailbox is there, with a package in it. Each program is this binary in a hidden role, so
-//! that exec costs all the same; what they do after `main` has a row of its own. All have their defaults: a mailbox of
+//! `new` is as drawn: the mailbox is made, and its first package comes from a process that has to find it. `waiting` is a
+//! program that was started again: its mailbox is there, with a package in it. Each program is the bench itself in a hidden
+//! role, so that exec costs all the same; what they do after `main` has rows of its own. All have their defaults: a mailbox of
 //! `Shape::default()`, a queue of the kernel's default size.
 
-use nix::mqueue::{MQ_OFlag, MqdT, mq_close, mq_open, mq_receive, mq_send, mq_unlink};
+use super::Case;
+use crate::harness::{End, Failure, Placement, Samples, Scheduling, sample_in_child, settle};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use nix::mqueue::{MQ_OFlag, MqdT, mq_close, mq_open, mq_send, mq_timedreceive, mq_unlink};
 use nix::sys::stat::Mode;
-use rohrpost_mailbox::{Label, Name, Node, Participant, Shape, Type, monotonic_ns};
+use nix::sys::time::TimeSpec;
+use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Shape, Type, monotonic_ns, realtime_ns};
 use std::error::Error;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::time::Duration;
 
-type Done<T> = Result<T, Box<dyn Error>>;
+type Done<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
-/// The first argument of the hidden programs.
-pub const ROLE: &str = "startup-program";
+/// Starts of a turn.
+const STARTS: usize = 21;
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Neither side waits longer for the other.
+const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+/// Set for the hidden programs, to what they are to do.
+const ROLE: &str = "ROHRPOST_BENCH_STARTUP";
 const HUB: Name = Name::new(1, 100, 0, 0);
 const OWN: Name = Name::new(1, 200, 0, 0);
 const BODY: &[u8] = &[7; 64];
 /// Messages of a queue of default size have at most so many bytes.
 const QUEUE_BYTES_MAX: usize = 8192;
 
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let all = [
+        (Start::New, From::Exec),
+        (Start::New, From::Main),
+        (Start::Waiting, From::Exec),
+        (Start::Waiting, From::Main),
+    ];
+    all.map(|(start, from)| -> Box<dyn Case> { Box::new(Startup { start, from }) }).into_iter().collect()
+}
+
 /// Whether its mailbox is there before the program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Start {
+enum Start {
     /// The program makes it, and tells the hub.
     New,
     /// It is there, with a package.
@@ -37,11 +59,7 @@ pub enum Start {
 }
 
 impl Start {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::New, Self::Waiting];
-
-    /// The word for it.
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::New => "new",
             Self::Waiting => "waiting",
@@ -49,37 +67,110 @@ impl Start {
     }
 }
 
-/// One start: from exec, and from `main`, to the first package. Nanoseconds.
-#[derive(Clone, Copy, Debug)]
-pub struct Started {
-    /// From just before exec.
-    pub from_exec_ns: u64,
-    /// From the first line of `main`.
-    pub from_main_ns: u64,
+/// When the clock starts.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum From {
+    Exec,
+    /// The first line of `main`.
+    Main,
 }
 
-/// What is started: a program with mailboxes, or one with POSIX queues.
-pub trait Ground {
-    /// Starts the program once, takes part, and cleans up after it.
-    ///
-    /// # Errors
-    /// When anything fails.
-    fn start(&mut self, start: Start) -> Done<Started>;
+struct Startup {
+    start: Start,
+    from: From,
+}
+
+impl Case for Startup {
+    fn name(&self) -> String {
+        let from = if self.from == From::Exec { "" } else { "-after-main" };
+        format!("startup-{}{from}", self.start.name())
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let starts = settings.count(STARTS);
+        let ours = Contender::sampled("rohrpost", || self.turn(starts, Mailboxes::new));
+        let queue = Contender::sampled("POSIX queue", || self.turn(starts, Queues::new));
+        let subject = Subject { case: self.name(), bytes: Some(BODY.len()), unit: "us" };
+        let target = (self.from == From::Exec).then_some(Target::AtMost(1.5));
+        Ok(compare(settings, &subject, &[ours, queue], &[Versus { name: "POSIX queue", p50: target, p99: None }]))
+    }
+}
+
+impl Startup {
+    /// Microseconds of each start.
+    fn turn<G: Ground>(&self, starts: usize, ground: impl FnOnce() -> Done<G>) -> Result<Vec<f64>, Failure> {
+        sample_in_child(PATIENCE, |samples| {
+            settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
+            self.start_all(starts, ground, samples).map_err(|error| Failure::of("start-up", error))
+        })
+    }
+
+    fn start_all<G: Ground>(&self, starts: usize, ground: impl FnOnce() -> Done<G>, samples: &Samples) -> Done<()> {
+        let mut ground = ground()?;
+        for _ in 0..starts {
+            if self.start == Start::Waiting {
+                ground.make_waiting()?;
+            }
+            let role = ground.role(self.start)?;
+            let times = std::thread::scope(|scope| {
+                let program = scope.spawn(|| run(&role));
+                if self.start == Start::New {
+                    ground.answer_hello()?;
+                }
+                program.join().map_err(|_| "the thread that starts the program panicked")?
+            })?;
+            ground.forget()?;
+            let began_ns = if self.from == From::Exec { times.exec_ns } else { times.main_ns };
+            samples.push((times.first_ns - began_ns) as f64 / 1000.0);
+        }
+        Ok(())
+    }
+}
+
+/// When what was, on the monotonic clock.
+struct Times {
+    exec_ns: u64,
+    main_ns: u64,
+    first_ns: u64,
+}
+
+/// Starts the program on the other processor, and waits for its end.
+fn run(role: &str) -> Done<Times> {
+    settle(End::Pong, Placement::TwoCores, Scheduling::Fifo)?;
+    let mut command = Command::new(std::env::current_exe()?);
+    command.env(ROLE, role).stdin(Stdio::null()).stdout(Stdio::piped());
+    let exec_ns = monotonic_ns();
+    let output = command.spawn()?.wait_with_output()?;
+    let said = String::from_utf8(output.stdout)?;
+    let times: Vec<u64> = said.split_whitespace().map(str::parse).collect::<Result<_, _>>().unwrap_or_default();
+    let [main_ns, first_ns] = times[..] else { return Err(format!("the program said `{said}`").into()) };
+    Ok(Times { exec_ns, main_ns, first_ns })
+}
+
+/// What a program is started on: a node, or queues.
+trait Ground {
+    /// Makes the program's mailbox or queue, with something in it.
+    fn make_waiting(&mut self) -> Done<()>;
+
+    /// What to tell the program.
+    fn role(&self, start: Start) -> Done<String>;
+
+    /// Waits for the program's hello, and answers.
+    fn answer_hello(&mut self) -> Done<()>;
+
+    /// Removes the program's mailbox or queue.
+    fn forget(&mut self) -> Done<()>;
 }
 
 /// A node with a hub on it.
-pub struct Mailboxes {
+struct Mailboxes {
     directory: tempfile::TempDir,
-    hub: rohrpost_mailbox::Receiver,
+    hub: Receiver,
     participant: Arc<Participant>,
 }
 
 impl Mailboxes {
-    /// Makes a node of its own in shared memory.
-    ///
-    /// # Errors
-    /// When that cannot be.
-    pub fn new() -> Done<Self> {
+    fn new() -> Done<Self> {
         let directory = tempfile::Builder::new().prefix("rohrpost-bench-").tempdir_in("/dev/shm")?;
         let participant = Participant::join(&Node::create(&directory.path().join("node"), 0o700)?, HUB)?;
         let hub = participant.receiver(HUB, Shape::default())?;
@@ -87,42 +178,45 @@ impl Mailboxes {
     }
 
     fn answer(&self) -> Done<()> {
-        let label = Label { kind: Type::data(0), ..Label::default() };
-        Ok(self.participant.sender(OWN)?.send(&label, &[BODY])?)
+        Ok(self.participant.sender(OWN)?.send(&label(), &[BODY])?)
     }
+}
+
+fn label() -> Label {
+    Label { from: OWN, kind: Type::data(0), ..Label::default() }
 }
 
 impl Ground for Mailboxes {
-    fn start(&mut self, start: Start) -> Done<Started> {
-        if start == Start::Waiting {
-            // Dropped, it stays, as if its owner had died.
-            drop(self.participant.receiver(OWN, Shape::default())?);
-            self.answer()?;
-        }
+    fn make_waiting(&mut self) -> Done<()> {
+        // Dropped, it stays, as if its owner had died.
+        drop(self.participant.receiver(OWN, Shape::default())?);
+        self.answer()
+    }
+
+    fn role(&self, start: Start) -> Done<String> {
         let path = self.directory.path().join("node");
-        let program = Program::exec(&["mailbox", start.name(), path.to_str().ok_or("node's path is no UTF-8")?])?;
-        if start == Start::New {
-            drop(self.hub.receive());
-            self.answer()?;
-        }
-        let started = program.started()?;
+        Ok(format!("mailbox {} {}", start.name(), path.to_str().ok_or("the node's path is no UTF-8")?))
+    }
+
+    fn answer_hello(&mut self) -> Done<()> {
+        drop(self.hub.receive_timeout(ANSWER_WITHIN).ok_or("the program did not say hello")?);
+        self.answer()
+    }
+
+    fn forget(&mut self) -> Done<()> {
         self.participant.node().remove_orphan(OWN)?;
-        Ok(started)
+        Ok(())
     }
 }
 
-/// A hub's queue, and the name of the program's.
-pub struct Queues {
+/// A hub's queue, and the names of both.
+struct Queues {
     hub: MqdT,
     names: [String; 2],
 }
 
 impl Queues {
-    /// Makes the hub's queue.
-    ///
-    /// # Errors
-    /// When the kernel has no room for it.
-    pub fn new() -> Done<Self> {
+    fn new() -> Done<Self> {
         let names = ["hub", "own"].map(|name| format!("/rohrpost-bench-{}-{name}", std::process::id()));
         Ok(Self { hub: make_queue(&names[0])?, names })
     }
@@ -135,26 +229,31 @@ impl Queues {
 }
 
 impl Ground for Queues {
-    fn start(&mut self, start: Start) -> Done<Started> {
-        if start == Start::Waiting {
-            mq_close(make_queue(&self.names[1])?)?;
-            self.answer()?;
-        }
-        let program = Program::exec(&["queue", start.name(), &self.names[0], &self.names[1]])?;
-        if start == Start::New {
-            receive(&self.hub)?;
-            self.answer()?;
-        }
-        let started = program.started();
-        mq_unlink(self.names[1].as_str())?;
-        started
+    fn make_waiting(&mut self) -> Done<()> {
+        mq_close(make_queue(&self.names[1])?)?;
+        self.answer()
+    }
+
+    fn role(&self, start: Start) -> Done<String> {
+        Ok(format!("queue {} {} {}", start.name(), self.names[0], self.names[1]))
+    }
+
+    fn answer_hello(&mut self) -> Done<()> {
+        receive(&self.hub)?;
+        self.answer()
+    }
+
+    fn forget(&mut self) -> Done<()> {
+        Ok(mq_unlink(self.names[1].as_str())?)
     }
 }
 
 impl Drop for Queues {
     fn drop(&mut self) {
-        // The program's is gone unless a start failed; then this is all that can be done for it.
-        self.names.iter().for_each(|name| drop(mq_unlink(name.as_str())));
+        for name in &self.names {
+            // The program's is gone unless a start failed.
+            let _ = mq_unlink(name.as_str());
+        }
     }
 }
 
@@ -163,46 +262,30 @@ fn make_queue(name: &str) -> nix::Result<MqdT> {
     mq_open(name, flags, Mode::S_IRUSR | Mode::S_IWUSR, None)
 }
 
-fn receive(queue: &MqdT) -> nix::Result<usize> {
-    mq_receive(queue, &mut [0; QUEUE_BYTES_MAX], &mut 0)
+/// The next message, which must be the body, and when it was there.
+fn receive(queue: &MqdT) -> Done<u64> {
+    let mut message = [0; QUEUE_BYTES_MAX];
+    // A queue's deadline is a time of day.
+    let deadline = TimeSpec::from_duration(Duration::from_nanos(realtime_ns()) + ANSWER_WITHIN);
+    let bytes = mq_timedreceive(queue, &mut message, &mut 0, &deadline)?;
+    let now_ns = monotonic_ns();
+    if &message[..bytes] == BODY { Ok(now_ns) } else { Err("the first message is another".into()) }
 }
 
-/// A started program, and when that was.
-struct Program {
-    child: std::process::Child,
-    exec_ns: u64,
-}
-
-impl Program {
-    fn exec(arguments: &[&str]) -> Done<Self> {
-        let mut command = Command::new(std::env::current_exe()?);
-        command.arg(ROLE).args(arguments).stdin(Stdio::null()).stdout(Stdio::piped());
-        let exec_ns = monotonic_ns();
-        Ok(Self { child: command.spawn()?, exec_ns })
-    }
-
-    fn started(self) -> Done<Started> {
-        let output = self.child.wait_with_output()?;
-        let said = String::from_utf8(output.stdout)?;
-        let times: Vec<u64> = said.split_whitespace().map(str::parse).collect::<Result<_, _>>()?;
-        let [main_ns, first_ns] = times[..] else { return Err(format!("the program said `{said}`").into()) };
-        Ok(Started { from_exec_ns: first_ns - self.exec_ns, from_main_ns: first_ns - main_ns })
-    }
-}
-
-/// The hidden program. `arguments` are those after [`ROLE`]; `main_ns` is when `main` began.
+/// If this process was started as one of the hidden programs: does what it has to. Call it first thing in `main`.
 ///
 /// # Errors
 /// When anything fails, or the first package is not the one that was sent.
-pub fn program(arguments: &[String], main_ns: u64) -> Done<()> {
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let first_ns = match arguments[..] {
-        ["mailbox", start, path] => with_mailbox(start == Start::New.name(), Path::new(path))?,
-        ["queue", start, hub, own] => with_queue(start == Start::New.name(), hub, own)?,
-        _ => return Err(format!("no such program: {arguments:?}").into()),
+pub fn run_hidden_program() -> Option<Result<(), Failure>> {
+    let main_ns = monotonic_ns();
+    let role = std::env::var(ROLE).ok()?;
+    let first_ns = match role.split(' ').collect::<Vec<_>>()[..] {
+        ["mailbox", start, path] => with_mailbox(start == Start::New.name(), Path::new(path)),
+        ["queue", start, hub, own] => with_queue(start == Start::New.name(), hub, own),
+        _ => Err(format!("{ROLE}: no such program: {role}").into()),
     };
-    println!("{main_ns} {first_ns}");
-    Ok(())
+    let said = first_ns.map(|first_ns| println!("{main_ns} {first_ns}"));
+    Some(said.map_err(|error| Failure::of("hidden program", error)))
 }
 
 fn with_mailbox(hello: bool, path: &Path) -> Done<u64> {
@@ -210,11 +293,11 @@ fn with_mailbox(hello: bool, path: &Path) -> Done<u64> {
     let mut own = participant.receiver(OWN, Shape::default())?;
     let mut hub = participant.sender(HUB)?;
     if hello {
-        hub.send(&Label { from: OWN, kind: Type::data(0), ..Label::default() }, &[BODY])?;
+        hub.send(&label(), &[BODY])?;
     }
-    let first = own.receive();
-    let first_ns = monotonic_ns();
-    if first.body() == BODY { Ok(first_ns) } else { Err("the first package is another".into()) }
+    let first = own.receive_timeout(ANSWER_WITHIN).ok_or("no package came")?;
+    let now_ns = monotonic_ns();
+    if first.body() == BODY { Ok(now_ns) } else { Err("the first package is another".into()) }
 }
 
 fn with_queue(hello: bool, hub: &str, own: &str) -> Done<u64> {
@@ -223,8 +306,5 @@ fn with_queue(hello: bool, hub: &str, own: &str) -> Done<u64> {
     if hello {
         mq_send(&hub, BODY, 0)?;
     }
-    let mut first = [0; QUEUE_BYTES_MAX];
-    let len = mq_receive(&own, &mut first, &mut 0)?;
-    let first_ns = monotonic_ns();
-    if &first[..len] == BODY { Ok(first_ns) } else { Err("the first message is another".into()) }
+    receive(&own)
 }

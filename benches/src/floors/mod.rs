@@ -1,5 +1,9 @@
 //! What the computer gives at best: bare shared memory, and the kernel's own queue.
 
 mod hand_over;
+pub mod ring;
+mod two_rings;
+pub mod vyukov;
 
 pub use hand_over::{HandOver, Lanes, Wake};
+pub use two_rings::{TwoRings, TwoRingsReceiver, TwoRingsSender};

@@ -3,11 +3,13 @@
 mod child;
 mod ping_pong;
 mod place;
+mod samples;
 mod shared;
 
 pub use child::Child;
 pub use ping_pong::{Cell, End, Link, Meetings, check_echo, fill, ping, pong, time_two_processes};
 pub use place::{Placement, Scheduling, refusals, settle};
+pub use samples::{Samples, sample_in_child};
 pub use shared::{Gate, Shared, Zeroable};
 
 /// Why a contender has no figure.
