@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::environment::{self, Environment};
-use rohrpost_bench::{Failure, Settings, cases, table};
+use rohrpost_bench::{Failure, Settings, cases, harness, table};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -67,6 +67,8 @@ fn local(arguments: &Local) -> Result<bool, Failure> {
     let settings =
         Settings { rounds, only: arguments.only.clone(), quick: arguments.quick, rohrpost: arguments.rohrpost.clone() };
     let say = |text: String| writeln!(io::stdout(), "{text}").map_err(|error| Failure::of("output", error));
+    harness::heed();
+    harness::sweep();
     let environment = Environment::look()?;
     say(if arguments.json {
         table::json_environment(&environment).to_string()
@@ -79,6 +81,9 @@ fn local(arguments: &Local) -> Result<bool, Failure> {
             continue;
         }
         let rows = case.run(&settings)?;
+        if harness::interrupted() {
+            return Err(Failure::Failed("interrupted".into()));
+        }
         sound &= !rows.iter().any(|row| matches!(row.result, Err(Failure::Failed(_))));
         if arguments.json {
             rows.iter().try_for_each(|row| say(table::json(row).to_string()))?;

@@ -15,6 +15,8 @@ pub enum How {
     Blocking,
     /// Copied in and out; the receiver looks again and again before it would sleep.
     Spinning,
+    /// The same, written and read in place.
+    Loaned,
 }
 
 /// One end: a mailbox of its own, and the way into the other's.
@@ -22,7 +24,10 @@ pub struct Mailboxes {
     receiver: Receiver,
     sender: Sender,
     label: Label,
+    how: How,
     waiting: Waiting,
+    /// Bytes of each package, of which the link's user sees the head when they are loaned.
+    bytes: usize,
 }
 
 impl Mailboxes {
@@ -43,24 +48,32 @@ impl Mailboxes {
         let receiver = participant.receiver(mine, shape).map_err(|error| failed(&error))?;
         meetings.meet()?;
         let sender = participant.sender(other).map_err(|error| failed(&error))?;
-        let spin = if how == How::Spinning { SPIN } else { Duration::ZERO };
+        let spin = if how == How::Blocking { Duration::ZERO } else { SPIN };
         let label = Label { from: mine, kind: Type::command(16), ..Label::default() };
-        Ok(Self { receiver, sender, label, waiting: Waiting { spin, deadline: None } })
+        Ok(Self { receiver, sender, label, how, waiting: Waiting { spin, deadline: None }, bytes })
     }
 }
 
 impl Link for Mailboxes {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.sender.send(&self.label, &[message]).map_err(|error| Failure::of("send", error))
+        let sent = match self.how {
+            How::Blocking | How::Spinning => self.sender.send(&self.label, &[message]),
+            How::Loaned => self.sender.loan(self.label.priority).and_then(|mut loan| {
+                loan.body()[..message.len()].copy_from_slice(message);
+                loan.send(&self.label, self.bytes)
+            }),
+        };
+        sent.map_err(|error| Failure::of("send", error))
     }
 
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         let package = self.receiver.receive_timeout(self.waiting);
         let package = package.ok_or_else(|| Failure::Failed("waited without a deadline, and got nothing".into()))?;
-        if package.body().len() != message.len() {
-            return Err(Failure::Failed(format!("{} bytes came, not {}", package.body().len(), message.len())));
+        let body = package.body();
+        if body.len() != self.bytes || body.len() < message.len() {
+            return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), self.bytes)));
         }
-        message.copy_from_slice(package.body());
+        message.copy_from_slice(&body[..message.len()]);
         Ok(())
     }
 }

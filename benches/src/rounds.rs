@@ -1,6 +1,6 @@
 //! Contenders of a case, one after the other, round after round; and the rows that come of it.
 
-use crate::harness::Failure;
+use crate::harness::{Failure, interrupted};
 use crate::settings::Settings;
 use crate::statistics::{Ratio, Summary, median};
 use std::time::Duration;
@@ -142,7 +142,7 @@ fn interleave(settings: &Settings, contenders: &[Contender]) -> Vec<Turns> {
     let mut turns: Vec<Turns> = contenders.iter().map(|_| Vec::new()).collect();
     for _ in 0..settings.rounds.max(1) {
         for (contender, turns) in contenders.iter().zip(&mut turns) {
-            if !turns.iter().any(Result::is_err) {
+            if !turns.iter().any(Result::is_err) && !interrupted() {
                 std::thread::sleep(PAUSE);
                 turns.push((contender.turn)());
             }

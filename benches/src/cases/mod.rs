@@ -6,6 +6,7 @@ mod latency;
 mod many;
 mod memory;
 mod rates;
+mod rivals;
 mod startup;
 
 pub use startup::run_hidden_program;
@@ -38,4 +39,9 @@ pub fn all() -> Vec<Box<dyn Case>> {
         startup::cases(),
     ];
     all.into_iter().flatten().collect()
+}
+
+/// The few that tell in seconds how this computer does: blocking and spinning beside the two floors.
+pub fn self_test() -> Vec<Box<dyn Case>> {
+    latency::self_test()
 }

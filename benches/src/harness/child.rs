@@ -1,6 +1,6 @@
 //! A forked process that does one thing, tells why it failed, and dies with its parent.
 
-use super::{Failure, Shared, Zeroable};
+use super::{Failure, Shared, Zeroable, interrupted};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork, getppid};
@@ -89,6 +89,9 @@ impl Child {
     /// What the child failed with, or that it was killed.
     pub fn finish(mut self, deadline: Instant) -> Result<(), Failure> {
         while !self.has_ended()? {
+            if interrupted() {
+                return Err(Failure::Failed("interrupted".into()));
+            }
             if Instant::now() > deadline {
                 return Err(Failure::Failed("hung: killed when its time was over".into()));
             }

@@ -1,6 +1,6 @@
 //! Ping-pong: one end sends and waits for the echo. Half of the round trip is what one way takes.
 
-use super::{Child, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle};
+use super::{Child, Failure, Gate, Placement, Scheduling, Shared, Zeroable, interrupted, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -13,6 +13,12 @@ const NUMBER_BYTES: usize = 8;
 
 /// The number that tells the far end to stop.
 const STOP: u64 = u64::MAX;
+
+/// After this the far end waits for the first message.
+const HEAD_START: Duration = Duration::from_millis(10);
+
+/// A turn that takes so much longer than its cap hangs, and is killed.
+const GRACE: Duration = Duration::from_secs(15);
 
 /// Which of the two ends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -177,13 +183,12 @@ pub fn time_two_processes<L: Link>(
     let mut echo = Child::start(|| pong(&mut open(End::Pong)?, cell))?;
     let mut measure = Child::start(|| {
         let mut link = open(End::Ping)?;
-        // The other end should be waiting by then.
-        std::thread::sleep(Duration::from_millis(10));
+        std::thread::sleep(HEAD_START);
         turn.record(&ping(&mut link, cell)?);
         Ok(())
     })?;
-    let deadline = Instant::now() + cell.cap + Duration::from_secs(15);
-    while !echo.has_ended()? && !measure.has_ended()? && Instant::now() < deadline {
+    let deadline = Instant::now() + cell.cap + GRACE;
+    while !echo.has_ended()? && !measure.has_ended()? && Instant::now() < deadline && !interrupted() {
         std::thread::sleep(Duration::from_millis(10));
     }
     // An end that fails leaves the other waiting for ever: what the first one says counts.
@@ -208,4 +213,29 @@ impl Meetings<'_> {
         self.met += 1;
         self.gate.meet(2 * self.met)
     }
+}
+
+/// Times a link between two threads of one process. Gives what one way takes, µs.
+///
+/// # Errors
+/// What either end failed with.
+#[cfg(feature = "peers")]
+pub fn time_two_threads<L: Link + Send>(cell: &Cell, make: impl Fn() -> [L; 2]) -> Result<Vec<f64>, Failure> {
+    let turn = Shared::<Turn>::new()?;
+    let open = |end| {
+        settle(end, cell.placement, cell.scheduling)?;
+        turn.gate.meet(2)
+    };
+    let process = Child::start(|| {
+        let [mut near, mut far] = make();
+        std::thread::scope(|scope| {
+            let echo = scope.spawn(|| open(End::Pong).and_then(|()| pong(&mut far, cell)));
+            open(End::Ping)?;
+            std::thread::sleep(HEAD_START);
+            turn.record(&ping(&mut near, cell)?);
+            echo.join().unwrap_or_else(|_| Err(Failure::Failed("panicked, see above".into())))
+        })
+    })?;
+    process.finish(Instant::now() + cell.cap + GRACE)?;
+    Ok(turn.one_way_us())
 }

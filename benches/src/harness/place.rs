@@ -2,6 +2,7 @@
 
 use super::{End, Failure};
 use nix::sched::{CpuSet, sched_setaffinity};
+use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::unistd::Pid;
 use rohrpost_mailbox::sys;
 
@@ -39,7 +40,7 @@ pub fn settle(end: End, placement: Placement, scheduling: Scheduling) -> Result<
     let mut set = CpuSet::new();
     set.set(processor).map_err(|error| Failure::of("processor", error))?;
     let _ = sched_setaffinity(Pid::from_raw(0), &set);
-    let _ = sys::lock_memory();
+    let _ = mlockall(MlockAllFlags::MCL_CURRENT);
     if scheduling == Scheduling::Fifo {
         let _ = sys::schedule(sys::Scheduling::Fifo(PRIORITY));
     }
@@ -59,10 +60,8 @@ pub fn refusals() -> Vec<String> {
     if let Err(error) = sys::schedule(sys::Scheduling::Fifo(PRIORITY)) {
         refused.push(format!("SCHED_FIFO: {error}"));
     }
-    match sys::lock_memory() {
-        Ok(true) => {}
-        Ok(false) => refused.push("memory is not locked: the memlock limit is too small".into()),
-        Err(error) => refused.push(format!("memory is not locked: {error}")),
+    if let Err(error) = mlockall(MlockAllFlags::MCL_CURRENT) {
+        refused.push(format!("locked memory: {error}"));
     }
     refused
 }

@@ -89,6 +89,13 @@ pub struct OurSink {
 }
 
 impl OurSink {
+    /// Sends commands, each with an id of its own, so that nothing newer replaces it.
+    #[must_use]
+    pub fn with_commands(mut self) -> Self {
+        self.label.kind = Type::command(16);
+        self.with_states(u16::MAX)
+    }
+
     /// Sends packages of so many different states in turn, for mailboxes that keep the latest of each.
     #[must_use]
     pub fn with_states(self, ids: u16) -> Self {
@@ -98,7 +105,7 @@ impl OurSink {
 
 impl Sink for OurSink {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        self.label.id = if self.ids > 1 { (self.label.id + 1) % self.ids } else { 0 };
+        self.label.id = if self.ids > 1 { self.label.id.wrapping_add(1) % self.ids } else { 0 };
         loop {
             match self.sender.send(&self.label, &[message]) {
                 Ok(()) => return Ok(()),
