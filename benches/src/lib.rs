@@ -13,6 +13,7 @@
 //! threads, end when it ends, and are killed when their time is over.
 
 pub mod cases;
+pub mod counting;
 pub mod environment;
 pub mod floors;
 pub mod harness;

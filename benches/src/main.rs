@@ -1,11 +1,15 @@
 //! `cargo run --release -p rohrpost-bench -- local`
 
 use clap::{Parser, Subcommand};
+use rohrpost_bench::counting::CountingHeap;
 use rohrpost_bench::environment::{self, Environment};
 use rohrpost_bench::{Failure, Settings, cases, harness, table};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+
+#[global_allocator]
+static HEAP: CountingHeap = CountingHeap;
 
 /// Rohrpost's mailboxes beside the floors of this computer, and beside what else could be used.
 #[derive(Parser)]

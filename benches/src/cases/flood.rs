@@ -12,10 +12,8 @@
 use super::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::{TwoRings, TwoRingsReceiver, TwoRingsSender};
-use crate::harness::{
-    Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, sample_in_child, settle,
-};
-use crate::one_way::{Ground, Queue, Retry, Sink, Source, deepest};
+use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
+use crate::one_way::{Ground, Queue, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use rohrpost_mailbox::{Full, monotonic_ns, sys};
@@ -72,27 +70,22 @@ impl Case for Flood {
         });
         let queue = |priority: u32| {
             move || {
-                sample_in_child(PATIENCE, |samples| {
-                    let queue = Queue::new(deepest(DEPTH), BYTES)?;
-                    let all =
-                        flood(urgent, None, || Ok(queue.sink(priority)), || Ok(queue.sink(0)), || Ok(queue.source()))?;
-                    all.into_iter().for_each(|sample| samples.push(sample));
-                    Ok(())
-                })
+                let queue = Queue::new(DEPTH, BYTES)?;
+                flood(urgent, None, || Ok(queue.sink(priority)), || Ok(queue.sink(0)), || Ok(queue.source()))
             }
         };
         let contenders = [
             Contender::sampled("rohrpost", ours(Full::Displace, 1, None)),
             two_rings,
-            Contender::sampled("POSIX queue", queue(1)),
+            Contender::sampled("posix-mq", queue(1)),
             Contender::sampled("rohrpost, latest", ours(Full::Latest, 2 * DEPTH as u16, None)),
             // What rejects has no room for the urgent unless somebody leaves it.
             Contender::sampled("rohrpost, reject, 8 left free", ours(Full::Reject, 1, Some(DEPTH as u64 - 8))),
-            Contender::sampled("POSIX queue, one priority", queue(0)),
+            Contender::sampled("posix-mq, one priority", queue(0)),
         ];
         let versus = [
             Versus { name: "two rings", p50: Some(Target::AtMost(1.5)), p99: None },
-            Versus { name: "POSIX queue", p50: None, p99: Some(Target::AtMost(1.5)) },
+            Versus { name: "posix-mq", p50: None, p99: Some(Target::AtMost(1.5)) },
         ];
         let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
         Ok(compare(settings, &subject, &contenders, &versus))

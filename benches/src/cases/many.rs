@@ -3,7 +3,7 @@
 //! Each turn makes its node anew, in a process of its own.
 
 use super::Case;
-use crate::harness::{End, Failure, Placement, Samples, Scheduling, sample_in_child, settle};
+use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -124,7 +124,7 @@ const BODY: &[u8] = &[7; 64];
 
 /// A node and the receivers of all its mailboxes, each of the default shape.
 struct Many {
-    directory: tempfile::TempDir,
+    scratch: Scratch,
     node: Arc<Node>,
     receivers: Vec<Receiver>,
 }
@@ -132,12 +132,12 @@ struct Many {
 impl Many {
     /// Makes them. All belong to one participant of this process.
     fn new(count: usize) -> Done<Self> {
-        let directory = tempfile::Builder::new().prefix("rohrpost-bench-").tempdir_in("/dev/shm")?;
-        let node = Node::create(&path_in(directory.path()), 0o700)?;
+        let scratch = Scratch::new()?;
+        let node = Node::create(&path_in(&scratch.directory()), 0o700)?;
         let participant = Participant::join(&node, Name::NONE)?;
         let receivers: Result<_, _> =
             (0..count).map(|index| participant.receiver(name(index), Shape::default())).collect();
-        Ok(Self { directory, node, receivers: receivers? })
+        Ok(Self { scratch, node, receivers: receivers? })
     }
 
     /// For each mailbox, as a participant that has never seen it: nanoseconds to open it by name and to have sent there.
@@ -175,10 +175,10 @@ impl Many {
 
     /// Nanoseconds from exec to the end of `rohrpost list --mailboxes`, everything read.
     fn list_ns(&self, rohrpost: &Path) -> Done<u64> {
-        let config = self.directory.path().join("bench.toml");
+        let config = self.scratch.directory().join("bench.toml");
         std::fs::write(&config, CONFIGURATION)?;
         let mut command = Command::new(rohrpost);
-        command.args(["list", "--mailboxes", "--config"]).arg(config).env("ROHRPOST_DIR", self.directory.path());
+        command.args(["list", "--mailboxes", "--config"]).arg(config).env("ROHRPOST_DIR", self.scratch.directory());
         let began_ns = monotonic_ns();
         let output = command.stdin(Stdio::null()).stderr(Stdio::inherit()).output()?;
         let took_ns = monotonic_ns() - began_ns;

@@ -5,6 +5,7 @@ mod flood;
 mod latency;
 mod many;
 mod memory;
+mod proof;
 mod rates;
 mod rivals;
 mod startup;
@@ -34,6 +35,7 @@ pub fn all() -> Vec<Box<dyn Case>> {
         rates::cases(),
         flood::cases(),
         cost::cases(),
+        proof::cases(),
         memory::cases(),
         many::cases(),
         startup::cases(),

@@ -5,8 +5,8 @@
 
 use super::Case;
 use crate::floors::ring::{Bare, DEPTH, Futex, RingReceiver, RingSender, Shared as Ring};
-use crate::harness::{Failure, Scheduling, Shared, sample_in_child};
-use crate::one_way::{Ground, Queue, Retry, Stream, deepest, rate};
+use crate::harness::{Failure, Scheduling, Shared};
+use crate::one_way::{Ground, Queue, Retry, Stream, rate};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -15,8 +15,6 @@ use std::time::Duration;
 
 /// Long enough for some hundred thousand packages, short enough that the kernel's fair server stays out.
 const TURN: Duration = Duration::from_millis(500);
-/// A turn that has not ended by then never will.
-const PATIENCE: Duration = Duration::from_secs(20);
 /// Turns of an empty loop before a refused sender tries again: about what the receiver takes for some packages.
 const RETRY: Retry = Retry::Spin(64);
 const PRIORITIES: [u8; 4] = [20, 50, 80, 110];
@@ -51,18 +49,33 @@ impl Case for OneSender {
             let ring = Shared::<Ring>::new()?;
             rate(&stream, |_| Ok(Bare::<RingSender>::sender(&ring)), || Ok(Bare::<RingReceiver>::receiver(&ring)))
         });
-        let queue = rated("POSIX queue", || {
-            let rates = sample_in_child(PATIENCE, |samples| {
-                let queue = Queue::new(deepest(DEPTH), self.bytes)?;
-                samples.push(rate(&stream, |_| Ok(queue.sink(0)), || Ok(queue.source()))?);
-                Ok(())
-            })?;
-            rates.first().copied().ok_or_else(|| Failure::Failed("no rate".into()))
+        let queue = rated("posix-mq", || {
+            let queue = Queue::new(DEPTH, self.bytes)?;
+            rate(&stream, |_| Ok(queue.sink(0)), || Ok(queue.source()))
         });
         let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "packages/s" };
         let floor = if self.spins { bare } else { futex };
         let versus = [Versus { name: floor.name, p50: Some(Target::AtLeast(self.bound)), p99: None }];
-        Ok(compare(settings, &subject, &[ours, floor, queue], &versus))
+        #[allow(unused_mut)]
+        let mut contenders = vec![ours, floor, queue];
+        #[cfg(feature = "peers")]
+        contenders.extend(self.peers(&stream));
+        Ok(compare(settings, &subject, &contenders, &versus))
+    }
+}
+
+#[cfg(feature = "peers")]
+impl OneSender {
+    fn peers<'a>(&self, stream: &'a Stream) -> Vec<Contender<'a>> {
+        use crate::one_way::{channel_rate, iceoryx_rate};
+        if self.spins {
+            vec![
+                rated("iceoryx2 spinning", || iceoryx_rate(stream, false)),
+                rated("crossbeam, 1 process", || channel_rate(stream)),
+            ]
+        } else {
+            vec![rated("iceoryx2 listener", || iceoryx_rate(stream, true))]
+        }
     }
 }
 

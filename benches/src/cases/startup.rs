@@ -10,7 +10,7 @@
 //! `Shape::default()`, a queue of the kernel's default size.
 
 use super::Case;
-use crate::harness::{End, Failure, Placement, Samples, Scheduling, sample_in_child, settle};
+use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use nix::mqueue::{MQ_OFlag, MqdT, mq_close, mq_open, mq_send, mq_timedreceive, mq_unlink};
@@ -89,10 +89,10 @@ impl Case for Startup {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let starts = settings.count(STARTS);
         let ours = Contender::sampled("rohrpost", || self.turn(starts, Mailboxes::new));
-        let queue = Contender::sampled("POSIX queue", || self.turn(starts, Queues::new));
+        let queue = Contender::sampled("posix-mq", || self.turn(starts, Queues::new));
         let subject = Subject { case: self.name(), bytes: Some(BODY.len()), unit: "us" };
         let target = (self.from == From::Exec).then_some(Target::AtMost(1.5));
-        Ok(compare(settings, &subject, &[ours, queue], &[Versus { name: "POSIX queue", p50: target, p99: None }]))
+        Ok(compare(settings, &subject, &[ours, queue], &[Versus { name: "posix-mq", p50: target, p99: None }]))
     }
 }
 
@@ -164,17 +164,17 @@ trait Ground {
 
 /// A node with a hub on it.
 struct Mailboxes {
-    directory: tempfile::TempDir,
+    scratch: Scratch,
     hub: Receiver,
     participant: Arc<Participant>,
 }
 
 impl Mailboxes {
     fn new() -> Done<Self> {
-        let directory = tempfile::Builder::new().prefix("rohrpost-bench-").tempdir_in("/dev/shm")?;
-        let participant = Participant::join(&Node::create(&directory.path().join("node"), 0o700)?, HUB)?;
+        let scratch = Scratch::new()?;
+        let participant = Participant::join(&Node::create(&scratch.directory().join("node"), 0o700)?, HUB)?;
         let hub = participant.receiver(HUB, Shape::default())?;
-        Ok(Self { directory, hub, participant })
+        Ok(Self { scratch, hub, participant })
     }
 
     fn answer(&self) -> Done<()> {
@@ -194,7 +194,7 @@ impl Ground for Mailboxes {
     }
 
     fn role(&self, start: Start) -> Done<String> {
-        let path = self.directory.path().join("node");
+        let path = self.scratch.directory().join("node");
         Ok(format!("mailbox {} {}", start.name(), path.to_str().ok_or("the node's path is no UTF-8")?))
     }
 

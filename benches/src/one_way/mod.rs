@@ -1,10 +1,14 @@
 //! Messages in one direction: from one sender or several to one receiver, as fast as it takes them.
 
 mod ours;
+#[cfg(feature = "peers")]
+mod peers;
 mod queue;
 
 pub use ours::{Ground, OurSink, OurSource, Retry};
-pub use queue::{Queue, QueueSink, QueueSource, deepest};
+#[cfg(feature = "peers")]
+pub use peers::{channel_rate, iceoryx_rate};
+pub use queue::{Queue, QueueSink, QueueSource};
 
 use crate::Failure;
 use crate::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
@@ -57,6 +61,13 @@ pub struct Stream {
     pub cap: Duration,
 }
 
+impl Stream {
+    /// A turn that has not ended by then never will.
+    fn patience(&self) -> Duration {
+        self.cap + Duration::from_secs(15)
+    }
+}
+
 #[repr(C)]
 struct Turn {
     gate: Gate,
@@ -66,6 +77,14 @@ struct Turn {
 
 // SAFETY: atomics only.
 unsafe impl Zeroable for Turn {}
+
+impl Turn {
+    /// Messages a second.
+    fn rate(&self) -> f64 {
+        let (received, took_ns) = (self.received.load(Ordering::Acquire), self.took_ns.load(Ordering::Acquire));
+        received as f64 * 1e9 / took_ns.max(1) as f64
+    }
+}
 
 /// Sends from some processes to another, and gives messages a second, from the first one received to the last. Each sender's
 /// messages must come whole, in order, and all of them.
@@ -86,7 +105,8 @@ pub fn rate<I: Sink, O: Source>(
         settle(End::Pong, Placement::TwoCores, stream.scheduling)?;
         turn.gate.meet(all)?;
         turn.gate.meet(2 * all)?;
-        receive_all(&mut source, stream, &turn)
+        receive_all(&mut source, stream, &turn)?;
+        turn.gate.meet(3 * all)
     })?;
     let sender = |number| {
         let (turn, sink) = (&turn, &sink);
@@ -95,15 +115,16 @@ pub fn rate<I: Sink, O: Source>(
             let mut sink = sink(number)?;
             settle(End::Ping, Placement::TwoCores, stream.scheduling)?;
             turn.gate.meet(2 * all)?;
-            send_all(&mut sink, stream, number as u8)
+            send_all(&mut sink, stream, number as u8)?;
+            // With iceoryx2's publisher goes what the other end has not taken yet.
+            turn.gate.meet(3 * all)
         })
     };
     let senders: Vec<Child> = (0..stream.senders).map(sender).collect::<Result<_, _>>()?;
-    let deadline = Instant::now() + stream.cap + Duration::from_secs(15);
+    let deadline = Instant::now() + stream.patience();
     receiver.finish(deadline)?;
     senders.into_iter().try_for_each(|sender| sender.finish(deadline))?;
-    let (received, took_ns) = (turn.received.load(Ordering::Acquire), turn.took_ns.load(Ordering::Acquire));
-    Ok(received as f64 * 1e9 / took_ns.max(1) as f64)
+    Ok(turn.rate())
 }
 
 fn send_all(sink: &mut impl Sink, stream: &Stream, sender: u8) -> Result<(), Failure> {

@@ -2,6 +2,7 @@
 
 use super::{Sink, Source};
 use crate::Failure;
+use crate::harness::Scratch;
 use rohrpost_mailbox::{
     Full, Label, Name, Node, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
@@ -14,7 +15,7 @@ const SPIN: Duration = Duration::from_millis(100);
 
 /// A node of its own in shared memory; gone when this is dropped.
 pub struct Ground {
-    directory: tempfile::TempDir,
+    scratch: Scratch,
     shape: Shape,
 }
 
@@ -24,15 +25,13 @@ impl Ground {
     /// # Errors
     /// When there is no room.
     pub fn new(slots: usize, bytes: usize, full: Full) -> Result<Self, Failure> {
-        let directory = tempfile::Builder::new().prefix("rohrpost-bench-").tempdir_in("/dev/shm");
-        let directory = directory.map_err(|error| Failure::of("node's directory", error))?;
         let shape = Shape { slots: slots as u16, body_bytes_max: bytes as u16, full, ..Shape::default() };
-        Ok(Self { directory, shape })
+        Ok(Self { scratch: Scratch::new()?, shape })
     }
 
     /// Where the node lies.
     pub fn path(&self) -> PathBuf {
-        self.directory.path().join("node")
+        self.scratch.directory().join("node")
     }
 
     /// What its mailbox is made as.
