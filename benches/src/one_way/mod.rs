@@ -115,6 +115,8 @@ pub fn rate<I: Sink, O: Source>(
             let mut sink = sink(number)?;
             settle(End::Ping, Placement::TwoCores, stream.scheduling)?;
             turn.gate.meet(2 * all)?;
+            // The receiver should be receiving by then: iceoryx2 drops what fills a subscriber that never did.
+            std::thread::sleep(Duration::from_millis(10));
             send_all(&mut sink, stream, number as u8)?;
             // With iceoryx2's publisher goes what the other end has not taken yet.
             turn.gate.meet(3 * all)
