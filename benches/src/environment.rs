@@ -1,21 +1,23 @@
 //! The computer that it is measured on.
 
-use crate::harness::{Child, Failure, refusals};
+use crate::harness::{Child, Failure, processors, refusals};
+use serde::Serialize;
 use std::fs;
 use std::time::{Duration, Instant};
 
 /// What figures depend on besides the code.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Environment {
     /// Model of the processor.
     pub processor: String,
-    /// How many.
-    pub processors: usize,
+    /// Those that this program may use.
+    pub processors: Vec<usize>,
     /// Kernel's release.
     pub kernel: String,
     /// Mean number of busy threads during the last minute.
     pub load: String,
     /// What the kernel refuses of pinning, real-time scheduling and locked memory; empty: nothing.
+    #[serde(rename = "refused")]
     pub refusals: Vec<String>,
 }
 
@@ -30,7 +32,7 @@ impl Environment {
         let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
         Ok(Self {
             processor: model.map_or("unknown", |(_, name)| name.trim()).to_string(),
-            processors: std::thread::available_parallelism().map_or(1, |n| n.get()),
+            processors: processors(),
             kernel: read("/proc/sys/kernel/osrelease"),
             load: load(),
             refusals: ask_refusals()?,

@@ -21,6 +21,7 @@ pub mod one_way;
 pub mod ours;
 #[cfg(feature = "peers")]
 pub mod peers;
+pub mod report;
 pub mod rounds;
 pub mod settings;
 pub mod statistics;

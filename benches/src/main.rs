@@ -2,8 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::counting::CountingHeap;
-use rohrpost_bench::environment::{self, Environment};
-use rohrpost_bench::{Failure, Settings, cases, harness, table};
+use rohrpost_bench::{Failure, Settings, cases, report};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -70,33 +69,9 @@ fn local(arguments: &Local) -> Result<bool, Failure> {
     let rounds = if arguments.quick { arguments.rounds.min(1) } else { arguments.rounds };
     let settings =
         Settings { rounds, only: arguments.only.clone(), quick: arguments.quick, rohrpost: arguments.rohrpost.clone() };
-    let say = |text: String| writeln!(io::stdout(), "{text}").map_err(|error| Failure::of("output", error));
-    harness::heed();
-    harness::sweep();
-    let environment = Environment::look()?;
-    say(if arguments.json {
-        table::json_environment(&environment).to_string()
-    } else {
-        table::human_environment(&environment)
-    })?;
-    let mut sound = true;
-    for case in cases::all() {
-        if !settings.wants(&case.name()) {
-            continue;
-        }
-        let rows = case.run(&settings)?;
-        if harness::interrupted() {
-            return Err(Failure::Failed("interrupted".into()));
-        }
-        sound &= !rows.iter().any(|row| matches!(row.result, Err(Failure::Failed(_))));
-        if arguments.json {
-            rows.iter().try_for_each(|row| say(table::json(row).to_string()))?;
-        } else {
-            say(format!("\n{}", table::human(&rows)))?;
-        }
-    }
-    if !arguments.json {
-        say(format!("\nload afterwards  {}", environment::load()))?;
-    }
-    Ok(sound)
+    let say = |text: String| writeln!(io::stdout(), "{text}").is_ok();
+    let waits = || {
+        let _ = writeln!(io::stderr(), "waiting: another bench runs on this computer");
+    };
+    Ok(report::run(&settings, &cases::all(), arguments.json, say, waits)?.is_sound())
 }

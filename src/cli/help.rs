@@ -8,7 +8,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
     ("One of its modules", &["restart", "stop", "start"]),
     ("To measure", &["hz", "bw", "delay", "graph", "ping", "send"]),
-    ("This computer", &["doctor", "clean", "completions", "version"]),
+    ("This computer", &["doctor", "bench", "clean", "completions", "version"]),
     ("Else", &["run", "help"]),
 ];
 

@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand.
 
+mod bench;
 mod bw;
 mod call;
 mod check;
@@ -92,6 +93,8 @@ enum Command {
     Clean(clean::Arguments),
     /// Look whether this computer lets a robot run in time.
     Doctor(doctor::Arguments),
+    /// Measure how this computer hands packages over.
+    Bench(bench::Arguments),
     /// Begin a module of your own: a project that builds and runs.
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
@@ -128,6 +131,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),

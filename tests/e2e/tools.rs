@@ -26,7 +26,9 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "echo" => &["probe.0", "beat"],
         "send" => &["probe.0", "count", "1", "--count", "1"],
         "param" => &["list"],
-        "check" | "launch" | "demo" | "clean" | "doctor" | "new" | "completions" | "version" | "run" => return None,
+        "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run" => {
+            return None;
+        }
         other => panic!("`{other}` is new: say here how it is tested"),
     };
     Some([&[command], after].concat())

@@ -11,9 +11,9 @@
 
 use super::Case;
 use crate::floors::ring::DEPTH;
-use crate::floors::{TwoRings, TwoRingsReceiver, TwoRingsSender};
+use crate::floors::{Queue, TwoRings, TwoRingsReceiver, TwoRingsSender};
 use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
-use crate::one_way::{Ground, Queue, Retry, Sink, Source};
+use crate::one_way::{Ground, QueueSink, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use rohrpost_mailbox::{Full, monotonic_ns, sys};
@@ -71,7 +71,8 @@ impl Case for Flood {
         let queue = |priority: u32| {
             move || {
                 let queue = Queue::new(DEPTH, BYTES)?;
-                flood(urgent, None, || Ok(queue.sink(priority)), || Ok(queue.sink(0)), || Ok(queue.source()))
+                let sink = |priority| Ok(QueueSink::new(&queue, priority));
+                flood(urgent, None, || sink(priority), || sink(0), || Ok(&queue))
             }
         };
         let contenders = [

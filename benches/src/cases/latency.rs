@@ -48,8 +48,9 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
 }
 
 /// A few, against the floors alone, which give an answer in seconds.
-pub(super) fn self_test() -> Vec<Box<dyn Case>> {
+pub(super) fn self_test(scheduling: Scheduling) -> Vec<Box<dyn Case>> {
     let few = |mut case: Latency| {
+        case.scheduling = scheduling;
         case.messages = 3_000;
         case.rivals.retain(|(rival, ..)| matches!(rival, Rival::Futex | Rival::Spin));
         Box::new(case) as Box<dyn Case>
@@ -119,19 +120,18 @@ fn loaned() -> Vec<Latency> {
 }
 
 fn normal_scheduler() -> Vec<Latency> {
-    let case = |(how, rivals): (How, [Rival; 2])| {
-        let name = if how == How::Spinning { "spinning, default scheduler" } else { "blocking, default scheduler" };
-        let case = Latency { scheduling: Scheduling::Normal, ..Latency::new(name, 64, how) };
-        rivals.into_iter().fold(case, |case, rival| case.beside(rival, None, None))
-    };
-    vec![case((How::Blocking, [Rival::Futex, Rival::PosixQueue]))]
+    let case = |name, how| Latency { scheduling: Scheduling::Normal, ..Latency::new(name, 64, how) };
+    let blocking = case("blocking, default scheduler", How::Blocking);
+    let blocking = blocking.beside(Rival::Futex, None, None).beside(Rival::PosixQueue, None, None);
+    let spinning = case("spinning, default scheduler", How::Spinning).beside(Rival::Spin, None, None);
+    vec![blocking, spinning]
 }
 
 fn paced() -> Vec<Latency> {
-    let case = |(name, how)| Latency { pace: Some(PACE), messages: MESSAGES_PACED, ..Latency::new(name, 64, how) };
-    let blocking = case(("blocking, paced", How::Blocking));
+    let case = |name, how| Latency { pace: Some(PACE), messages: MESSAGES_PACED, ..Latency::new(name, 64, how) };
+    let blocking = case("blocking, paced", How::Blocking);
     let blocking = blocking.beside(Rival::Futex, None, None).beside(Rival::PosixQueue, None, None);
-    let spinning = case(("spinning, paced", How::Spinning)).beside(Rival::Spin, None, None);
+    let spinning = case("spinning, paced", How::Spinning).beside(Rival::Spin, None, None);
     vec![blocking, spinning]
 }
 

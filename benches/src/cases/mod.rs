@@ -12,7 +12,7 @@ mod startup;
 
 pub use startup::run_hidden_program;
 
-use crate::harness::Failure;
+use crate::harness::{Failure, Scheduling};
 use crate::rounds::Row;
 use crate::settings::Settings;
 
@@ -44,6 +44,6 @@ pub fn all() -> Vec<Box<dyn Case>> {
 }
 
 /// The few that tell in seconds how this computer does: blocking and spinning beside the two floors.
-pub fn self_test() -> Vec<Box<dyn Case>> {
-    latency::self_test()
+pub fn self_test(scheduling: Scheduling) -> Vec<Box<dyn Case>> {
+    latency::self_test(scheduling)
 }

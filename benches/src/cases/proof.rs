@@ -5,8 +5,9 @@
 
 use super::Case;
 use crate::counting::heap_uses;
+use crate::floors::Queue;
 use crate::harness::{Failure, sample_in_child};
-use crate::one_way::{Ground, Queue, Retry, Sink, Source};
+use crate::one_way::{Ground, QueueSink, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -129,7 +130,7 @@ fn channel_heap_uses(batches: usize) -> Result<f64, Failure> {
 
 fn queue_under(batches: usize) -> Result<usize, Failure> {
     let queue = Queue::new(BATCH, BYTES)?;
-    let (mut sink, mut source) = (queue.sink(0), queue.source());
+    let (mut sink, mut source) = (QueueSink::new(&queue, 0), &queue);
     let mut message = [0; BYTES];
     for _ in 0..batches {
         mark();
@@ -138,7 +139,7 @@ fn queue_under(batches: usize) -> Result<usize, Failure> {
         }
         mark();
         for _ in 0..BATCH {
-            source.receive(&mut message)?;
+            Source::receive(&mut source, &mut message)?;
         }
     }
     Ok(batches * BATCH)

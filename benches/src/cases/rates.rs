@@ -4,9 +4,10 @@
 //! their senders wait, too.
 
 use super::Case;
+use crate::floors::Queue;
 use crate::floors::ring::{Bare, DEPTH, Futex, RingReceiver, RingSender, Shared as Ring};
 use crate::harness::{Failure, Scheduling, Shared};
-use crate::one_way::{Ground, Queue, Retry, Stream, rate};
+use crate::one_way::{Ground, QueueSink, Retry, Stream, rate};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -51,7 +52,7 @@ impl Case for OneSender {
         });
         let queue = rated("posix-mq", || {
             let queue = Queue::new(DEPTH, self.bytes)?;
-            rate(&stream, |_| Ok(queue.sink(0)), || Ok(queue.source()))
+            rate(&stream, |_| Ok(QueueSink::new(&queue, 0)), || Ok(&queue))
         });
         let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "packages/s" };
         let floor = if self.spins { bare } else { futex };

@@ -7,5 +7,5 @@ mod two_rings;
 pub mod vyukov;
 
 pub use hand_over::{HandOver, Lanes, Wake};
-pub use queue::{QueueEnd, Queues, queue};
+pub use queue::{Queue, QueueEnd, Queues};
 pub use two_rings::{TwoRings, TwoRingsReceiver, TwoRingsSender};

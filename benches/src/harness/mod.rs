@@ -1,5 +1,6 @@
 //! Two processes that send to each other: forked, pinned, scheduled, timed, and never left behind.
 
+mod alone;
 mod child;
 mod interrupt;
 mod ping_pong;
@@ -8,12 +9,13 @@ mod samples;
 mod scratch;
 mod shared;
 
+pub use alone::{Alone, alone};
 pub use child::Child;
 pub use interrupt::{heed, interrupted};
 #[cfg(feature = "peers")]
 pub use ping_pong::time_two_threads;
 pub use ping_pong::{Cell, End, Link, Meetings, check_echo, fill, ping, pong, time_two_processes};
-pub use place::{Placement, Scheduling, refusals, settle};
+pub use place::{Placement, Scheduling, processors, refusals, settle};
 pub use samples::{Samples, sample_in_child};
 pub use scratch::{Scratch, sweep};
 pub use shared::{Gate, Shared, Zeroable};

@@ -18,7 +18,7 @@ const STOP: u64 = u64::MAX;
 const HEAD_START: Duration = Duration::from_millis(10);
 
 /// A turn that takes so much longer than its cap hangs, and is killed.
-const GRACE: Duration = Duration::from_secs(15);
+const GRACE: Duration = Duration::from_secs(30);
 
 /// Which of the two ends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -238,4 +238,87 @@ pub fn time_two_threads<L: Link + Send>(cell: &Cell, make: impl Fn() -> [L; 2]) 
     })?;
     process.finish(Instant::now() + cell.cap + GRACE)?;
     Ok(turn.one_way_us())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::{Receiver, Sender, channel};
+
+    /// What goes wrong on the way of a message to the far end.
+    #[derive(Clone, Copy)]
+    enum Mishap {
+        None,
+        Damage,
+        Loss,
+        Repetition,
+        /// The far end answers with the message before.
+        Stale,
+    }
+
+    struct Queue {
+        out: Sender<Vec<u8>>,
+        back: Receiver<Vec<u8>>,
+        /// Before this message, counted from 0.
+        mishap: (Mishap, u64),
+        sent: u64,
+        last: Vec<u8>,
+    }
+
+    impl Link for Queue {
+        fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+            let mut message = message.to_vec();
+            let mishap = if self.sent == self.mishap.1 { self.mishap.0 } else { Mishap::None };
+            self.sent += 1;
+            match mishap {
+                Mishap::None => {}
+                Mishap::Damage => message[40] ^= 1,
+                Mishap::Loss => return Ok(()),
+                Mishap::Repetition => drop(self.out.send(message.clone())),
+                Mishap::Stale => message = self.last.clone(),
+            }
+            self.last = message.clone();
+            self.out.send(message).map_err(|error| Failure::of("send", error))
+        }
+
+        fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+            let patience = Duration::from_millis(200);
+            let received = self.back.recv_timeout(patience).map_err(|error| Failure::of("receive", error))?;
+            message.copy_from_slice(&received);
+            Ok(())
+        }
+    }
+
+    /// What both ends say when the near or the far end's message 5 meets a mishap.
+    fn play(near: Mishap, far: Mishap) -> [Result<(), Failure>; 2] {
+        let (placement, scheduling) = (Placement::TwoCores, Scheduling::Normal);
+        let cap = Duration::from_secs(5);
+        let cell = Cell { bytes: 64, messages: 20, warm_up: 2, placement, scheduling, pace: None, cap };
+        let ((out, far_back), (far_out, back)) = (channel(), channel());
+        let mut near = Queue { out, back, mishap: (near, 5), sent: 0, last: Vec::new() };
+        let mut far = Queue { out: far_out, back: far_back, mishap: (far, 5), sent: 0, last: Vec::new() };
+        std::thread::scope(|scope| {
+            let echo = scope.spawn(|| pong(&mut far, &cell));
+            let round_trips = ping(&mut near, &cell);
+            [round_trips.map(|round_trips| assert_eq!(round_trips.len(), 20)), echo.join().unwrap()]
+        })
+    }
+
+    #[test]
+    fn whatever_happens_to_a_message_is_seen() {
+        assert_eq!(play(Mishap::None, Mishap::None), [Ok(()), Ok(())]);
+        for (mishap, near_says, far_says) in [
+            ((Mishap::Damage, Mishap::None), "damaged: byte 40 is 4, not 5", ""),
+            ((Mishap::None, Mishap::Damage), "damaged: byte 40 is 4, not 5", ""),
+            ((Mishap::Loss, Mishap::None), "receive", ""),
+            ((Mishap::None, Mishap::Stale), "answer [4,", ""),
+            ((Mishap::Repetition, Mishap::None), "", "message 5 came when 6 was due"),
+            ((Mishap::Stale, Mishap::None), "", "message 4 came when 5 was due"),
+        ] {
+            let [near, far] = play(mishap.0, mishap.1);
+            for (end, says) in [(near, near_says), (far, far_says)] {
+                assert!(says.is_empty() || end.as_ref().unwrap_err().to_string().contains(says), "{end:?}, not {says}");
+            }
+        }
+    }
 }

@@ -55,6 +55,9 @@ unsafe impl<T: Zeroable> Send for Shared<T> {}
 // SAFETY: it gives out `&T` alone, and T is `Sync`.
 unsafe impl<T: Zeroable> Sync for Shared<T> {}
 
+/// Opening a link takes milliseconds, on a busy computer a second.
+const GATE_OPENS_WITHIN: Duration = Duration::from_secs(20);
+
 /// Where processes wait for each other, any number of times.
 #[repr(transparent)]
 pub struct Gate(AtomicU32);
@@ -70,10 +73,12 @@ impl Gate {
     pub fn meet(&self, calls: u32) -> Result<(), Failure> {
         // ORDERING: what each did before it came is seen by all who leave.
         self.0.fetch_add(1, Ordering::AcqRel);
-        let give_up = Instant::now() + Duration::from_secs(10);
+        let give_up = Instant::now() + GATE_OPENS_WITHIN;
         while self.0.load(Ordering::Acquire) < calls {
             if Instant::now() > give_up {
-                return Err(Failure::Failed("the other process did not get ready within 10 s".into()));
+                return Err(Failure::Failed(format!(
+                    "the other process did not get ready within {GATE_OPENS_WITHIN:?}"
+                )));
             }
             std::thread::sleep(Duration::from_millis(1));
         }

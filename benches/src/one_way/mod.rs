@@ -8,7 +8,7 @@ mod queue;
 pub use ours::{Ground, OurSink, OurSource, Retry};
 #[cfg(feature = "peers")]
 pub use peers::{channel_rate, iceoryx_rate};
-pub use queue::{Queue, QueueSink, QueueSource};
+pub use queue::QueueSink;
 
 use crate::Failure;
 use crate::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};

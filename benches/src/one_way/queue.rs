@@ -2,56 +2,29 @@
 
 use super::{Sink, Source};
 use crate::Failure;
-use crate::floors::queue;
-use nix::mqueue::{MqdT, mq_receive, mq_send};
+use crate::floors::Queue;
 
-/// A queue; make it before the processes that use it.
-pub struct Queue(MqdT);
-
-impl Queue {
-    /// One of its own.
-    ///
-    /// # Errors
-    /// As [`queue`].
-    pub fn new(depth: usize, bytes: usize) -> Result<Self, Failure> {
-        Ok(Self(queue(depth, bytes)?))
-    }
-
-    /// A sender of this priority.
-    pub fn sink(&self, priority: u32) -> QueueSink<'_> {
-        QueueSink { queue: &self.0, priority }
-    }
-
-    /// The receiver.
-    pub fn source(&self) -> QueueSource<'_> {
-        QueueSource { queue: &self.0 }
-    }
+/// Sends into a queue with one priority.
+pub struct QueueSink<'a> {
+    queue: &'a Queue,
+    priority: u32,
 }
 
-/// Sends with one priority.
-pub struct QueueSink<'a> {
-    queue: &'a MqdT,
-    priority: u32,
+impl<'a> QueueSink<'a> {
+    /// A sender of this priority.
+    pub fn new(queue: &'a Queue, priority: u32) -> Self {
+        Self { queue, priority }
+    }
 }
 
 impl Sink for QueueSink<'_> {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
-        mq_send(self.queue, message, self.priority).map_err(|error| Failure::of("mq_send", error))
+        self.queue.send(message, self.priority)
     }
 }
 
-/// Receives the most urgent.
-pub struct QueueSource<'a> {
-    queue: &'a MqdT,
-}
-
-impl Source for QueueSource<'_> {
+impl Source for &Queue {
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-        let mut priority = 0;
-        match mq_receive(self.queue, message, &mut priority) {
-            Ok(bytes) if bytes == message.len() => Ok(()),
-            Ok(bytes) => Err(Failure::Failed(format!("{bytes} bytes came, not {}", message.len()))),
-            Err(error) => Err(Failure::of("mq_receive", error)),
-        }
+        Queue::receive(self, message).map(drop)
     }
 }

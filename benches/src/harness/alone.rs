@@ -1,0 +1,39 @@
+//! One bench at a time: two that spin at real-time priority on the same processors would wait for each other's ends.
+
+use super::{Failure, interrupted};
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::net::{SocketAddr, UnixListener};
+use std::time::Duration;
+
+/// An abstract name, which is free again when its holder is gone, however it went.
+const NAME: &str = "rohrpost-bench";
+
+/// How often a bench that waits looks.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Held while a bench measures.
+pub struct Alone {
+    _name: UnixListener,
+}
+
+/// Waits until no other bench measures on this computer; says by `waits` that it has to.
+///
+/// # Errors
+/// When it was interrupted meanwhile, or there are no such names.
+pub fn alone(waits: impl FnOnce()) -> Result<Alone, Failure> {
+    let name = SocketAddr::from_abstract_name(NAME).map_err(|error| Failure::of(NAME, error))?;
+    let mut waits = Some(waits);
+    loop {
+        match UnixListener::bind_addr(&name) {
+            Ok(listener) => return Ok(Alone { _name: listener }),
+            Err(error) if error.kind() != std::io::ErrorKind::AddrInUse => return Err(Failure::of(NAME, error)),
+            Err(_) if interrupted() => return Err(Failure::Failed("interrupted".into())),
+            Err(_) => {
+                if let Some(waits) = waits.take() {
+                    waits();
+                }
+                std::thread::sleep(PATIENCE);
+            }
+        }
+    }
+}
