@@ -13,9 +13,11 @@
 //! threads, end when it ends, and are killed when their time is over.
 
 pub mod cases;
+pub mod counting;
 pub mod environment;
 pub mod floors;
 pub mod harness;
+pub mod one_way;
 pub mod ours;
 #[cfg(feature = "peers")]
 pub mod peers;

@@ -1,5 +1,7 @@
 //! How much is measured.
 
+use std::path::PathBuf;
+
 /// How much a run measures. All cases obey it.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -9,11 +11,13 @@ pub struct Settings {
     pub only: Vec<String>,
     /// A few hundred messages a turn: shows that everything runs, and measures little.
     pub quick: bool,
+    /// The `rohrpost` command to measure; none: the one beside this program.
+    pub rohrpost: Option<PathBuf>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { rounds: 5, only: Vec::new(), quick: false }
+        Self { rounds: 5, only: Vec::new(), quick: false, rohrpost: None }
     }
 }
 

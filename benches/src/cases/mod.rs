@@ -1,7 +1,16 @@
 //! The cases. To add one: something that has a name and gives rows, and a line in [`all`].
 
+mod cost;
+mod flood;
 mod latency;
+mod many;
+mod memory;
+mod proof;
+mod rates;
 mod rivals;
+mod startup;
+
+pub use startup::run_hidden_program;
 
 use crate::harness::{Failure, Scheduling};
 use crate::rounds::Row;
@@ -21,7 +30,17 @@ pub trait Case {
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    latency::cases()
+    let all = [
+        latency::cases(),
+        rates::cases(),
+        flood::cases(),
+        cost::cases(),
+        proof::cases(),
+        memory::cases(),
+        many::cases(),
+        startup::cases(),
+    ];
+    all.into_iter().flatten().collect()
 }
 
 /// The few that tell in seconds how this computer does: blocking and spinning beside the two floors.

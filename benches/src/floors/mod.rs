@@ -2,6 +2,10 @@
 
 mod hand_over;
 mod queue;
+pub mod ring;
+mod two_rings;
+pub mod vyukov;
 
 pub use hand_over::{HandOver, Lanes, Wake};
 pub use queue::{Queue, QueueEnd, Queues};
+pub use two_rings::{TwoRings, TwoRingsReceiver, TwoRingsSender};

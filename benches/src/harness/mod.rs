@@ -5,6 +5,7 @@ mod child;
 mod interrupt;
 mod ping_pong;
 mod place;
+mod samples;
 mod scratch;
 mod shared;
 
@@ -15,6 +16,7 @@ pub use interrupt::{heed, interrupted};
 pub use ping_pong::time_two_threads;
 pub use ping_pong::{Cell, End, Link, Meetings, check_echo, fill, ping, pong, time_two_processes};
 pub use place::{Placement, Scheduling, processors, refusals, settle};
+pub use samples::{Samples, sample_in_child};
 pub use scratch::{Scratch, sweep};
 pub use shared::{Gate, Shared, Zeroable};
 

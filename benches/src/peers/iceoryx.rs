@@ -6,7 +6,7 @@ use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publishe
 use iceoryx2::prelude::*;
 use std::fmt::Debug;
 
-type Service = ipc::Service;
+pub(super) type Service = ipc::Service;
 
 /// Samples that may wait; in ping-pong more than one never does.
 const DEPTH: usize = 16;
@@ -34,12 +34,12 @@ pub struct Iceoryx {
     _node: Node<Service>,
 }
 
-fn failed(error: impl Debug) -> Failure {
+pub(super) fn failed(error: impl Debug) -> Failure {
     Failure::Failed(format!("iceoryx2: {error:?}"))
 }
 
 /// All that it makes lies in the scratch directory, or has the scratch's name in shared memory.
-fn configuration(scratch: &Scratch) -> Result<Config, Failure> {
+pub(super) fn configuration(scratch: &Scratch) -> Result<Config, Failure> {
     let mut config = Config::default();
     config.global.prefix = FileName::new(scratch.name().as_bytes()).map_err(failed)?;
     let directory = scratch.directory();
@@ -62,14 +62,14 @@ impl Iceoryx {
         set_log_level(LogLevel::Error);
         let node = NodeBuilder::new().config(&configuration(scratch)?).create::<Service>().map_err(failed)?;
         let (out, back) = if end == End::Ping { ("there", "back") } else { ("back", "there") };
-        let publisher = messages(&node, out)?
+        let publisher = messages(&node, out, DEPTH)?
             .publisher_builder()
             .initial_max_slice_len(bytes)
             .max_loaned_samples(2)
             .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
             .create()
             .map_err(failed)?;
-        let subscriber = messages(&node, back)?.subscriber_builder().create().map_err(failed)?;
+        let subscriber = messages(&node, back, DEPTH)?.subscriber_builder().create().map_err(failed)?;
         let bell = match waits {
             Waits::Listener => {
                 let notifier = events(&node, out)?.notifier_builder().create().map_err(failed)?;
@@ -84,17 +84,17 @@ impl Iceoryx {
     }
 }
 
-type Messages = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], ()>;
-type Events = iceoryx2::service::port_factory::event::PortFactory<Service>;
+pub(super) type Messages = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Service, [u8], ()>;
+pub(super) type Events = iceoryx2::service::port_factory::event::PortFactory<Service>;
 
-fn messages(node: &Node<Service>, name: &str) -> Result<Messages, Failure> {
+pub(super) fn messages(node: &Node<Service>, name: &str, depth: usize) -> Result<Messages, Failure> {
     let name = ServiceName::new(name).map_err(failed)?;
     let builder = node.service_builder(&name).publish_subscribe::<[u8]>();
-    let builder = builder.enable_safe_overflow(false).subscriber_max_buffer_size(DEPTH).history_size(0);
+    let builder = builder.enable_safe_overflow(false).subscriber_max_buffer_size(depth).history_size(0);
     builder.max_publishers(2).max_subscribers(2).open_or_create().map_err(failed)
 }
 
-fn events(node: &Node<Service>, name: &str) -> Result<Events, Failure> {
+pub(super) fn events(node: &Node<Service>, name: &str) -> Result<Events, Failure> {
     let name = ServiceName::new(&format!("{name}-bell")).map_err(failed)?;
     node.service_builder(&name).event().open_or_create().map_err(failed)
 }

@@ -2,6 +2,8 @@
 
 mod channel;
 mod iceoryx;
+mod iceoryx_one_way;
 
 pub use channel::{Channel, pair};
 pub use iceoryx::{Iceoryx, Waits};
+pub use iceoryx_one_way::{IceoryxReceiver, IceoryxSender};
