@@ -6,6 +6,7 @@
 mod cargo;
 mod checks;
 mod demo;
+mod fuzz;
 mod picture;
 mod venv;
 
@@ -19,6 +20,8 @@ cargo xtask test
     All tests: the workspace's, the GUI bridge's, and those that need Rerun's command line.
 cargo xtask ci
     Format, clippy for both builds, then all tests.
+cargo xtask fuzz [TARGET...] [--seconds N]
+    Fuzzes each target, or those named, for so long (60 s), from where the last run ended.
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
     A picture of a drawing as its viewer shows it, without a screen.
 ";
@@ -33,6 +36,7 @@ fn main() -> ExitCode {
         "demo" => demo::run(rest),
         "test" => checks::test(),
         "ci" => checks::ci(),
+        "fuzz" => fuzz::run(rest),
         "picture" => picture::run(rest),
         "help" | "--help" | "-h" => {
             print!("{HELP}");
