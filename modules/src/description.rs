@@ -66,11 +66,8 @@ impl Described for Description {
         let number = || field("number", u16::schema());
         let words = || [field("name", text()), field("text", text())];
         let argument = structure("Argument", vec![field("name", text()), field("ty", itself())]);
-        let function = [
-            field("idempotent", bool::schema()),
-            field("arguments", list(argument)),
-            field("result", itself()),
-        ];
+        let function =
+            [field("idempotent", bool::schema()), field("arguments", list(argument)), field("result", itself())];
         let function = structure("Function", [number()].into_iter().chain(words()).chain(function).collect());
         let item = [number()].into_iter().chain(words()).chain([field("ty", itself())]).collect();
         let item = structure("DataItem", item);

@@ -5,7 +5,7 @@
 //! promise is a file in `target/fuzz`, and goes into `tests/fuzz/corpus` once the mistake is mended.
 
 use crate::Failure;
-use crate::cargo::{self, cargo};
+use crate::cargo::{self, cargo, host};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
@@ -76,6 +76,8 @@ impl Fuzzer {
         let mut command = cargo(&["build", "--package", PACKAGE, "--features", "libfuzzer"]);
         // Flags for a named target do not reach build scripts and macros.
         let host = host()?;
+        // Dependencies too: unoptimised ones are most of the time.
+        command.args(["--config", "profile.dev.package.'*'.opt-level=2"]);
         command.args(["--target", &host]).env("CARGO_TARGET_DIR", &work).env("RUSTFLAGS", FLAGS);
         cargo::run("building the fuzz targets", &mut command)?;
         let program = work.join(host).join("debug").join(PACKAGE);
@@ -110,7 +112,10 @@ impl Fuzzer {
             Effort::Long { seconds } => ["-seed=0".into(), "-runs=-1".into(), format!("-max_total_time={seconds}")],
         });
         command.arg(format!("-timeout={INPUT_SECONDS_MAX}")).arg(format!("-rss_limit_mb={MEGABYTES_MAX}"));
-        command.arg(format!("-max_len={INPUT_BYTES_MAX}")).arg("-print_final_stats=1").arg(format!("-artifact_prefix={name}-"));
+        command
+            .arg(format!("-max_len={INPUT_BYTES_MAX}"))
+            .arg("-print_final_stats=1")
+            .arg(format!("-artifact_prefix={name}-"));
         command.arg(&found);
         let kept = self.corpus.join(name);
         if kept.is_dir() {
@@ -130,12 +135,4 @@ impl Fuzzer {
             format!("{failure}\n{said}\nall of it: {}", log.display())
         })
     }
-}
-
-/// The compiler's own target.
-fn host() -> Result<String, Failure> {
-    let output = Command::new("rustc").arg("-vV").output().map_err(|error| format!("rustc -vV: {error}"))?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    let host = text.lines().find_map(|line| line.strip_prefix("host: "));
-    host.map(str::to_owned).ok_or_else(|| "rustc -vV names no host".into())
 }

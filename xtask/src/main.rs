@@ -8,6 +8,7 @@ mod checks;
 mod demo;
 mod fuzz;
 mod picture;
+mod tsan;
 mod venv;
 
 use std::process::ExitCode;
@@ -22,6 +23,8 @@ cargo xtask ci
     Format, clippy for both builds, then all tests.
 cargo xtask fuzz [TARGET...] [--seconds N]
     Fuzzes each target, or those named, for so long (60 s), from where the last run ended.
+cargo xtask tsan
+    Runs the mailbox's slot core, and broken variants of it, under ThreadSanitizer.
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
     A picture of a drawing as its viewer shows it, without a screen.
 ";
@@ -37,6 +40,7 @@ fn main() -> ExitCode {
         "test" => checks::test(),
         "ci" => checks::ci(),
         "fuzz" => fuzz::run(rest),
+        "tsan" => tsan::run(),
         "picture" => picture::run(rest),
         "help" | "--help" | "-h" => {
             print!("{HELP}");
