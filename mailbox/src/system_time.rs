@@ -69,10 +69,11 @@ pub struct TimeRecord {
 }
 
 impl TimeRecord {
-    /// System time at this moment of the monotonic clock.
+    /// System time at this moment of the monotonic clock. Another process wrote the record: whatever it says, this is a time.
     pub fn at(&self, monotonic_ns: u64) -> SystemTime {
         let since = i128::from(monotonic_ns) - i128::from(self.monotonic_ns);
-        let system = i128::from(self.system_ns) + since * i128::from(self.pace_ppb) / BILLION;
+        let passed = since.saturating_mul(self.pace_ppb.into()) / BILLION;
+        let system = i128::from(self.system_ns) + passed;
         let age_ns = monotonic_ns.saturating_sub(self.monotonic_ns);
         let drift = u128::from(age_ns) * u128::from(self.drift_ns_s) / BILLION as u128;
         SystemTime {
@@ -173,9 +174,18 @@ impl TimePage {
         None
     }
 
+    /// The index that the next record gets, never 0. It counts a few writes a second; only what somebody else wrote there wraps.
+    fn next(&self) -> u64 {
+        match self.index.load(Ordering::Relaxed) {
+            // Even, so that it is the other record's turn.
+            u64::MAX => 2,
+            index => index + 1,
+        }
+    }
+
     /// Writes the record that the index does not name.
     fn fill(&self, record: &TimeRecord) {
-        let next = self.index.load(Ordering::Relaxed) + 1;
+        let next = self.next();
         // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
         fence(Ordering::Release);
         self.records[(next % 2) as usize].store(record);
@@ -183,7 +193,7 @@ impl TimePage {
 
     /// Makes the record just filled the valid one.
     fn turn(&self) {
-        let next = self.index.load(Ordering::Relaxed) + 1;
+        let next = self.next();
         // ORDERING: Release (B); pairs with (A).
         self.index.store(next, Ordering::Release);
         step!("time: turned");
@@ -254,7 +264,7 @@ impl TimeKeeper {
         let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
-        let epoch = page.read().map_or(1, |last| last.epoch + 1);
+        let epoch = page.read().map_or(1, |last| last.epoch.wrapping_add(1));
         page.fill(&TimeRecord {
             epoch,
             source,
