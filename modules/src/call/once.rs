@@ -209,9 +209,14 @@ impl Memory {
         self.until_ns = self.until_ns.max(until_ns);
         // Told apart as `place` does, also half way round, where both sides are equally far.
         match self.last.wrapping_sub(request.sequence) as i32 {
-            ahead @ ..0 => {
-                self.run = self.run.checked_shl(ahead.unsigned_abs()).unwrap_or(0) | 1;
+            ahead @ ..0 if ahead.unsigned_abs() < WINDOW => {
+                self.run = self.run << ahead.unsigned_abs() | 1;
                 self.last = request.sequence;
+            }
+            // Nothing that is remembered is known any more. Its answers go too: the numbers may come round again.
+            ..0 => {
+                self.begin(request);
+                self.run = 1;
             }
             behind => self.run |= 1 << behind,
         }
