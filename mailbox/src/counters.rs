@@ -338,7 +338,7 @@ mod tests {
         let counters = counters();
         for class in 0..=255 {
             counters.lost(Priority(class), Loss::Refused, 1);
-            counters.received(Priority(class), Duration::from_micros(1), 1);
+            counters.received(Priority(class), 1_000, 1);
         }
         let rows = counters.read();
         assert_eq!(rows.len(), ROWS);
@@ -352,7 +352,7 @@ mod tests {
     fn damaged_counts_add_up_to_the_most_and_not_to_a_panic() {
         let counters = counters();
         for class in [3, 4] {
-            counters.received(Priority(class), Duration::MAX, 1);
+            counters.received(Priority(class), u64::MAX, 1);
             counters.row(Class(class)).received.store(u64::MAX - 1, Ordering::Relaxed);
             counters.row(Class(class)).losses.iter().for_each(|losses| losses.store(u64::MAX, Ordering::Relaxed));
         }
@@ -367,7 +367,7 @@ mod tests {
     fn quantiles_of_nothing_are_nothing_and_of_one_are_it() {
         let counters = counters();
         assert!(counters.read().is_empty());
-        counters.received(Priority(9), Duration::from_micros(100), 40);
+        counters.received(Priority(9), 100_000, 40);
         assert_eq!(counters.read()[0].body_bytes, 40);
         let latency = &counters.read()[0].latency;
         assert_eq!((latency.count(), latency.mean()), (1, Some(latency.max)));

@@ -29,11 +29,13 @@ pub(crate) const HINT_WORDS: usize = SLOTS_MAX / 64;
 const DISPLACE_LOOKS_MAX: usize = 4;
 
 /// Something in cache lines of its own: 128 bytes, since processors fetch lines in pairs.
+#[derive(Default)]
 #[repr(C, align(128))]
 pub(crate) struct Line<T>(pub(crate) T);
 
 /// What senders and receiver touch with every package, each part in lines of its own: what counts is how often a line goes from
 /// one processor to the other.
+#[derive(Default)]
 #[repr(C)]
 pub(crate) struct Hot {
     /// Senders': the next ticket, that is, the order of publishing. Also the count of packages ever accepted here (one too many
@@ -49,6 +51,7 @@ pub(crate) struct Hot {
 }
 
 /// What the receiver tells senders.
+#[derive(Default)]
 #[repr(C)]
 pub(crate) struct ReceiverSays {
     /// Not 0: it sleeps or is about to; ring its bell.
@@ -265,7 +268,7 @@ impl<'a> Slots<'a> {
         step!("reuse: chosen");
         let reused = self.change(old.slot, old.word, word);
         step!("reuse: claimed");
-        reused.then(|| Claim { slot: old.slot, word, place: Some(old.word) })
+        reused.then_some(Claim { slot: old.slot, word, place: Some(old.word) })
     }
 
     /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the order:

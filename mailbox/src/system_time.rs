@@ -70,7 +70,7 @@ pub struct TimeRecord {
 }
 
 impl TimeRecord {
-    /// System time at this moment of the monotonic clock.
+    /// System time at this moment of the monotonic clock. Another process wrote the record: whatever it says, this is a time.
     pub fn at(&self, monotonic_ns: u64) -> SystemTime {
         let since = i128::from(monotonic_ns) - i128::from(self.monotonic_ns);
         let system = i128::from(self.system_ns) + since.saturating_mul(self.pace_ppb.into()) / BILLION;
@@ -174,9 +174,18 @@ impl TimePage {
         None
     }
 
+    /// The index that the next record gets, never 0. It counts a few writes a second; only what somebody else wrote there wraps.
+    fn next(&self) -> u64 {
+        match self.index.load(Ordering::Relaxed) {
+            // Even, so that it is the other record's turn.
+            u64::MAX => 2,
+            index => index + 1,
+        }
+    }
+
     /// Writes the record that the index does not name.
     fn fill(&self, record: &TimeRecord) {
-        let next = self.index.load(Ordering::Relaxed).wrapping_add(1);
+        let next = self.next();
         // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
         fence(Ordering::Release);
         self.records[(next % 2) as usize].store(record);
@@ -184,7 +193,7 @@ impl TimePage {
 
     /// Makes the record just filled the valid one.
     fn turn(&self) {
-        let next = self.index.load(Ordering::Relaxed).wrapping_add(1);
+        let next = self.next();
         // ORDERING: Release (B); pairs with (A).
         self.index.store(next, Ordering::Release);
         step!("time: turned");

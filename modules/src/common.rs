@@ -1,8 +1,10 @@
 //! The functions that every module has (seed 002, 2.2.1), numbers 1 to 15 of the commands.
 
 use crate::parameter::{Parameter, Refusal};
-use crate::value::Data;
+use crate::value::meta::{field, itself, list, structure, text};
+use crate::value::{Data, Described};
 use postcard_schema::Schema;
+use postcard_schema::schema::owned::OwnedNamedType;
 use rohrpost_mailbox::ModuleState;
 use serde::{Deserialize, Serialize};
 
@@ -149,6 +151,17 @@ pub struct ParameterPage {
     pub changes: u32,
     /// Those from the index that was asked for.
     pub parameters: Vec<Parameter>,
+}
+
+impl Described for ParameterPage {
+    fn shape() -> OwnedNamedType {
+        let bound = |name| field(name, Option::<Vec<u8>>::schema());
+        let words = ["name", "text", "unit"].map(|name| field(name, text()));
+        let rest = [field("ty", itself()), bound("least"), bound("most"), field("value", Vec::<u8>::schema())];
+        let parameter = structure("Parameter", words.into_iter().chain(rest).collect());
+        let counts = [field("total", u16::schema()), field("changes", u32::schema())];
+        structure("ParameterPage", counts.into_iter().chain([field("parameters", list(parameter))]).collect())
+    }
 }
 
 /// Sets parameters, all of them or none.

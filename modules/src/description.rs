@@ -1,5 +1,7 @@
 //! What a module tells of itself: its functions and data, by which tools print, call and record it.
 
+use crate::value::meta::{field, itself, list, structure, text};
+use crate::value::{Data, Described, read_described};
 use postcard_schema::schema::owned::OwnedNamedType;
 use rohrpost_mailbox::{Name, Node, local};
 use serde::{Deserialize, Serialize};
@@ -59,11 +61,34 @@ pub struct DataItem {
     pub ty: OwnedNamedType,
 }
 
+impl Described for Description {
+    fn shape() -> OwnedNamedType {
+        let number = || field("number", u16::schema());
+        let words = || [field("name", text()), field("text", text())];
+        let argument = structure("Argument", vec![field("name", text()), field("ty", itself())]);
+        let function =
+            [field("idempotent", bool::schema()), field("arguments", list(argument)), field("result", itself())];
+        let function = structure("Function", [number()].into_iter().chain(words()).chain(function).collect());
+        let item = [number()].into_iter().chain(words()).chain([field("ty", itself())]).collect();
+        let item = structure("DataItem", item);
+        structure(
+            "Description",
+            vec![
+                field("name", text()),
+                field("class", text()),
+                field("text", text()),
+                field("functions", list(function)),
+                field("data", list(item)),
+            ],
+        )
+    }
+}
+
 impl Description {
     /// What the module under this name has noted of itself beside its command mailbox; asks nobody. None when it noted
     /// nothing that can be read.
     pub fn noted(node: &Node, module: Name) -> Option<Self> {
-        postcard::from_bytes(&node.about(module.with_local(local::COMMANDS))?).ok()
+        read_described(&node.about(module.with_local(local::COMMANDS))?).ok()
     }
 
     /// Tells interfaces apart: callers and servers must have the same. Numbers, types, and names of functions and arguments

@@ -29,6 +29,14 @@ pub(crate) fn cargo(args: &[&str]) -> Command {
     command
 }
 
+/// The compiler's own target.
+pub(crate) fn host() -> Result<String, Failure> {
+    let output = Command::new("rustc").arg("-vV").output().map_err(|error| format!("rustc -vV: {error}"))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let host = text.lines().find_map(|line| line.strip_prefix("host: "));
+    host.map(str::to_owned).ok_or_else(|| "rustc -vV names no host".into())
+}
+
 /// Says what is run and why, runs it, and fails if it does.
 pub(crate) fn run(why: &str, command: &mut Command) -> Result<(), Failure> {
     eprintln!("==> {why}\n    {}", shown(command));

@@ -8,11 +8,14 @@
 use crate::Failure;
 use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE, cargo};
 use crate::venv;
+use crate::{fuzz, tsan};
 use std::process::{Command, ExitCode};
 
 /// All tests.
 pub(crate) fn test() -> Result<ExitCode, Failure> {
     cargo::run("testing all but the GUI bridge", &mut cargo(&["test", "--workspace", "--exclude", BRIDGE]))?;
+    tsan::run()?;
+    fuzz::short()?;
     let bridge = ["--profile", BRIDGE_PROFILE, "--package", BRIDGE];
     cargo::run("testing the GUI bridge", cargo(&["test"]).args(bridge))?;
     // The example is a bridge with a view of one's own, which a test starts.

@@ -6,7 +6,9 @@
 mod cargo;
 mod checks;
 mod demo;
+mod fuzz;
 mod picture;
+mod tsan;
 mod venv;
 
 use std::process::ExitCode;
@@ -19,6 +21,10 @@ cargo xtask test
     All tests: the workspace's, the GUI bridge's, and those that need Rerun's command line.
 cargo xtask ci
     Format, clippy for both builds, then all tests.
+cargo xtask fuzz [TARGET...] [--seconds N]
+    Fuzzes each target, or those named, for so long (60 s), from where the last run ended.
+cargo xtask tsan
+    Runs the mailbox's slot core, and broken variants of it, under ThreadSanitizer.
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
     A picture of a drawing as its viewer shows it, without a screen.
 ";
@@ -33,6 +39,8 @@ fn main() -> ExitCode {
         "demo" => demo::run(rest),
         "test" => checks::test(),
         "ci" => checks::ci(),
+        "fuzz" => fuzz::run(rest),
+        "tsan" => tsan::run(),
         "picture" => picture::run(rest),
         "help" | "--help" | "-h" => {
             print!("{HELP}");

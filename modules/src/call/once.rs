@@ -207,12 +207,18 @@ impl Memory {
             self.begin(request);
         }
         self.until_ns = self.until_ns.max(until_ns);
-        match request.sequence.wrapping_sub(self.last) as i32 {
-            ahead @ 1.. => {
-                self.run = self.run.checked_shl(ahead as u32).unwrap_or(0) | 1;
+        // Told apart as `place` does, also half way round, where both sides are equally far.
+        match self.last.wrapping_sub(request.sequence) as i32 {
+            ahead @ ..0 if ahead.unsigned_abs() < WINDOW => {
+                self.run = self.run << ahead.unsigned_abs() | 1;
                 self.last = request.sequence;
             }
-            behind => self.run |= 1 << behind.unsigned_abs(),
+            // Nothing that is remembered is known any more. Its answers go too: the numbers may come round again.
+            ..0 => {
+                self.begin(request);
+                self.run = 1;
+            }
+            behind => self.run |= 1 << behind,
         }
         let answer = &mut self.answers[self.next];
         self.next = (self.next + 1) % REPLIES_KEPT;

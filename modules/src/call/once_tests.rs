@@ -57,6 +57,24 @@ fn what_was_run_is_not_run_again_whatever_its_order() {
 }
 
 #[test]
+fn numbers_that_come_round_are_new_and_get_their_own_answers() {
+    let answer = |once: &mut Once, sequence| match once.judge(&request(sequence), 0) {
+        Verdict::Again(_, body) => body.to_vec(),
+        other => panic!("{sequence}: {other:?}"),
+    };
+    for step in [1 << 31, 3 << 29] {
+        let mut once = Once::new(0);
+        for round in 0..4_u32 {
+            let sequence = 7_u32.wrapping_add(round.wrapping_mul(step));
+            // Half way round, both sides are equally far: what follows is new.
+            assert_eq!(once.judge(&request(sequence), 0), Verdict::Run, "step {step}, round {round}");
+            once.done(&request(sequence), 0, false, &round.to_le_bytes());
+            assert_eq!(answer(&mut once, sequence), round.to_le_bytes(), "step {step}, round {round}");
+        }
+    }
+}
+
+#[test]
 fn each_rule_decides_as_it_says() {
     let base = request(1);
     let day = 86_400_000 * MS;

@@ -136,7 +136,7 @@ impl World {
             }
         }
         let cell_m = cell_m.ok_or(MapError::Ended { line: last, missing: "the line `cell_m` and metres" })?;
-        let drawn = Drawn::read(lines, None, square)?;
+        let drawn = Drawn::read(last, lines, None, square)?;
         let (column, row, heading_rad) = drawn.start.ok_or(MapError::NoStart)?;
         drawn.world(cell_m, |world| Ok(world.pose_in(column, row, heading_rad)))
     }
@@ -153,12 +153,12 @@ impl World {
         }
         let rows = dimension(&mut lines, "height")?;
         let columns = dimension(&mut lines, "width")?;
-        match lines.next() {
-            Some((_, "map")) => {}
+        let last = match lines.next() {
+            Some((number, "map")) => number,
             Some((number, line)) => return Err(header(number, "`map`", line)),
             None => return Err(MapError::Ended { line: 3, missing: "the line `map`" }),
-        }
-        let drawn = Drawn::read(lines, Some((columns, rows)), octile_square)?;
+        };
+        let drawn = Drawn::read(last, lines, Some((columns, rows)), octile_square)?;
         drawn.world(cell_m, |world| match start {
             Some(pose) if world.is_blocked_at(pose.x_m, pose.y_m) => {
                 Err(MapError::StartBlocked { x_m: pose.x_m, y_m: pose.y_m })
@@ -268,13 +268,14 @@ enum Square {
 }
 
 impl Drawn {
+    /// `last` is the line before the rows.
     fn read<'t>(
+        mut last: usize,
         lines: impl Iterator<Item = (usize, &'t str)>,
         size: Option<(usize, usize)>,
         meaning: fn(char) -> Option<Square>,
     ) -> Result<Self, MapError> {
         let mut drawn = Self { columns: size.map_or(0, |size| size.0), rows: 0, blocked: Vec::new(), start: None };
-        let mut last = 0;
         for (line, text) in lines {
             last = line;
             // Only an end of the file: a row of walls has no empty line in it, and a free one has its spaces.

@@ -5,6 +5,7 @@ use crate::common::{self, Change, DescriptionPart, OutputLevel, ParameterPage, S
 use crate::description::Description;
 use crate::interface::append;
 use crate::parameter::{Parameter, Refusal};
+use crate::value::read_described;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
@@ -212,7 +213,9 @@ impl ToolLink {
         let mut reads = 0;
         loop {
             let from = found.len() as u16;
-            let page: ParameterPage = self.common(module, common::PARAMETERS, &(from,))?;
+            let write = |body: &mut Vec<u8>| append(body, &(from,));
+            let read = |bytes: &[u8]| read_described(bytes).map_err(|_| postcard::Error::SerdeDeCustom);
+            let page: ParameterPage = self.call(module, common::PARAMETERS, common::HASH, write, read)?;
             // What it says of itself is a claim.
             if page.total > PARAMETERS_MAX {
                 let text = format!("its {} parameters are more than {PARAMETERS_MAX}", page.total);
@@ -272,5 +275,5 @@ pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Desc
             break;
         }
     }
-    postcard::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
+    read_described(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
 }

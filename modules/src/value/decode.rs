@@ -27,7 +27,12 @@ use postcard_schema::schema::owned::{
 ///
 /// Bytes that are cut, that go on, or that another type wrote, with the path to the place where it showed.
 pub fn decode(ty: &OwnedNamedType, bytes: &[u8]) -> Result<Value, WalkError> {
-    let mut decoder = Decoder { bytes, depth: 0, empty_left: EMPTY_MAX };
+    decode_within(DEPTH_MAX, ty, bytes)
+}
+
+/// The same with another bound on nesting.
+pub(super) fn decode_within(depth_max: usize, ty: &OwnedNamedType, bytes: &[u8]) -> Result<Value, WalkError> {
+    let mut decoder = Decoder { bytes, depth: 0, depth_max, empty_left: EMPTY_MAX };
     let value = decoder.value(ty)?;
     match decoder.bytes.len() {
         0 => Ok(value),
@@ -39,13 +44,14 @@ struct Decoder<'a> {
     /// What is not read yet.
     bytes: &'a [u8],
     depth: usize,
+    depth_max: usize,
     /// How many more values may take no bytes.
     empty_left: usize,
 }
 
 impl<'a> Decoder<'a> {
     fn value(&mut self, ty: &OwnedNamedType) -> Result<Value, WalkError> {
-        if self.depth >= DEPTH_MAX {
+        if self.depth >= self.depth_max {
             return Err(WalkProblem::TooDeep.into());
         }
         let before = self.bytes.len();

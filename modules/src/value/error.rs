@@ -107,6 +107,12 @@ pub enum WalkProblem {
     /// A field is given twice.
     #[error("given twice")]
     FieldTwice,
+    /// Bytes that the type itself refuses.
+    #[error("{error}")]
+    NotRead {
+        /// What it says.
+        error: String,
+    },
 }
 
 fn count(number: usize, noun: &str) -> String {

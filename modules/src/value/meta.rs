@@ -1,4 +1,5 @@
-//! The description of descriptions: a module that describes itself sends one, and tools print it like any other data.
+//! The description of descriptions: a module that describes itself sends one, and tools print it like any other data. And what
+//! descriptions are put together of.
 
 use postcard_schema::schema::owned::{
     OwnedDataModelType as Ty, OwnedDataModelVariant as VariantTy, OwnedNamedType, OwnedNamedValue, OwnedNamedVariant,
@@ -60,23 +61,24 @@ fn named_variant() -> OwnedNamedType {
     structure("OwnedNamedVariant", vec![field("name", text()), field("ty", kind)])
 }
 
-fn itself() -> OwnedNamedType {
+/// A description inside of something else.
+pub(crate) fn itself() -> OwnedNamedType {
     OwnedNamedType { name: "OwnedNamedType".into(), ty: Ty::Schema }
 }
 
-fn text() -> OwnedNamedType {
+pub(crate) fn text() -> OwnedNamedType {
     OwnedNamedType { name: "String".into(), ty: Ty::String }
 }
 
-fn list(element: OwnedNamedType) -> OwnedNamedType {
+pub(crate) fn list(element: OwnedNamedType) -> OwnedNamedType {
     OwnedNamedType { name: "Vec<T>".into(), ty: Ty::Seq(Box::new(element)) }
 }
 
-fn structure(name: &str, fields: Vec<OwnedNamedValue>) -> OwnedNamedType {
+pub(crate) fn structure(name: &str, fields: Vec<OwnedNamedValue>) -> OwnedNamedType {
     OwnedNamedType { name: name.into(), ty: Ty::Struct(fields) }
 }
 
-fn field(name: &str, ty: OwnedNamedType) -> OwnedNamedValue {
+pub(crate) fn field(name: &str, ty: OwnedNamedType) -> OwnedNamedValue {
     OwnedNamedValue { name: name.into(), ty }
 }
 

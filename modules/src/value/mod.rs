@@ -15,10 +15,11 @@
 
 mod argument;
 mod decode;
+mod described;
 mod encode;
 mod error;
 mod json;
-mod meta;
+pub(crate) mod meta;
 mod scalar;
 mod show;
 mod types;
@@ -28,6 +29,7 @@ mod tests;
 
 pub use argument::parse_argument;
 pub use decode::decode;
+pub use described::{Described, read_described};
 pub use encode::encode;
 pub use error::{WalkError, WalkProblem};
 pub use show::{LIST_SHOWN, Shown, numbers};

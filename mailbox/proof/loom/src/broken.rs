@@ -327,24 +327,6 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "the_urgent_passes_what_is_known",
         says: WRONG,
     },
-    // The second one's alert is overwritten unseen.
-    Broken {
-        name: "alert_cleared_by_a_store",
-        edits: &[
-            edit(
-                "slots",
-                "self.hot.alert.0.load(Ordering::Relaxed) != 0",
-                "self.hot.alert.0.load(Ordering::Acquire) != 0",
-            ),
-            edit(
-                "slots",
-                "self.hot.alert.0.swap(0, Ordering::AcqRel);",
-                "self.hot.alert.0.store(0, Ordering::Release);",
-            ),
-        ],
-        caught_by: "no_alert_is_lost",
-        says: WRONG,
-    },
     // Who read the higher level did not alert, and is overlooked.
     Broken {
         name: "no_look_at_the_new_level",

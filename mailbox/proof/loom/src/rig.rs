@@ -6,7 +6,7 @@
 use crate::name::Priority;
 use crate::bell::Bell;
 use crate::queue::Queue;
-use crate::slots::{Bodies, Full, HINT_WORDS, Hot, Line, NoSlot, Posted, Published, ReceiverSays, Slots};
+use crate::slots::{Bodies, Full, Hot, NoSlot, Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use crate::word::{Claimant, FREE, Victim, Word};
@@ -52,18 +52,8 @@ impl Mailbox {
 
     fn with_bell(slots: usize, bell: Arc<Sleeper>) -> Arc<Self> {
         reached("mailbox: new");
-        let hot = Hot {
-            ticket: Line(AtomicU64::new(0)),
-            ready: Line([(); HINT_WORDS].map(|()| AtomicU64::new(0))),
-            receiver: Line(ReceiverSays {
-                sleeping: AtomicU32::new(0),
-                level: AtomicU32::new(0),
-                retired: AtomicU32::new(0),
-            }),
-            alert: Line(AtomicU32::new(0)),
-        };
         Arc::new(Self {
-            hot,
+            hot: Hot::default(),
             words: (0..slots).map(|_| AtomicU64::new(FREE.0)).collect(),
             bodies: (0..slots).map(|_| UnsafeCell::new(0)).collect(),
             bell,

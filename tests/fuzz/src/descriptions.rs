@@ -1,0 +1,95 @@
+//! Descriptions that modules give of themselves, and data read by them without a type: what a tool does with both.
+
+use crate::split::Bytes;
+use postcard_schema::schema::owned::OwnedNamedType;
+use rohrpost_modules::common::ParameterPage;
+use rohrpost_modules::description::Description;
+use rohrpost_modules::parameter::{from_file, from_word, toml_text, value_text};
+use rohrpost_modules::value::{
+    self, LIST_SHOWN, Value, decode, describe_result, describe_type, encode, is_word, numbers, parse_argument,
+};
+
+/// The first byte says what: a description, a page of parameters, or a type and a value of it.
+pub(crate) fn run(data: &[u8]) {
+    let Some((what, bytes)) = data.split_first() else { return };
+    match what % 3 {
+        0 => described(bytes),
+        1 => parameters(bytes),
+        _ => typed(bytes),
+    }
+}
+
+fn described(bytes: &[u8]) {
+    let Ok(description) = value::read_described::<Description>(bytes) else { return };
+    let again = postcard::to_stdvec(&description).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(value::read_described::<Description>(&again).as_ref(), Ok(&description));
+    assert_eq!(description.hash(), description.clone().hash());
+    for function in &description.functions {
+        function.arguments.iter().for_each(|argument| of(&argument.ty, bytes));
+        let _ = describe_result(&function.result);
+        of(&function.result, bytes);
+        assert!(description.function(&function.name).is_some());
+    }
+    for item in &description.data {
+        of(&item.ty, bytes);
+        assert!(description.data_item(&item.name).is_some());
+    }
+}
+
+fn parameters(bytes: &[u8]) {
+    let Ok(page) = value::read_described::<ParameterPage>(bytes) else { return };
+    for parameter in &page.parameters {
+        let range = parameter.with_unit(&parameter.range());
+        assert!(range.len() >= parameter.unit.len());
+        if let Ok(value) = parameter.value() {
+            let _ = (value_text(&value), toml_text(&value));
+            let _ = from_file(&parameter.ty, &value);
+        }
+        let _ = from_word(&parameter.ty, &parameter.text);
+    }
+}
+
+fn typed(bytes: &[u8]) {
+    let mut bytes = Bytes(bytes);
+    let length = bytes.half().into();
+    let Ok(ty) = value::read_described::<OwnedNamedType>(bytes.take(length)) else { return };
+    of(&ty, bytes.0);
+}
+
+/// All that is done with a type and bytes that may be one of its values.
+fn of(ty: &OwnedNamedType, bytes: &[u8]) {
+    assert!(!describe_type(ty).is_empty());
+    let _ = is_word(ty);
+    let text = String::from_utf8_lossy(bytes);
+    if let Ok(value) = parse_argument(ty, &text) {
+        let written = encode(ty, &value).unwrap_or_else(|error| panic!("{text:?} was understood: {error}"));
+        assert!(decode(ty, &written).is_ok(), "{text:?}");
+    }
+    let value = match decode(ty, bytes) {
+        Ok(value) => value,
+        Err(error) => return assert!(!error.to_string().is_empty()),
+    };
+    shown(&value);
+    let written = encode(ty, &value).unwrap_or_else(|error| panic!("{value:?}: {error}"));
+    let again = decode(ty, &written).unwrap_or_else(|error| panic!("{value:?}: {error}"));
+    // By text, since a NaN is not itself.
+    assert_eq!(format!("{again:?}"), format!("{value:?}"));
+    as_json(ty, &value);
+}
+
+fn shown(value: &Value) {
+    let text = value.to_string();
+    assert!(!text.contains(|c: char| c.is_control() && c != '\n'), "{text:?}");
+    let _ = value.display(2).to_string();
+    let _ = numbers(value, LIST_SHOWN);
+}
+
+/// What goes to JSON and comes back means the same.
+fn as_json(ty: &OwnedNamedType, value: &Value) {
+    let json = serde_json::to_string(value).unwrap_or_else(|error| panic!("{value:?}: {error}"));
+    // The reader of JSON has a bound of its own on nesting.
+    let Ok(read) = serde_json::from_str::<Value>(&json) else { return };
+    if let Ok(written) = encode(ty, &read) {
+        assert!(decode(ty, &written).is_ok(), "{json}");
+    }
+}

@@ -1,0 +1,62 @@
+//! Fuzz targets: each takes any bytes, hands them to what reads bytes of others, and panics if a promise is not kept.
+//!
+//! ```text
+//! corpus/NAME/*  ──┬── tests/corpus.rs    each file once, in every `cargo test`
+//!                  └── libFuzzer          changes them, guided by what code they reach: `cargo xtask fuzz`
+//! ```
+//!
+//! The promise that all share: no panic, no read outside, an end in bounded time and memory. The others stand in the targets.
+//! An input that broke one stays in the corpus, under a name that says what it broke.
+
+#![forbid(unsafe_code)]
+
+mod calls;
+mod config;
+mod descriptions;
+mod head;
+mod lines;
+mod logs;
+mod maps;
+mod names;
+mod parameters;
+mod planted;
+mod segments;
+mod split;
+
+/// One target.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// Its name, which is also its folder in `corpus/`.
+    pub name: &'static str,
+    /// Reads the bytes; panics if a promise is not kept.
+    pub run: fn(&[u8]),
+}
+
+/// All targets.
+pub const TARGETS: [Target; 10] = [
+    Target { name: "head", run: head::run },
+    Target { name: "names", run: names::run },
+    Target { name: "config", run: config::run },
+    Target { name: "parameters", run: parameters::run },
+    Target { name: "descriptions", run: descriptions::run },
+    Target { name: "calls", run: calls::run },
+    Target { name: "lines", run: lines::run },
+    Target { name: "logs", run: logs::run },
+    Target { name: "maps", run: maps::run },
+    Target { name: "segments", run: segments::run },
+];
+
+/// A target that must fail: it shows that the fuzzer finds what is to be found.
+pub const PLANTED: Target = Target { name: "planted", run: planted::run };
+
+/// The target of this name.
+///
+/// # Errors
+/// Says which there are.
+pub fn target(name: &str) -> Result<Target, String> {
+    let mut all = TARGETS.into_iter().chain([PLANTED]);
+    all.find(|target| target.name == name).ok_or_else(|| {
+        let names = TARGETS.map(|target| target.name).join(", ");
+        format!("no target `{name}`; there are {names}")
+    })
+}

@@ -1,0 +1,49 @@
+//! Logs of CARMEN, as the demonstration plays them: read, believed or not, played, and drawn into a map.
+
+use rohrpost_modules::robot::carmen::{LogError, Reader, Record, Settings};
+use rohrpost_modules::robot::grid::{Mapper, Settings as GridSettings};
+use rohrpost_modules::robot::playback::Playback;
+use rohrpost_modules::robot::track::Track;
+
+/// Scans that are drawn of one input: each may touch some thousand cells.
+const SCANS: usize = 4;
+
+pub(crate) fn run(data: &[u8]) {
+    let mut reader = Reader::new(data, Settings::default());
+    let lines = data.split(|byte| *byte == b'\n').count() as u64;
+    for item in reader.by_ref() {
+        match item {
+            Ok(record) => assert!(record.stamp_s().is_none_or(f64::is_finite)),
+            Err(LogError::Malformed { line, flaw }) => {
+                assert!((1..=lines).contains(&line) && !flaw.to_string().is_empty());
+            }
+            Err(error @ LogError::Io { .. }) => panic!("bytes can be read: {error}"),
+        }
+    }
+    assert!(reader.line() <= lines && reader.skipped() <= reader.line());
+    play(data);
+}
+
+fn play(data: &[u8]) {
+    let speed = 1.0 + data.len() as f64;
+    let playback = Playback::new(Reader::new(data, Settings::default()), speed).unwrap_or_else(|e| panic!("{e}"));
+    let (mut last_ns, mut scans) = (0, 0);
+    let (mut map, mut track) = (Mapper::new(GridSettings::default()), Track::new(8));
+    for due in playback {
+        let due = due.unwrap_or_else(|error| panic!("bytes can be read: {error}"));
+        assert!(due.due_ns >= last_ns, "due times never go back");
+        last_ns = due.due_ns;
+        match due.record {
+            Record::Odometry { odometry, .. } => drop(track.push(due.due_ns, odometry.pose)),
+            Record::Scan { scan, odometry, .. } if scans < SCANS => {
+                scans += 1;
+                let pose = track.at(due.due_ns).ok().or(scan.pose).unwrap_or(odometry);
+                let _ = map.integrate(&scan, &pose);
+            }
+            Record::Scan { .. } | Record::Param { .. } => {}
+        }
+    }
+    for index in map.take_changed() {
+        assert!(map.tile(index).is_some());
+    }
+}
