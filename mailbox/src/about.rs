@@ -2,8 +2,9 @@
 //!
 //! This crate does not know what it says. It appears whole, stays as long as the mailbox, and goes before it.
 
+use crate::files::{open_shared, open_to_read};
 use crate::name::Name;
-use crate::node::{Node, NodeError, open_shared, open_to_read};
+use crate::node::{Node, NodeError};
 use crate::receiver::Receiver;
 use crate::step::step;
 use std::fs;
@@ -37,7 +38,7 @@ impl Receiver {
         };
         write().map_err(|error: io::Error| {
             let _ = fs::remove_file(&unfinished);
-            NodeError::Io(path, error)
+            NodeError::of(&path, error)
         })
     }
 }

@@ -90,10 +90,16 @@ impl Counters {
     fn row(&self, class: Class) -> &Row {
         let mine = USED | u32::from(class.0);
         for row in &self.0[..ROWS - 1] {
-            match row.class.compare_exchange(0, mine, Ordering::Relaxed, Ordering::Relaxed) {
-                Ok(_) => return row,
-                Err(there) if there == mine => return row,
-                Err(_) => {}
+            // Looked at before it is claimed, so that counting does not write what it only reads.
+            let there = match row.class.load(Ordering::Relaxed) {
+                0 => row
+                    .class
+                    .compare_exchange(0, mine, Ordering::Relaxed, Ordering::Relaxed)
+                    .map_or_else(|there| there, |_| mine),
+                there => there,
+            };
+            if there == mine {
+                return row;
             }
         }
         let rest = &self.0[ROWS - 1];
@@ -113,18 +119,17 @@ impl Counters {
     }
 
     /// By the receiver alone, which may therefore load and store.
-    pub(crate) fn received(&self, priority: Priority, waited: Duration, bytes: usize) {
+    pub(crate) fn received(&self, priority: Priority, waited_ns: u64, bytes: usize) {
         let row = self.row(Class(priority.0));
-        let ns = u64::try_from(waited.as_nanos()).unwrap_or(u64::MAX);
-        let bucket = &row.latency[bucket(ns)];
+        let bucket = &row.latency[bucket(waited_ns)];
         bucket.store(bucket.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
-        if ns > row.latency_max_ns.load(Ordering::Relaxed) {
-            row.latency_max_ns.store(ns, Ordering::Relaxed);
+        if waited_ns > row.latency_max_ns.load(Ordering::Relaxed) {
+            row.latency_max_ns.store(waited_ns, Ordering::Relaxed);
         }
         let add = |count: &AtomicU64, more: u64| {
             count.store(count.load(Ordering::Relaxed).wrapping_add(more), Ordering::Relaxed);
         };
-        add(&row.latency_sum_ns, ns);
+        add(&row.latency_sum_ns, waited_ns);
         add(&row.body_bytes, bytes as u64);
         add(&row.received, 1);
     }

@@ -3,8 +3,8 @@
 //! ```text
 //!     0  Identity   what this is: written once, before the segment gets its name; then only read
 //!    64  Owner      who receives: changed on adoption
-//!   128  Hot        ticket, sleeping, retired, ready hints
-//!   320  Counters   ten rows of 320 bytes
+//!   128  Hot        ticket, ready hints, what the receiver says, alert: 128 bytes each
+//!   640  Counters   ten rows of 320 bytes
 //!  4096  words      one a slot, 64 B apart up to 64 slots, 8 B above
 //!     …  slots      each: published (u64 ns, monotonic), head (16 B), body; a multiple of 64 B
 //! ```
@@ -14,7 +14,7 @@
 use crate::counters::{Counters, ROWS};
 use crate::name::Name;
 use crate::package::{BODY_BYTES_MAX, HEAD_BYTES};
-use crate::slots::{Full, Hot, SLOTS_MAX};
+use crate::slots::{Full, Hot, ReceiverSays, SLOTS_MAX};
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 use std::time::Duration;
@@ -22,7 +22,7 @@ use std::time::Duration;
 /// `rohrpost` in ASCII, little-endian.
 pub(crate) const MAGIC: u64 = u64::from_le_bytes(*b"rohrpost");
 /// Raised with every change of a layout in shared memory.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 pub(crate) const PAGE: usize = 4096;
 /// Bytes of a slot before its body: time of publishing and head.
 pub(crate) const SLOT_PREFIX: usize = 8 + HEAD_BYTES;
@@ -109,7 +109,7 @@ impl Shape {
 }
 
 /// 0 is kept for none.
-fn stored_ns(age: Duration) -> u64 {
+pub(crate) fn stored_ns(age: Duration) -> u64 {
     u64::try_from(age.as_nanos()).unwrap_or(u64::MAX).max(1)
 }
 
@@ -128,6 +128,22 @@ pub(crate) struct Identity {
 }
 
 impl Identity {
+    /// As the first bytes of a file have it. Nobody changes it once the file has its name, so a copy is as good.
+    pub(crate) fn from_bytes(bytes: &[u8; size_of::<Self>()]) -> Self {
+        let long = |at: usize| AtomicU64::new(u64::from_ne_bytes(std::array::from_fn(|i| bytes[at + i])));
+        let short = |at: usize| AtomicU32::new(u32::from_ne_bytes(std::array::from_fn(|i| bytes[at + i])));
+        Self {
+            magic: long(offset_of!(Self, magic)),
+            version: short(offset_of!(Self, version)),
+            name: short(offset_of!(Self, name)),
+            slots: short(offset_of!(Self, slots)),
+            body_bytes_max: short(offset_of!(Self, body_bytes_max)),
+            full: short(offset_of!(Self, full)),
+            claims: short(offset_of!(Self, claims)),
+            max_age_ns: long(offset_of!(Self, max_age_ns)),
+        }
+    }
+
     /// Before the segment has its name, so that nobody else can see it.
     pub(crate) fn write(&self, name: Name, shape: &Shape) {
         use std::sync::atomic::Ordering::Relaxed;
@@ -192,8 +208,10 @@ pub(crate) struct Page {
 const _: () = {
     assert!(size_of::<Identity>() == 64 && offset_of!(Identity, max_age_ns) == 32);
     assert!(size_of::<Owner>() == 64);
-    assert!(size_of::<Hot>() == 192 && offset_of!(Hot, sleeping) == 8 && offset_of!(Hot, ready) == 16);
-    assert!(offset_of!(Page, hot) == 128 && offset_of!(Page, counters) == 320);
+    assert!(size_of::<Hot>() == 512 && offset_of!(Hot, ready) == 128);
+    assert!(offset_of!(Hot, receiver) == 256 && offset_of!(Hot, alert) == 384);
+    assert!(offset_of!(ReceiverSays, level) == 4 && offset_of!(ReceiverSays, retired) == 8);
+    assert!(offset_of!(Page, hot) == 128 && offset_of!(Page, counters) == 640);
     assert!(size_of::<Counters>() == ROWS * 320 && size_of::<Page>() <= PAGE);
 };
 

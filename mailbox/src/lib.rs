@@ -11,7 +11,7 @@
 //!
 //! This crate knows no network, no configuration file and no message type. Reading order: `word` (the life of a slot),
 //! `slots` (the protocol, and what each death leaves), `queue`, `doorbell`, then `segment`, `sender`, `receiver`, `node`,
-//! `registry`, `traffic`.
+//! `registry`, `inspect`, `traffic`.
 //!
 //! ```
 //! use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Shape, Type};
@@ -35,7 +35,9 @@ mod clock;
 mod counters;
 mod doorbell;
 mod entry;
+mod files;
 mod flows;
+mod inspect;
 mod latest;
 mod layout;
 mod lock;
@@ -65,13 +67,14 @@ pub use clock::{monotonic_ns, realtime_ns};
 pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss, saturating_sum};
 pub use entry::{ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 pub use flows::{FlowInfo, FlowSecond, Publications};
+pub use inspect::{InspectError, MailboxDetail, MailboxInfo, Party, SlotInfo, VictimInfo, WaitingPackage};
 pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
 pub use node::{LaunchLock, Node, NodeError, base_directory, node_directory, remove_base_if_empty};
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;
 pub use receiver::{Package, Receiver};
-pub use registry::{CreateError, MailboxInfo};
+pub use registry::CreateError;
 pub use sender::{Label, Loan, SendError, Sender};
 pub use slots::{Full, SLOTS_MAX};
 pub use system_time::{SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource};

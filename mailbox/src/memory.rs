@@ -1,6 +1,7 @@
 //! Files mapped into memory that other processes map too. The only place that turns addresses into references.
 
-use nix::sys::mman::{MapFlags, ProtFlags, mlock, mmap, munmap};
+use nix::errno::Errno;
+use nix::sys::mman::{MapFlags, ProtFlags, mmap, munmap};
 use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
@@ -38,35 +39,53 @@ unsafe impl Send for Mapping {}
 // SAFETY: as above: shared references give access to atomics only, bodies come as raw pointers.
 unsafe impl Sync for Mapping {}
 
+/// What a mapping is for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Use {
+    /// To read.
+    Look,
+    /// To read and write.
+    Share,
+    /// The same, and the kernel is asked to keep the pages in memory. If the memlock limit does not allow it they are present
+    /// all the same, as long as memory is not short.
+    Keep,
+}
+
 impl Mapping {
     /// Maps the first `bytes` of a file that is at least so long, all pages present.
-    pub(crate) fn new(file: &File, bytes: usize, writable: bool) -> io::Result<Self> {
+    pub(crate) fn new(file: &File, bytes: usize, used: Use) -> io::Result<Self> {
         let length = NonZeroUsize::new(bytes).ok_or(io::ErrorKind::InvalidInput)?;
         if file.metadata()?.len() < bytes as u64 {
             return Err(io::Error::new(io::ErrorKind::UnexpectedEof, format!("file is shorter than {bytes} bytes")));
         }
-        let protection = if writable { ProtFlags::PROT_READ | ProtFlags::PROT_WRITE } else { ProtFlags::PROT_READ };
-        let flags = MapFlags::MAP_SHARED | MapFlags::MAP_POPULATE;
-        // SAFETY: a new mapping at an address of the kernel's choice touches nothing that exists.
-        let base = unsafe { mmap(None, length, protection, flags, file, 0) }?;
+        let (write, keep) = match used {
+            Use::Look => (ProtFlags::empty(), MapFlags::empty()),
+            Use::Share => (ProtFlags::PROT_WRITE, MapFlags::empty()),
+            Use::Keep => (ProtFlags::PROT_WRITE, MapFlags::MAP_LOCKED),
+        };
+        let map = |keep| {
+            let flags = MapFlags::MAP_SHARED | MapFlags::MAP_POPULATE | keep;
+            // SAFETY: a new mapping at an address of the kernel's choice touches nothing that exists.
+            unsafe { mmap(None, length, ProtFlags::PROT_READ | write, flags, file, 0) }
+        };
+        let base = match map(keep) {
+            Err(Errno::EAGAIN | Errno::EPERM) if used == Use::Keep => map(MapFlags::empty())?,
+            mapped => mapped?,
+        };
         Ok(Self { base: base.cast(), bytes })
-    }
-
-    /// Asks the kernel to keep the pages in memory; false when the memlock limit does not allow it.
-    pub(crate) fn lock_in_memory(&self) -> bool {
-        // SAFETY: the range is our own mapping.
-        unsafe { mlock(self.base.cast(), self.bytes) }.is_ok()
     }
 
     /// The value at `offset`.
     ///
     /// # Panics
     /// When it does not lie inside the mapping or is not aligned: offsets come from checked layouts.
+    #[inline]
     pub(crate) fn at<T: Shared>(&self, offset: usize) -> &T {
         &self.slice(offset, 1)[0]
     }
 
     /// `count` values from `offset` on. Panics as [`Mapping::at`] does.
+    #[inline]
     pub(crate) fn slice<T: Shared>(&self, offset: usize, count: usize) -> &[T] {
         let first = self.bytes_at(offset, count * size_of::<T>()).cast::<T>();
         assert!(first.is_aligned());
@@ -76,6 +95,7 @@ impl Mapping {
     }
 
     /// The address of `count` bytes from `offset` on. Panics as [`Mapping::at`] does.
+    #[inline]
     pub(crate) fn bytes_at(&self, offset: usize, count: usize) -> NonNull<u8> {
         assert!(offset.checked_add(count).is_some_and(|end| end <= self.bytes));
         // SAFETY: stays inside the mapping, as just asserted.

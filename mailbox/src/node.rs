@@ -16,9 +16,10 @@
 
 use crate::doorbell;
 use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
+use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, Held};
-use crate::memory::Mapping;
+use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::step::step;
 use crate::word::Claimant;
@@ -35,6 +36,9 @@ const LAUNCH_BYTE: u64 = 1 << 20;
 const REGISTRY_BYTE: u64 = LAUNCH_BYTE + 1;
 /// Changing the registry takes microseconds; who holds it longer is stopped.
 pub(crate) const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
+/// Between two tries: as long as making a mailbox takes, then longer and longer.
+const REGISTRY_PAUSE: Duration = Duration::from_micros(50);
+const REGISTRY_PAUSE_MAX: Duration = Duration::from_millis(1);
 
 /// The file `node`.
 #[repr(C)]
@@ -67,6 +71,28 @@ pub enum NodeError {
          launched it, or stop what runs there and remove the directory"
     )]
     Version(PathBuf, u32),
+    /// No memory, most likely.
+    #[error("node {path}: no shared memory: {source}; is it full (df {path})?", path = path.display())]
+    Memory {
+        /// Its directory.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// As many files are open as may be.
+    #[error(
+        "node {0}: this process, or the computer, has no file descriptor left; raise the limit (ulimit -n, or LimitNOFILE= \
+         of a service)"
+    )]
+    Descriptors(PathBuf),
+    /// Another user's.
+    #[error(
+        "node {0}: permission denied; be the user whose node it is, or have its `mode` in the configuration let you in"
+    )]
+    Denied(PathBuf),
+    /// Cut off, or somebody else's.
+    #[error("node {0}: its file `node` is damaged, or not Rohrpost's; stop what runs there and remove the directory")]
+    Damaged(PathBuf),
     /// No such node, or it was removed after it was opened.
     #[error("no node at {0}: is it launched?")]
     Missing(PathBuf),
@@ -108,7 +134,21 @@ pub struct Node {
     /// Holds no lock, so that it can ask about all.
     file: File,
     directory: File,
+    /// Device and number of the file, by which it is known again.
+    identity: (u64, u64),
     mapping: Mapping,
+}
+
+impl NodeError {
+    /// What the system said of a file of the node's.
+    pub(crate) fn of(path: &Path, source: io::Error) -> Self {
+        match &source {
+            error if is_lack_of_memory(error) => Self::Memory { path: path.into(), source },
+            error if error.kind() == io::ErrorKind::PermissionDenied => Self::Denied(path.into()),
+            error if is_lack_of_descriptors(error) => Self::Descriptors(path.into()),
+            _ => Self::Io(path.into(), source),
+        }
+    }
 }
 
 impl Node {
@@ -117,7 +157,7 @@ impl Node {
     /// # Errors
     /// When the directory cannot be made or is not ours to trust.
     pub fn create(path: &Path, mode: u32) -> Result<Arc<Self>, NodeError> {
-        let failed = |error| NodeError::Io(path.into(), error);
+        let failed = |error| NodeError::of(path, error);
         let made = fs::DirBuilder::new().recursive(true).mode(mode).create(path);
         made.map_err(failed)?;
         let us = nix::unistd::getuid().as_raw();
@@ -141,35 +181,34 @@ impl Node {
     /// # Errors
     /// [`NodeError::Missing`] when nobody has made it.
     pub fn open(path: &Path) -> Result<Arc<Self>, NodeError> {
-        if !path.join("node").exists() {
-            return Err(NodeError::Missing(path.into()));
-        }
         Self::open_file(path, false)
     }
 
     fn open_file(path: &Path, create: bool) -> Result<Arc<Self>, NodeError> {
-        let failed = |error| NodeError::Io(path.into(), error);
-        let file = open_shared(&path.join("node"), create).map_err(failed)?;
+        let failed = |error| NodeError::of(path, error);
+        let file = match open_shared(&path.join("node"), create) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(NodeError::Missing(path.into())),
+            opened => opened.map_err(failed)?,
+        };
+        // Only who makes it whole needs the registry to itself; somebody else may have done so before it was had.
+        let maker = if is_whole(path, &file)? { None } else { Some(RegistryLock::take(path)?) };
         let bytes = size_of::<NodePage>();
-        // Before anything is locked or made longer: what another version made is its own business.
-        if let Some(other) = other_version(&file) {
-            return Err(NodeError::Version(path.into(), other));
-        }
-        let lock = RegistryLock::take(path)?;
-        if file.metadata().map_err(failed)?.len() < bytes as u64 {
+        if maker.is_some() && !is_whole(path, &file)? && file.metadata().map_err(failed)?.len() < bytes as u64 {
             allocate(&file, bytes).map_err(failed)?;
         }
         // Not to be read, only to find pipes by.
         let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
         let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
-        let mapping = Mapping::new(&file, bytes, true).map_err(failed)?;
-        let node = Self { path: path.into(), mapping, file, directory };
-        node.check_in()?;
-        drop(lock);
+        let mapping = Mapping::new(&file, bytes, Use::Share).map_err(failed)?;
+        let there = file.metadata().map_err(failed)?;
+        let node = Self { path: path.into(), mapping, identity: (there.dev(), there.ino()), file, directory };
+        if maker.is_some() {
+            node.check_in()?;
+        }
         Ok(Arc::new(node))
     }
 
-    /// Writes or checks the magic number; under the registry's lock.
+    /// Writes the magic number, unless somebody else just has; under the registry's lock.
     fn check_in(&self) -> Result<(), NodeError> {
         let page = self.page();
         if page.magic.load(Ordering::Acquire) != MAGIC {
@@ -270,7 +309,7 @@ impl Node {
     /// # Errors
     /// [`NodeError::Launched`] names the process that is it already.
     pub fn launch_lock(self: &Arc<Self>) -> Result<LaunchLock, NodeError> {
-        let failed = |error| NodeError::Io(self.path.clone(), error);
+        let failed = |error| NodeError::of(&self.path, error);
         let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
         let Some(held) = Held::try_take(file, LAUNCH_BYTE).map_err(failed)? else {
             return Err(NodeError::Launched(self.path.clone(), self.page().launch_pid.load(Ordering::Acquire)));
@@ -283,16 +322,16 @@ impl Node {
     /// Whether `file`, just opened by its path, is the one that this node has mapped: the directory may have been removed.
     /// Asked when its lock is held; until then somebody may be removing it.
     pub(crate) fn check_present(&self, file: &File) -> Result<(), NodeError> {
-        let failed = |error| NodeError::Io(self.path.clone(), error);
-        let (there, mine) = (file.metadata().map_err(failed)?, self.file.metadata().map_err(failed)?);
-        let present = (there.dev(), there.ino()) == (mine.dev(), mine.ino()) && there.nlink() > 0;
+        let failed = |error| NodeError::of(&self.path, error);
+        let there = file.metadata().map_err(failed)?;
+        let present = (there.dev(), there.ino()) == self.identity && there.nlink() > 0;
         if present { Ok(()) } else { Err(NodeError::Missing(self.path.clone())) }
     }
 
     /// Takes the launch's place and every participant's; none when somebody has one of them. So nobody can join or launch
     /// until the result is dropped.
     pub(crate) fn keep_all_out(&self) -> Result<Option<File>, NodeError> {
-        let failed = |error| NodeError::Io(self.path.clone(), error);
+        let failed = |error| NodeError::of(&self.path, error);
         let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
         // The launch's first: on a node that runs nothing else is taken, not even for a moment in which somebody wants to join.
         for byte in std::iter::once(LAUNCH_BYTE).chain(0..PARTICIPANTS_MAX as u64) {
@@ -321,14 +360,16 @@ impl RegistryLock {
 
     /// The same, with less patience; with none it is tried once.
     pub(crate) fn take_within(path: &Path, patience: Duration) -> Result<Self, NodeError> {
-        let failed = |error| NodeError::Io(path.into(), error);
+        let failed = |error| NodeError::of(path, error);
         let file = open_shared(&path.join("node"), false).map_err(failed)?;
         let start = Instant::now();
+        let mut pause = REGISTRY_PAUSE;
         while !lock::try_lock(&file, REGISTRY_BYTE).map_err(failed)? {
             if patience.is_zero() || start.elapsed() > patience {
                 return Err(NodeError::Busy(path.into()));
             }
-            std::thread::sleep(Duration::from_micros(200));
+            std::thread::sleep(pause);
+            pause = (pause * 2).min(REGISTRY_PAUSE_MAX);
         }
         Ok(Self { file })
     }
@@ -340,49 +381,22 @@ impl Drop for RegistryLock {
     }
 }
 
-/// Opens a file of the node's directory, never through a link. A new file may be used by whom the directory's mode lets in.
-pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    options.read(true).write(true).mode(0o600).custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW);
-    if !create {
-        return options.open(path);
-    }
-    match options.clone().create_new(true).open(path) {
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => options.open(path),
-        Err(error) => Err(error),
-        Ok(file) => {
-            let around = path.parent().map_or(Ok(0o700), |folder| fs::metadata(folder).map(|found| found.mode()))?;
-            // By the file, not by its name: neither the umask nor anybody else has a say.
-            file.set_permissions(fs::Permissions::from_mode(around & 0o666))?;
-            Ok(file)
-        }
-    }
-}
-
-/// The layout version that a node's file was made with, if it is whole and not ours. Every version begins its files with
+/// Whether a node's file is finished; false when it was just begun, or its maker died. Every version begins its files with
 /// the magic number, which is written last, and its version.
-fn other_version(file: &File) -> Option<u32> {
-    let (mut magic, mut version) = ([0; 8], [0; 4]);
-    file.read_exact_at(&mut magic, 0).ok()?;
-    file.read_exact_at(&mut version, 8).ok()?;
-    let version = u32::from_ne_bytes(version);
-    (u64::from_ne_bytes(magic) == MAGIC && version != VERSION).then_some(version)
-}
-
-/// Opens a file of the node's directory to look at it: never through a link, never waiting for a pipe's other end.
-pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
-    let flags = libc::O_CLOEXEC | libc::O_NOFOLLOW | libc::O_NONBLOCK;
-    OpenOptions::new().read(true).custom_flags(flags).open(path)
-}
-
-/// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later.
-pub(crate) fn allocate(file: &File, bytes: usize) -> io::Result<()> {
-    let length = libc::off_t::try_from(bytes).map_err(|_| io::ErrorKind::InvalidInput)?;
-    loop {
-        match nix::fcntl::posix_fallocate(file, 0, length) {
-            // A signal came; its handler has run.
-            Err(nix::errno::Errno::EINTR) => {}
-            result => return Ok(result?),
-        }
+fn is_whole(path: &Path, file: &File) -> Result<bool, NodeError> {
+    let failed = |error| NodeError::of(path, error);
+    let (there, mut magic, mut version) = (file.metadata().map_err(failed)?, [0; 8], [0; 4]);
+    match there.len() {
+        0 if there.is_file() => return Ok(false),
+        12.. if there.is_file() => {}
+        _ => return Err(NodeError::Damaged(path.into())),
+    }
+    file.read_exact_at(&mut magic, 0).map_err(failed)?;
+    file.read_exact_at(&mut version, 8).map_err(failed)?;
+    match (u64::from_ne_bytes(magic), u32::from_ne_bytes(version)) {
+        (0, _) => Ok(false),
+        (MAGIC, VERSION) if there.len() >= size_of::<NodePage>() as u64 => Ok(true),
+        (MAGIC, other) if other != VERSION => Err(NodeError::Version(path.into(), other)),
+        _ => Err(NodeError::Damaged(path.into())),
     }
 }

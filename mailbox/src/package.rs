@@ -158,25 +158,23 @@ impl Head {
         let Some(b) = bytes.first_chunk::<HEAD_BYTES>() else {
             return Err(Short { have: bytes.len(), need: HEAD_BYTES });
         };
-        let options = Options(b[15]);
-        let big = options.has(Options::BIG_ENDIAN);
-        let word = |at: usize| {
-            let four = [b[at], b[at + 1], b[at + 2], b[at + 3]];
-            if big { u32::from_be_bytes(four) } else { u32::from_le_bytes(four) }
-        };
-        let half = |at: usize| {
-            let two = [b[at], b[at + 1]];
-            if big { u16::from_be_bytes(two) } else { u16::from_le_bytes(two) }
-        };
-        Ok(Self {
-            to: Name::from_raw(word(0)),
-            from: Name::from_raw(word(4)),
-            len: half(8),
-            kind: Type(half(10).cast_signed()),
-            id: half(12),
-            priority: Priority(b[14]),
-            options: options.without(Options::BIG_ENDIAN),
+        Ok(if Options(b[15]).has(Options::BIG_ENDIAN) {
+            Self::parse(b, u32::from_be_bytes, u16::from_be_bytes)
+        } else {
+            Self::parse(b, u32::from_le_bytes, u16::from_le_bytes)
         })
+    }
+
+    fn parse(b: &[u8; HEAD_BYTES], word: impl Fn([u8; 4]) -> u32, half: impl Fn([u8; 2]) -> u16) -> Self {
+        Self {
+            to: Name::from_raw(word([b[0], b[1], b[2], b[3]])),
+            from: Name::from_raw(word([b[4], b[5], b[6], b[7]])),
+            len: half([b[8], b[9]]),
+            kind: Type(half([b[10], b[11]]).cast_signed()),
+            id: half([b[12], b[13]]),
+            priority: Priority(b[14]),
+            options: Options(b[15]).without(Options::BIG_ENDIAN),
+        }
     }
 }
 

@@ -2,9 +2,10 @@
 
 use crate::doorbell;
 use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX};
+use crate::files::open_shared;
 use crate::lock;
 use crate::name::Name;
-use crate::node::{Node, NodeError, open_shared};
+use crate::node::{Node, NodeError};
 use crate::step::step;
 use crate::traffic::Table;
 use crate::word::Claimant;
@@ -32,7 +33,7 @@ impl Participant {
     /// # Errors
     /// [`NodeError::Crowded`] when there is none.
     pub fn join(node: &Arc<Node>, module: Name) -> Result<Arc<Self>, NodeError> {
-        let failed = |error| NodeError::Io(node.path().into(), error);
+        let failed = |error| NodeError::of(node.path(), error);
         let file = open_shared(&node.path().join("node"), false).map_err(failed)?;
         for participant in 0..PARTICIPANTS_MAX as u16 {
             if !lock::try_lock(&file, u64::from(participant)).map_err(failed)? {

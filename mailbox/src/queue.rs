@@ -3,6 +3,7 @@
 //! Holds hints only, one entry a slot: the word is asked again, by compare-and-swap, when a package is taken. Everything
 //! is allocated at the start.
 
+use crate::name::Priority;
 use crate::slots::{HINT_WORDS, Slots, Taken};
 use crate::sync::Ordering;
 use crate::word::Word;
@@ -11,6 +12,9 @@ use crate::word::Word;
 /// setting it.
 const RESCAN_EVERY: u32 = 16;
 const ABSENT: u16 = u16::MAX;
+
+/// A level above all priorities: nothing is received without a look at the hints.
+const NO_LEVEL: u16 = 256;
 
 /// A binary heap of the ready slots that are known, and the hints that must wait for the next look.
 pub(crate) struct Queue {
@@ -22,11 +26,14 @@ pub(crate) struct Queue {
     /// pass its first.
     deferred: [u64; HINT_WORDS],
     receives: u32,
+    /// What senders were told: who sends something above this alerts.
+    level: u16,
 }
 
 impl Queue {
     pub(crate) fn new(count: usize) -> Self {
-        Self { heap: Vec::with_capacity(count), place: vec![ABSENT; count], deferred: [0; HINT_WORDS], receives: 0 }
+        let (heap, place) = (Vec::with_capacity(count), vec![ABSENT; count]);
+        Self { heap, place, deferred: [0; HINT_WORDS], receives: 0, level: NO_LEVEL }
     }
 
     /// Packages known to wait.
@@ -45,20 +52,52 @@ impl Queue {
         if self.receives.is_multiple_of(RESCAN_EVERY) {
             self.defer((self.receives / RESCAN_EVERY) as usize % slots.count());
         }
-        // One more look only if nothing of the first was old enough; going on until nothing new comes would have no bound.
-        for _ in 0..2 {
-            self.look(slots);
-            while let Some((seen, slot)) = self.pop() {
-                // Displaced since it was seen: the entry is dropped; whoever fills the slot hints again.
-                if let Some(taken) = slots.take(slot, seen) {
-                    return Some(taken);
-                }
+        let mut known = self.knows_the_first(slots);
+        // Each turn but the last drops an entry whose package was displaced or replaced since it was seen; that as often as there are
+        // slots is more bad luck than going on forever for.
+        for _ in 0..=slots.count() {
+            if !known {
+                self.look_for_the_first(slots);
             }
-            if !self.may_have_more(slots) {
-                return None;
+            let (seen, slot) = self.pop()?;
+            if let Some(taken) = slots.take(slot, seen) {
+                return Some(taken);
             }
+            // Whoever fills the slot hints again; and what took its place may stand before all others.
+            known = false;
         }
         None
+    }
+
+    /// Whether the first of the heap is the first of all: nobody has alerted, and it is of the level or above.
+    fn knows_the_first(&self, slots: &Slots<'_>) -> bool {
+        let first = self.heap.first();
+        first.is_some_and(|(word, _)| u16::from(word.priority().0) >= self.level) && !slots.is_alerted()
+    }
+
+    /// Looks at the hints, and tells senders of what priority the first is, if that is another than before.
+    fn look_for_the_first(&mut self, slots: &Slots<'_>) {
+        if slots.is_alerted() {
+            slots.heed();
+        }
+        self.look(slots);
+        if let Some(first) = self.first()
+            && u16::from(first.0) < self.level
+        {
+            slots.lower_level(first);
+            self.level = first.0.into();
+            self.look(slots);
+        }
+        if let Some(first) = self.first()
+            && u16::from(first.0) > self.level
+        {
+            slots.raise_level(first);
+            self.level = first.0.into();
+        }
+    }
+
+    fn first(&self) -> Option<Priority> {
+        self.heap.first().map(|(word, _)| word.priority())
     }
 
     /// Treats every slot as hinted at the next look: after adoption, and when somebody died.
@@ -70,14 +109,25 @@ impl Queue {
         self.deferred[slot / 64] |= 1 << (slot % 64);
     }
 
-    /// Moves what the hints speak of into the heap.
+    /// Moves what the hints speak of into the heap: with a package all that its sender published before it.
     pub(crate) fn look(&mut self, slots: &Slots<'_>) {
+        self.collect(slots, u64::MAX);
+        // ORDERING: the words were read with Acquire. Who published one of them had hinted its earlier ones before; those hints
+        // were among the swapped ones, or are seen here.
+        if !slots.any_hint() {
+            return;
+        }
+        // Senders are quick, and going on until nothing new comes would have no bound. Of what comes now, only what was published
+        // before this.
         // ORDERING: Acquire; pairs with the fetch_add of `publish`: all that a sender hinted before its package T is seen below.
-        let horizon = slots.hot.ticket.load(Ordering::Acquire);
-        for i in 0..slots.count().div_ceil(64) {
-            let hints = &slots.hot.ready[i];
+        let horizon = slots.hot.ticket.0.load(Ordering::Acquire);
+        self.collect(slots, horizon);
+    }
+
+    fn collect(&mut self, slots: &Slots<'_>, horizon: u64) {
+        for (i, hints) in slots.hot.ready.0[..slots.count().div_ceil(64)].iter().enumerate() {
             // Looked at before it is swapped, so that an idle line stays shared.
-            let fresh = if hints.load(Ordering::Relaxed) == 0 { 0 } else { hints.swap(0, Ordering::AcqRel) };
+            let fresh = if hints.load(Ordering::SeqCst) == 0 { 0 } else { hints.swap(0, Ordering::AcqRel) };
             let mut bits = fresh | std::mem::take(&mut self.deferred[i]);
             while bits != 0 {
                 let slot = i * 64 + bits.trailing_zeros() as usize;
@@ -86,6 +136,7 @@ impl Queue {
                     break;
                 }
                 bits &= bits - 1;
+                slots.expect_package(slot);
                 let word = slots.load(slot);
                 if !word.is_ready() {
                     continue;

@@ -2,7 +2,7 @@
 
 use crate::clock::monotonic_ns;
 use crate::counters::Loss;
-use crate::layout::Shape;
+use crate::layout::{Shape, stored_ns};
 use crate::lock::Held;
 use crate::name::Name;
 use crate::package::{Head, Options};
@@ -12,10 +12,9 @@ use crate::registry;
 use crate::segment::Segment;
 use crate::slots::Taken;
 use crate::step::step;
-use crate::waiting::{Waiting, wait_any};
+use crate::waiting::{Waiting, wait};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 /// When a slot was still being filled at the last search, the next one comes after so many receives and waits.
 const SEARCH_AGAIN: u32 = 64;
@@ -26,6 +25,8 @@ pub struct Receiver {
     participant: Arc<Participant>,
     segment: Segment,
     queue: Queue,
+    /// What waited longer is dropped.
+    max_age_ns: u64,
     /// The node's count of deaths when the slots were last searched for what the dead left.
     deaths_seen: u32,
     /// Receives and waits until the slots are searched again, because one was still being filled after the last search.
@@ -38,7 +39,8 @@ impl Receiver {
     pub(crate) fn new(participant: Arc<Participant>, segment: Segment, lock: Held) -> Self {
         let queue = Queue::new(usize::from(segment.shape.slots));
         let deaths_seen = participant.node().page().deaths.load(Ordering::Acquire);
-        let mut receiver = Self { participant, segment, queue, deaths_seen, search_in: None, _lock: lock };
+        let max_age_ns = segment.shape.max_age.map_or(u64::MAX, stored_ns);
+        let mut receiver = Self { participant, segment, queue, max_age_ns, deaths_seen, search_in: None, _lock: lock };
         receiver.search();
         receiver
     }
@@ -60,31 +62,31 @@ impl Receiver {
 
     /// The most important package, if there is one.
     pub fn try_receive(&mut self) -> Option<Package<'_>> {
-        let taken = self.next()?;
-        Some(Package::new(self, taken))
+        let in_hand = self.next()?;
+        Some(Package { segment: &self.segment, in_hand })
     }
 
     /// The most important package; sleeps until there is one.
     pub fn receive(&mut self) -> Package<'_> {
         loop {
-            if let Some(taken) = self.next() {
-                return Package::new(self, taken);
+            if let Some(in_hand) = self.next() {
+                return Package { segment: &self.segment, in_hand };
             }
-            wait_any(&mut [self], Waiting::default(), || false);
+            self.wait(Waiting::default());
         }
     }
 
-    /// The most important package; waits until there is one, at most for a timeout ([`Duration`]) or as a [`Waiting`] says.
+    /// The most important package; waits until there is one, at most for a timeout ([`Duration`](std::time::Duration)) or as a [`Waiting`] says.
     pub fn receive_timeout(&mut self, waiting: impl Into<Waiting>) -> Option<Package<'_>> {
         let waiting = waiting.into();
         loop {
-            if let Some(taken) = self.next() {
-                return Some(Package::new(self, taken));
+            if let Some(in_hand) = self.next() {
+                return Some(Package { segment: &self.segment, in_hand });
             }
             if waiting.is_over() {
                 return None;
             }
-            wait_any(&mut [self], waiting, || false);
+            self.wait(waiting);
         }
     }
 
@@ -107,8 +109,12 @@ impl Receiver {
         lost
     }
 
+    fn wait(&mut self, waiting: Waiting) {
+        wait(&mut [self], None, waiting, || false, |sleep| sleep());
+    }
+
     /// Takes the next package that is not too old.
-    fn next(&mut self) -> Option<Taken> {
+    fn next(&mut self) -> Option<InHand> {
         self.search_if_due();
         let slots = self.segment.slots();
         loop {
@@ -119,11 +125,14 @@ impl Receiver {
                 depth_max.store(depth, Ordering::Relaxed);
             }
             // SAFETY: just taken, and freed only below or by its guard.
-            let (published_ns, _, body) = unsafe { self.segment.read(taken.slot) };
-            let waited = Duration::from_nanos(monotonic_ns().saturating_sub(published_ns));
-            if self.segment.shape.max_age.is_none_or(|max| waited <= max) {
-                self.segment.page().counters.received(taken.word.priority(), waited, body.len());
-                return Some(taken);
+            let (published_ns, mut head) = unsafe { self.segment.read_head(taken.slot) };
+            let waited_ns = monotonic_ns().saturating_sub(published_ns);
+            if waited_ns <= self.max_age_ns {
+                self.segment.page().counters.received(taken.word.priority(), waited_ns, head.len.into());
+                if taken.word.is_redelivered() {
+                    head.options = head.options.with(Options::REDELIVERED);
+                }
+                return Some(InHand { taken, head, published_ns });
             }
             self.segment.page().counters.lost(taken.word.priority(), Loss::Stale, 1);
             slots.release(taken);
@@ -183,49 +192,50 @@ impl Receiver {
         self.segment.slots().awake();
     }
 
+    /// Has the line of the hints come here before it is looked at, and stay.
+    pub(crate) fn expect(&self) {
+        self.segment.slots().expect_hints();
+    }
+
     pub(crate) fn may_have(&self) -> bool {
         self.queue.may_have_more(&self.segment.slots())
             || self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen
     }
 }
 
-/// A package in hand, read where it lies. Dropped, its slot is free.
-pub struct Package<'a> {
-    segment: &'a Segment,
+/// A taken slot, and what its prefix says.
+struct InHand {
     taken: Taken,
     head: Head,
     published_ns: u64,
 }
 
-impl<'a> Package<'a> {
-    fn new(receiver: &'a Receiver, taken: Taken) -> Self {
-        // SAFETY: taken, and freed only when this guard drops.
-        let (published_ns, mut head, _) = unsafe { receiver.segment.read(taken.slot) };
-        if taken.word.is_redelivered() {
-            head.options = head.options.with(Options::REDELIVERED);
-        }
-        Self { segment: &receiver.segment, taken, head, published_ns }
-    }
+/// A package in hand, read where it lies. Dropped, its slot is free.
+pub struct Package<'a> {
+    segment: &'a Segment,
+    in_hand: InHand,
+}
 
+impl Package<'_> {
     /// Its head; the option `redelivered` tells that an earlier receiver died with it in hand.
     pub fn head(&self) -> &Head {
-        &self.head
+        &self.in_hand.head
     }
 
     /// Its body.
     pub fn body(&self) -> &[u8] {
         // SAFETY: taken, and freed only when `self` drops.
-        unsafe { self.segment.read(self.taken.slot) }.2
+        unsafe { self.segment.body(self.in_hand.taken.slot, self.in_hand.head.len) }
     }
 
     /// When it was published, on the monotonic clock.
     pub fn published_ns(&self) -> u64 {
-        self.published_ns
+        self.in_hand.published_ns
     }
 }
 
 impl Drop for Package<'_> {
     fn drop(&mut self) {
-        self.segment.slots().release(self.taken);
+        self.segment.slots().release(self.in_hand.taken);
     }
 }

@@ -1,27 +1,30 @@
-//! Making, adopting, replacing, listing and removing mailboxes: the files of a node's directory are the registry.
+//! Making, adopting, replacing and removing mailboxes (`inspect` looks at them): the files of a node's directory are the registry.
 //!
 //! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A file
 //! gets its name last, whole; so nobody ever opens half a mailbox.
 
 use crate::about;
-use crate::counters::{ClassTraffic, Loss};
+use crate::counters::Loss;
+use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{Shape, ShapeError};
-use crate::lock::{self, Held};
+use crate::lock::Held;
+use crate::memory::Use;
 use crate::name::Name;
-use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock, allocate, open_shared};
+use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock};
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;
-use crate::segment::{BadSegment, Segment, name_of, path_of};
+use crate::segment::{BadSegment, Segment, path_of};
 use crate::step::step;
 use std::fs;
 use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// The byte of a segment's file that its owner locks.
-const OWNER_BYTE: u64 = 0;
+pub(crate) const OWNER_BYTE: u64 = 0;
 
 /// Why a mailbox could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -39,17 +42,46 @@ pub enum CreateError {
     Owned(Name, u32),
     /// The node cannot be used.
     #[error(transparent)]
-    Node(#[from] NodeError),
+    Node(NodeError),
     /// No memory, most likely.
-    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is /dev/shm full (df /dev/shm)?")]
+    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is it full (df {})?", .node.display())]
     Memory {
         /// Which mailbox.
         name: Name,
         /// How much it needs.
         bytes: usize,
+        /// The node's directory.
+        node: PathBuf,
         /// What the system said.
         source: io::Error,
     },
+    /// As many files are open as may be.
+    #[error(
+        "mailbox {0}: this process, or the computer, has no file descriptor left, and each mailbox that a process receives \
+         from takes one; raise the limit (ulimit -n, or LimitNOFILE= of a service), or use several processes"
+    )]
+    Descriptors(Name),
+    /// Its file cannot be used.
+    #[error("mailbox {0}: its file {1}: {2}")]
+    File(Name, PathBuf, io::Error),
+}
+
+impl CreateError {
+    /// What the system said of a mailbox's file, which lies in the node's directory.
+    fn of(file: &Path, name: Name, shape: &Shape, source: io::Error) -> Self {
+        if is_lack_of_memory(&source) {
+            let node = file.parent().unwrap_or(file).into();
+            return Self::Memory { name, bytes: shape.segment_bytes(), node, source };
+        }
+        if is_lack_of_descriptors(&source) {
+            return Self::Descriptors(name);
+        }
+        Self::File(name, file.into(), source)
+    }
+
+    fn of_node(name: Name, error: NodeError) -> Self {
+        if matches!(error, NodeError::Descriptors(_)) { Self::Descriptors(name) } else { Self::Node(error) }
+    }
 }
 
 impl Participant {
@@ -64,7 +96,8 @@ impl Participant {
         }
         shape.check().map_err(|error| CreateError::Shape(name, error))?;
         let shape = shape.as_stored();
-        let _registry = RegistryLock::take(self.node().path())?;
+        let taken = RegistryLock::take(self.node().path());
+        let _registry = taken.map_err(|error| CreateError::of_node(name, error))?;
         let (segment, lock) = match self.take_over(name, shape)? {
             Predecessor::Same(segment, lock) => (segment, lock),
             Predecessor::Other(old) => self.make(name, shape, Some(&old))?,
@@ -77,26 +110,24 @@ impl Participant {
         owner.pid.store(std::process::id(), Ordering::Relaxed);
         // ORDERING: Release; a sender that sees `sleeping` set by this owner sees whose bell to ring.
         owner.participant.store(u32::from(self.claimant().participant), Ordering::Release);
-        // Refused when the memlock limit is small; the pages are present all the same.
-        let _ = segment.lock_in_memory();
         Ok(Receiver::new(self.clone(), segment, lock))
     }
 
     /// Looks at what is there, as its owner, and adopts it if it is the same.
     fn take_over(&self, name: Name, shape: Shape) -> Result<Predecessor, CreateError> {
         let path = path_of(self.node().path(), name);
-        let memory = |source| CreateError::Memory { name, bytes: shape.segment_bytes(), source };
+        let failed = |source| CreateError::of(&path, name, &shape, source);
         let file = match open_shared(&path, false) {
             Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
-            Err(error) => return Err(memory(error)),
+            Err(error) => return Err(failed(error)),
         };
-        let old = match Segment::check(&file, name) {
+        let old = match Segment::check(&file, name, Use::Keep) {
             Ok(old) => Some(old),
             Err(BadSegment::Foreign | BadSegment::Version(_)) => None,
-            Err(BadSegment::Io(error)) => return Err(memory(error)),
+            Err(BadSegment::Io(error)) => return Err(failed(error)),
         };
-        let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(memory)? else {
+        let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else {
             let pid = old.map_or(0, |old| old.page().owner.pid.load(Ordering::Relaxed));
             return Err(CreateError::Owned(name, pid));
         };
@@ -132,7 +163,7 @@ impl Participant {
                 let counters = &segment.page().counters;
                 counters.carry_over(&old.page().counters);
                 // Not the old one's tickets: those of packages that their senders took back were never accepted.
-                segment.page().hot.ticket.store(counters.accepted(), Ordering::Relaxed);
+                segment.page().hot.ticket.0.store(counters.accepted(), Ordering::Relaxed);
                 step!("create: carried over");
             }
             fs::rename(&unfinished, &path)?;
@@ -141,7 +172,7 @@ impl Participant {
         };
         made().map_err(|source| {
             let _ = fs::remove_file(&unfinished);
-            CreateError::Memory { name, bytes: shape.segment_bytes(), source }
+            CreateError::of(&unfinished, name, &shape, source)
         })
     }
 }
@@ -183,62 +214,7 @@ fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeE
     Ok(())
 }
 
-/// A mailbox seen from outside. Looking changes nothing.
-#[derive(Clone, Debug)]
-pub struct MailboxInfo {
-    /// Its name.
-    pub name: Name,
-    /// Its shape.
-    pub shape: Shape,
-    /// Process that receives, if one does now.
-    pub owner: Option<u32>,
-    /// Times a new owner took over.
-    pub adoptions: u32,
-    /// Packages that wait or are in hand now.
-    pub depth: u32,
-    /// Most that its receiver ever found waiting.
-    pub depth_max: u32,
-    /// Packages ever accepted; after a sender was killed in the act, one more.
-    pub sent: u64,
-    /// By class: received, lost, latency.
-    pub classes: Vec<ClassTraffic>,
-}
-
 impl Node {
-    /// Names of all mailboxes of this node, in order.
-    ///
-    /// # Errors
-    /// When its directory cannot be read.
-    pub fn mailboxes(&self) -> Result<Vec<Name>, NodeError> {
-        let failed = |error| NodeError::Io(self.path().into(), error);
-        let entries = fs::read_dir(self.path()).map_err(failed)?;
-        let mut names: Vec<Name> = entries.filter_map(|entry| name_of(&entry.ok()?.path())).collect();
-        names.sort_unstable();
-        Ok(names)
-    }
-
-    /// A mailbox as it is now; none when it does not exist (any more).
-    pub fn look_at(&self, name: Name) -> Option<MailboxInfo> {
-        let (segment, file) = Segment::look_at(self.path(), name).ok()?;
-        let page = segment.page();
-        let slots = segment.slots();
-        let waits = |slot: &usize| {
-            use crate::word::State;
-            matches!(slots.load(*slot).state(), State::Ready | State::Taken)
-        };
-        let owned = lock::is_locked(&file, OWNER_BYTE).unwrap_or(false);
-        Some(MailboxInfo {
-            name,
-            shape: segment.shape,
-            owner: owned.then(|| page.owner.pid.load(Ordering::Relaxed)),
-            adoptions: page.owner.adoptions.load(Ordering::Relaxed),
-            depth: (0..slots.count()).filter(waits).count() as u32,
-            depth_max: page.owner.depth_max.load(Ordering::Relaxed),
-            sent: page.hot.ticket.load(Ordering::Relaxed),
-            classes: page.counters.read(),
-        })
-    }
-
     /// Removes a mailbox that nobody owns; false when somebody does, or it is gone.
     ///
     /// # Errors
@@ -260,7 +236,7 @@ impl Node {
         let failed = |error| NodeError::Io(path.clone(), error);
         let registry = RegistryLock::take_within(self.path(), patience)?;
         let Ok(file) = open_shared(&path, false) else { return Ok(false) };
-        let old = Segment::check(&file, name);
+        let old = Segment::check(&file, name, Use::Share);
         let Some(_owner) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else { return Ok(false) };
         if let Ok(old) = old {
             retire(&old);

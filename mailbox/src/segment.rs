@@ -1,14 +1,15 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
 use crate::clock::monotonic_ns;
-use crate::layout::{Page, SLOT_PREFIX, Shape, VERSION};
-use crate::memory::Mapping;
+use crate::files::{open_shared, open_to_read};
+use crate::layout::{Identity, Page, SLOT_PREFIX, Shape, VERSION};
+use crate::memory::{Mapping, Use};
 use crate::name::Name;
-use crate::node::{open_shared, open_to_read};
 use crate::package::{HEAD_BYTES, Head};
-use crate::slots::Slots;
+use crate::slots::{Bodies, Slots};
 use std::fs::File;
 use std::io;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
 
@@ -17,6 +18,10 @@ pub(crate) struct Segment {
     mapping: Mapping,
     pub(crate) name: Name,
     pub(crate) shape: Shape,
+    /// What the shape says, worked out once.
+    word_stride: usize,
+    slots_offset: usize,
+    slot_bytes: usize,
 }
 
 /// Why a file is not the mailbox it should be.
@@ -50,63 +55,70 @@ pub(crate) fn name_of(path: &Path) -> Option<Name> {
 impl Segment {
     /// Maps a file that was just made, and writes what it is.
     pub(crate) fn format(file: &File, name: Name, shape: Shape) -> io::Result<Self> {
-        let mapping = Mapping::new(file, shape.segment_bytes(), true)?;
-        let segment = Self { mapping, name, shape };
+        let segment = Self::new(Mapping::new(file, shape.segment_bytes(), Use::Keep)?, name, shape);
         segment.page().identity.write(name, &shape);
         Ok(segment)
     }
 
     /// Maps the mailbox of this name as it stands.
     pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
-        Self::check(&open_shared(&path_of(node, name), false)?, name)
+        Self::check(&open_shared(&path_of(node, name), false)?, name, Use::Share)
     }
 
     /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.
     pub(crate) fn look_at(node: &Path, name: Name) -> Result<(Self, File), BadSegment> {
         let file = open_to_read(&path_of(node, name))?;
         let shape = Self::identify(&file, name)?;
-        Ok((Self { mapping: Mapping::new(&file, shape.slots_offset(), false)?, name, shape }, file))
+        Ok((Self::new(Mapping::new(&file, shape.slots_offset(), Use::Look)?, name, shape), file))
     }
 
     /// Maps a file and checks that it is this mailbox, whole.
-    pub(crate) fn check(file: &File, name: Name) -> Result<Self, BadSegment> {
+    pub(crate) fn check(file: &File, name: Name, used: Use) -> Result<Self, BadSegment> {
         let shape = Self::identify(file, name)?;
-        Ok(Self { mapping: Mapping::new(file, shape.segment_bytes(), true)?, name, shape })
+        Ok(Self::new(Mapping::new(file, shape.segment_bytes(), used)?, name, shape))
     }
 
+    fn new(mapping: Mapping, name: Name, shape: Shape) -> Self {
+        let (word_stride, slots_offset, slot_bytes) = (shape.word_stride(), shape.slots_offset(), shape.slot_bytes());
+        Self { mapping, name, shape, word_stride, slots_offset, slot_bytes }
+    }
+
+    /// What a file says that it is. Read, not mapped: a map costs more than all of the rest.
     fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
-        if file.metadata()?.len() < size_of::<Page>() as u64 {
+        let there = file.metadata()?;
+        if !there.is_file() || there.len() < size_of::<Page>() as u64 {
             return Err(BadSegment::Foreign);
         }
-        let front = Mapping::new(file, size_of::<Page>(), false)?;
-        let identity = &front.at::<Page>(0).identity;
+        let mut first = [0; size_of::<Identity>()];
+        file.read_exact_at(&mut first, 0)?;
+        let identity = Identity::from_bytes(&first);
         if let Some(other) = identity.other_version() {
             return Err(BadSegment::Version(other));
         }
         let (found, shape) = identity.read().ok_or(BadSegment::Foreign)?;
-        if found != name || file.metadata()?.len() < shape.segment_bytes() as u64 {
+        if found != name || there.len() < shape.segment_bytes() as u64 {
             return Err(BadSegment::Foreign);
         }
         Ok(shape)
     }
 
-    pub(crate) fn lock_in_memory(&self) -> bool {
-        self.mapping.lock_in_memory()
-    }
-
+    #[inline]
     pub(crate) fn page(&self) -> &Page {
         self.mapping.at(0)
     }
 
+    #[inline]
     pub(crate) fn slots(&self) -> Slots<'_> {
-        let words = self.mapping.slice(crate::layout::PAGE, self.shape.words());
-        Slots::new(&self.page().hot, words, self.shape.word_stride(), usize::from(self.shape.slots))
+        let slots = usize::from(self.shape.slots);
+        let words = self.mapping.slice(crate::layout::PAGE, slots * self.word_stride);
+        let bodies = Bodies { first: self.mapping.bytes_at(self.slots_offset, 0).as_ptr(), bytes: self.slot_bytes };
+        Slots::new(&self.page().hot, words, self.word_stride, slots, bodies)
     }
 
+    #[inline]
     fn slot(&self, slot: usize) -> NonNull<u8> {
         assert!(slot < usize::from(self.shape.slots));
-        let bytes = self.shape.slot_bytes();
-        self.mapping.bytes_at(self.shape.slots_offset() + slot * bytes, bytes)
+        self.mapping.bytes_at(self.slots_offset + slot * self.slot_bytes, self.slot_bytes)
     }
 
     /// The body of a slot, to write.
@@ -128,6 +140,7 @@ impl Segment {
     ///
     /// # Safety
     /// As for [`Segment::body_mut`].
+    #[inline]
     pub(crate) unsafe fn write_head(&self, slot: usize, head: &Head) -> u64 {
         let (prefix, now_ns) = (self.slot(slot), monotonic_ns());
         // SAFETY: inside the slot and aligned (slots start at multiples of 64); the claim makes it ours alone.
@@ -138,20 +151,29 @@ impl Segment {
         now_ns
     }
 
-    /// When a slot's package was published (monotonic ns), its head, and its body.
+    /// When a slot's package was published (monotonic ns), and its head, whose length is one that the slot has room for.
     ///
     /// # Safety
-    /// The caller has taken this slot, and does not free it while the result lives.
-    pub(crate) unsafe fn read(&self, slot: usize) -> (u64, Head, &[u8]) {
+    /// The caller has taken this slot.
+    #[inline]
+    pub(crate) unsafe fn read_head(&self, slot: usize) -> (u64, Head) {
         let prefix = self.slot(slot);
         // SAFETY: inside the slot and aligned; taken, so nobody writes it.
         let (published_ns, head) =
             unsafe { (prefix.cast::<u64>().read(), prefix.add(8).cast::<[u8; HEAD_BYTES]>().read()) };
         // Sixteen bytes are always a head; its length is only believed as far as the slot goes.
         let head = Head::from_bytes(&head).unwrap_or_default();
-        let len = head.len.min(self.shape.body_bytes_max);
-        // SAFETY: as above; `len` stays inside the slot.
-        let body = unsafe { std::slice::from_raw_parts(prefix.add(SLOT_PREFIX).as_ptr(), usize::from(len)) };
-        (published_ns, Head { len, ..head }, body)
+        (published_ns, Head { len: head.len.min(self.shape.body_bytes_max), ..head })
+    }
+
+    /// The first `len` bytes of a slot's body.
+    ///
+    /// # Safety
+    /// The caller has taken this slot, and does not free it while the result lives.
+    #[inline]
+    pub(crate) unsafe fn body(&self, slot: usize, len: u16) -> &[u8] {
+        let len = usize::from(len.min(self.shape.body_bytes_max));
+        // SAFETY: `len` stays inside the slot; taken, so nobody writes it.
+        unsafe { std::slice::from_raw_parts(self.slot(slot).add(SLOT_PREFIX).as_ptr(), len) }
     }
 }

@@ -10,6 +10,7 @@ use crate::segment::{BadSegment, Segment};
 use crate::slots::{Claim, NoSlot, Published};
 use crate::step::step;
 use crate::traffic::{Key, Writer};
+use crate::word::Claimant;
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.
@@ -69,11 +70,59 @@ impl Label {
     }
 }
 
+/// Where a sender looks for a free slot first.
+///
+/// As long as the receiver keeps up, in few slots by turns: their lines are still in the caches of both, and the next can be
+/// fetched while the receiver reads the last. When these are in use, onwards through all, so that a long queue is not searched
+/// for each package anew.
+struct Place {
+    /// The slot that the next search begins with, if it is not for the home.
+    cursor: usize,
+    /// First of the few. Senders have different ones, so that they meet less.
+    home: usize,
+    /// Which of the few is next.
+    turn: usize,
+    /// Searches until the home is tried again.
+    away: u32,
+}
+
+impl Place {
+    /// So many slots make a home.
+    const HOME: usize = 4;
+    /// So many searches the home is left alone when its next slot was in use.
+    const AWAY: u32 = 32;
+
+    fn of(me: Claimant) -> Self {
+        let home = usize::from(me.participant) * 7;
+        Self { cursor: home, home, turn: 0, away: 0 }
+    }
+
+    /// The slot that will be looked at first.
+    fn next(&self) -> usize {
+        if self.away == 0 { self.home + self.turn } else { self.cursor }
+    }
+
+    fn first(&mut self) -> &mut usize {
+        self.cursor = self.next();
+        &mut self.cursor
+    }
+
+    fn found(&mut self, slot: usize, count: usize) {
+        if self.away > 0 {
+            self.away -= 1;
+        } else if slot == (self.home + self.turn) % count {
+            self.turn = (self.turn + 1) % Self::HOME;
+        } else {
+            self.away = Self::AWAY;
+        }
+    }
+}
+
 /// One participant's way into one mailbox.
 pub struct Sender {
     participant: Arc<Participant>,
     segment: Segment,
-    cursor: usize,
+    place: Place,
     /// Counts what it sends.
     flows: Writer,
     /// What a newer package may replace; empty unless the mailbox is `latest`.
@@ -94,11 +143,10 @@ impl Participant {
         }
         sending.push(name);
         drop(sending);
-        // Senders start at different slots, so that they meet less.
-        let cursor = usize::from(self.claimant().participant) * 7;
+        let place = Place::of(self.claimant());
         let posts = Posts::new(&segment.shape);
         let flows = self.traffic().writer();
-        Ok(Sender { participant: self.clone(), segment, cursor, posts, flows })
+        Ok(Sender { participant: self.clone(), segment, place, posts, flows })
     }
 }
 
@@ -158,8 +206,12 @@ impl Sender {
                 return Err(SendError::TooLarge { name: self.name(), len, max });
             }
             let old = label.and_then(|label| self.posts.of(label));
-            match self.segment.slots().claim(me, &mut self.cursor, priority, self.segment.shape.full, old) {
-                Ok(claim) => return Ok(claim),
+            let slots = self.segment.slots();
+            match slots.claim(me, self.place.first(), priority, self.segment.shape.full, old) {
+                Ok(claim) => {
+                    self.place.found(claim.slot, slots.count());
+                    return Ok(claim);
+                }
                 Err(NoSlot::Full) => {
                     self.segment.page().counters.lost(priority, Loss::Refused, 1);
                     return Err(SendError::Full(self.name()));
@@ -193,6 +245,7 @@ impl Sender {
             }
             match slots.publish(claim, label.priority) {
                 Published::Accepted { posted, wake } => {
+                    slots.expect_to_fill(self.place.next());
                     self.posts.remember(label, posted, &slots);
                     if wake {
                         self.wake();

@@ -13,11 +13,11 @@
 //! | receiver, package in hand | Taken | the next owner's `adopt`: Ready, redelivered; the second time dropped as poison |
 //!
 //! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
-//! Release (C), claiming an Acquire (D). Hints, `sleeping` and `retired` are settled by the fences (E), (F), (G).
+//! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G) and (J).
 
 use crate::name::Priority;
 use crate::step::step;
-use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
+use crate::sync::{AtomicU32, AtomicU64, Ordering, fence, prefetch_to_read, prefetch_to_write, seq_cst_accesses};
 use crate::word::{Claimant, FREE, State, Victim, Word};
 
 /// Most slots that a mailbox can have.
@@ -28,18 +28,36 @@ pub(crate) const HINT_WORDS: usize = SLOTS_MAX / 64;
 /// is owed to another process that was quicker, and n looks at n slots would be n².
 const DISPLACE_LOOKS_MAX: usize = 4;
 
-/// What senders and receiver touch with every package, together in as few cache lines as can be.
-#[repr(C, align(64))]
+/// Something in cache lines of its own: 128 bytes, since processors fetch lines in pairs.
+#[repr(C, align(128))]
+pub(crate) struct Line<T>(pub(crate) T);
+
+/// What senders and receiver touch with every package, each part in lines of its own: what counts is how often a line goes from
+/// one processor to the other.
+#[repr(C)]
 pub(crate) struct Hot {
-    /// Next ticket: the order of publishing. Also the count of packages ever accepted here (one too many for each
-    /// sender that was killed between its ticket and its word).
-    pub(crate) ticket: AtomicU64,
-    /// Not 0: the receiver sleeps or is about to; ring its bell. Written by the receiver alone.
+    /// Senders': the next ticket, that is, the order of publishing. Also the count of packages ever accepted here (one too many
+    /// for each sender that was killed between its ticket and its word).
+    pub(crate) ticket: Line<AtomicU64>,
+    /// Slots that may have become ready. Hints: each is set after its word changed, and may be late or stale.
+    pub(crate) ready: Line<[AtomicU64; HINT_WORDS]>,
+    /// Written by the receiver and seldom, read by senders with every package.
+    pub(crate) receiver: Line<ReceiverSays>,
+    /// Not 0: a sender has published something above the level. Written by senders seldom, read by the receiver with every
+    /// package.
+    pub(crate) alert: Line<AtomicU32>,
+}
+
+/// What the receiver tells senders.
+#[repr(C)]
+pub(crate) struct ReceiverSays {
+    /// Not 0: it sleeps or is about to; ring its bell.
     pub(crate) sleeping: AtomicU32,
+    /// It has looked at all hints, and receives packages of this priority without looking again: who sends a more important one
+    /// says so by `alert`.
+    pub(crate) level: AtomicU32,
     /// Not 0: this mailbox has been given up; what is sent here is not received.
     pub(crate) retired: AtomicU32,
-    /// Slots that may have become ready. Hints: each is set after its word changed, and may be late or stale.
-    pub(crate) ready: [AtomicU64; HINT_WORDS],
 }
 
 /// What happens to a package that finds no free slot. The numbers stand in the segment.
@@ -87,8 +105,8 @@ pub(crate) enum NoSlot {
 pub(crate) struct Claim {
     pub(crate) slot: usize,
     word: Word,
-    /// The ticket of the package that this one replaces.
-    place: Option<u64>,
+    /// The package that this one replaces.
+    place: Option<Word>,
 }
 
 impl Claim {
@@ -143,14 +161,24 @@ pub(crate) struct Slots<'a> {
     /// Words from one slot's to the next: 8 keeps each in a cache line of its own.
     stride: usize,
     count: usize,
+    bodies: Bodies,
+}
+
+/// Where the slots' prefixes and bodies lie, so that their lines can be asked for in time. Nothing here reads them.
+#[derive(Clone, Copy)]
+pub(crate) struct Bodies {
+    pub(crate) first: *const u8,
+    /// From one slot's to the next.
+    pub(crate) bytes: usize,
 }
 
 impl<'a> Slots<'a> {
     /// # Panics
     /// When `words` are too few for `count` at `stride`; both come from a checked layout.
-    pub(crate) fn new(hot: &'a Hot, words: &'a [AtomicU64], stride: usize, count: usize) -> Self {
+    #[inline]
+    pub(crate) fn new(hot: &'a Hot, words: &'a [AtomicU64], stride: usize, count: usize, bodies: Bodies) -> Self {
         assert!(count > 0 && count <= SLOTS_MAX && words.len() > (count - 1) * stride);
-        Self { hot, words, stride, count }
+        Self { hot, words, stride, count, bodies }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -166,13 +194,14 @@ impl<'a> Slots<'a> {
     }
 
     /// ORDERING: Acquire and Release at once, (A) to (D): every change both takes over what the last one left and hands on.
+    /// SeqCst for (E).
     fn change(&self, slot: usize, from: Word, to: Word) -> bool {
-        self.word(slot).compare_exchange(from.0, to.0, Ordering::AcqRel, Ordering::Relaxed).is_ok()
+        self.word(slot).compare_exchange(from.0, to.0, Ordering::SeqCst, Ordering::Relaxed).is_ok()
     }
 
     fn hint(&self, slot: usize) {
-        // ORDERING: Release; pairs with the receiver's swap, which then sees the word this hint speaks of.
-        self.hot.ready[slot / 64].fetch_or(1 << (slot % 64), Ordering::Release);
+        // ORDERING: Release; pairs with the receiver's swap, which then sees the word this hint speaks of. SeqCst for (E).
+        self.hot.ready.0[slot / 64].fetch_or(1 << (slot % 64), Ordering::SeqCst);
     }
 
     // ---- senders ----
@@ -236,7 +265,7 @@ impl<'a> Slots<'a> {
         step!("reuse: chosen");
         let reused = self.change(old.slot, old.word, word);
         step!("reuse: claimed");
-        reused.then(|| Claim { slot: old.slot, word, place: Some(old.word.ticket()) })
+        reused.then(|| Claim { slot: old.slot, word, place: Some(old.word) })
     }
 
     /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the order:
@@ -259,7 +288,7 @@ impl<'a> Slots<'a> {
         step!("replace: marked");
         if self.change(old.slot, old.word, FREE) {
             step!("replace: freed");
-            return Some(Claim { slot: claim.slot, word: marked, place: Some(old.word.ticket()) });
+            return Some(Claim { slot: claim.slot, word: marked, place: Some(old.word) });
         }
         // It is being received, or was displaced.
         self.change(claim.slot, marked, claim.word);
@@ -272,10 +301,10 @@ impl<'a> Slots<'a> {
         let slot = claim.slot;
         // ORDERING: AcqRel, so that whoever reads the counter sees what came before the tickets it counts. A receiver that
         // reads T sees the hints of all packages that one sender published before its package T.
-        let ticket = self.hot.ticket.fetch_add(1, Ordering::AcqRel);
+        let ticket = self.hot.ticket.0.fetch_add(1, Ordering::AcqRel);
         step!("publish: ticket");
         // A ticket is taken in any case, since they count the packages. What replaces an older one stands where that one stood.
-        let word = Word::ready(priority, claim.place.unwrap_or(ticket));
+        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));
         if !self.change(slot, claim.word, word) {
             // ORDERING: Acquire; pairs with the Release of the change that was in the way: if it was `settle`'s, then
             // `retired` is seen below.
@@ -285,16 +314,26 @@ impl<'a> Slots<'a> {
         step!("publish: ready");
         self.hint(slot);
         step!("publish: hint");
-        // ORDERING (E): the hint before the looks at `sleeping` and `retired`. Pairs with (F): of a sender and a receiver
-        // that goes to sleep at least one sees the other; and with (G): of a sender and a new owner likewise.
-        fence(Ordering::SeqCst);
-        if self.is_retired() && self.change(slot, word, claim.word) {
+        // ORDERING (E): the word and the hint before the looks at what the receiver says. All are SeqCst, so they stand in this
+        // order in the one order of all such accesses. Pairs with (F): of a sender and a receiver that goes to sleep at least
+        // one sees the other; with (G): of a sender and a new owner likewise; and with (J): of a sender and a receiver that
+        // turns to less important packages likewise.
+        seq_cst_accesses();
+        let receiver = &self.hot.receiver.0;
+        if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {
             step!("publish: taken back");
             return Published::Retired;
         }
         // A retired mailbox whose word is no longer ours: somebody received it before it retired, so it was accepted.
-        let posted = Posted { slot, word };
-        Published::Accepted { posted, wake: self.hot.sleeping.load(Ordering::Acquire) != 0 }
+        // With another priority than what it replaces, and of the level, it may stand before what the receiver knows of the level.
+        let moved = claim.place.is_some_and(|old| old.priority() != priority);
+        if u32::from(priority.0) + u32::from(moved) > receiver.level.load(Ordering::SeqCst) {
+            // ORDERING: Release; pairs with the swap in `heed`, which then sees the hint.
+            self.hot.alert.0.store(1, Ordering::Release);
+            step!("publish: alert");
+        }
+        let wake = receiver.sleeping.load(Ordering::SeqCst) != 0;
+        Published::Accepted { posted: Posted { slot, word }, wake }
     }
 
     /// Gives a claimed slot back unpublished.
@@ -306,7 +345,18 @@ impl<'a> Slots<'a> {
 
     /// Whether this mailbox has been given up.
     pub(crate) fn is_retired(&self) -> bool {
-        self.hot.retired.load(Ordering::Relaxed) != 0
+        self.hot.receiver.0.retired.load(Ordering::Relaxed) != 0
+    }
+
+    /// Has the lines of a slot come here that its next filler writes first.
+    pub(crate) fn expect_to_fill(&self, slot: usize) {
+        let slot = slot % self.count;
+        prefetch_to_write(self.word(slot));
+        self.first_lines(slot).into_iter().for_each(prefetch_to_write);
+    }
+
+    fn first_lines(&self, slot: usize) -> [*const u8; 2] {
+        [0, 64].map(|line| self.bodies.first.wrapping_add(slot * self.bodies.bytes + line))
     }
 
     // ---- the receiver ----
@@ -330,20 +380,57 @@ impl<'a> Slots<'a> {
 
     /// Says that the receiver is about to sleep. Look at the hints after this, then sleep, then [`Slots::awake`].
     pub(crate) fn drowsy(&self) {
-        // ORDERING: Release; pairs with the Acquire in `publish`: who sees this owner asleep sees whose bell to ring.
-        self.hot.sleeping.store(1, Ordering::Release);
+        // ORDERING: Release, at least; who sees this owner asleep sees whose bell to ring. Pairs with the load in `publish`.
+        self.hot.receiver.0.sleeping.store(1, Ordering::SeqCst);
         // ORDERING (F): `sleeping` before the last look at the hints. Pairs with (E).
-        fence(Ordering::SeqCst);
+        seq_cst_accesses();
     }
 
     /// Says that the receiver does not sleep. It alone says so: a sender that did would swallow the next one's wake-up.
     pub(crate) fn awake(&self) {
-        self.hot.sleeping.store(0, Ordering::Relaxed);
+        self.hot.receiver.0.sleeping.store(0, Ordering::Relaxed);
+    }
+
+    /// Has the lines of a package come here before they are looked at, all at once; and its word as it will be needed.
+    pub(crate) fn expect_package(&self, slot: usize) {
+        prefetch_to_write(self.word(slot));
+        self.first_lines(slot).into_iter().for_each(prefetch_to_read);
+    }
+
+    /// Has the line of the hints come here to be written, as it will be: looked at first, it would come twice. Who looks again and
+    /// again keeps it, and nothing moves until a sender takes it.
+    pub(crate) fn expect_hints(&self) {
+        prefetch_to_write(&raw const self.hot.ready);
     }
 
     /// Whether a hint is set.
     pub(crate) fn any_hint(&self) -> bool {
-        (0..self.count.div_ceil(64)).any(|i| self.hot.ready[i].load(Ordering::Acquire) != 0)
+        self.hot.ready.0[..self.count.div_ceil(64)].iter().any(|hints| hints.load(Ordering::SeqCst) != 0)
+    }
+
+    /// Whether something above the level was published.
+    pub(crate) fn is_alerted(&self) -> bool {
+        self.hot.alert.0.load(Ordering::Relaxed) != 0
+    }
+
+    /// Clears the alert. Look at the hints after this.
+    pub(crate) fn heed(&self) {
+        // ORDERING: Acquire; whatever this clears, its hint is seen. Pairs with `publish`.
+        self.hot.alert.0.swap(0, Ordering::AcqRel);
+    }
+
+    /// From now on whoever sends something above this alerts. Raised: who has read the old level alerts for nothing.
+    pub(crate) fn raise_level(&self, level: Priority) {
+        self.hot.receiver.0.level.store(level.0.into(), Ordering::Relaxed);
+    }
+
+    /// The same, when the level sinks: then look at the hints once more.
+    pub(crate) fn lower_level(&self, level: Priority) {
+        self.hot.receiver.0.level.store(level.0.into(), Ordering::SeqCst);
+        // ORDERING (J): the level before the look at the hints. Pairs with (E): who has read the higher level, and therefore did
+        // not alert, is seen by that look.
+        seq_cst_accesses();
+        step!("level: lowered");
     }
 
     /// Frees slots whose filler is dead, and tells `lost` their victims.
@@ -387,7 +474,7 @@ impl<'a> Slots<'a> {
 
     /// Gives the mailbox up for good. Senders see it after publishing and send anew elsewhere.
     pub(crate) fn retire(&self) {
-        self.hot.retired.store(1, Ordering::Relaxed);
+        self.hot.receiver.0.retired.store(1, Ordering::Relaxed);
         // ORDERING (G): `retired` before the owner's last look at the words. Pairs with (E).
         fence(Ordering::SeqCst);
     }

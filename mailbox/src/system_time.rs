@@ -6,8 +6,9 @@
 //! are measured by the monotonic clock.
 
 use crate::clock::{monotonic_ns, realtime_ns};
-use crate::memory::Mapping;
-use crate::node::{Node, NodeError, allocate, open_shared};
+use crate::files::{allocate, open_shared};
+use crate::memory::{Mapping, Use};
+use crate::node::{Node, NodeError};
 use crate::step::step;
 use std::path::Path;
 use std::sync::Arc;
@@ -72,7 +73,7 @@ impl TimeRecord {
     /// System time at this moment of the monotonic clock.
     pub fn at(&self, monotonic_ns: u64) -> SystemTime {
         let since = i128::from(monotonic_ns) - i128::from(self.monotonic_ns);
-        let system = i128::from(self.system_ns) + since * i128::from(self.pace_ppb) / BILLION;
+        let system = i128::from(self.system_ns) + since.saturating_mul(self.pace_ppb.into()) / BILLION;
         let age_ns = monotonic_ns.saturating_sub(self.monotonic_ns);
         let drift = u128::from(age_ns) * u128::from(self.drift_ns_s) / BILLION as u128;
         SystemTime {
@@ -175,7 +176,7 @@ impl TimePage {
 
     /// Writes the record that the index does not name.
     fn fill(&self, record: &TimeRecord) {
-        let next = self.index.load(Ordering::Relaxed) + 1;
+        let next = self.index.load(Ordering::Relaxed).wrapping_add(1);
         // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
         fence(Ordering::Release);
         self.records[(next % 2) as usize].store(record);
@@ -183,7 +184,7 @@ impl TimePage {
 
     /// Makes the record just filled the valid one.
     fn turn(&self) {
-        let next = self.index.load(Ordering::Relaxed) + 1;
+        let next = self.index.load(Ordering::Relaxed).wrapping_add(1);
         // ORDERING: Release (B); pairs with (A).
         self.index.store(next, Ordering::Release);
         step!("time: turned");
@@ -196,7 +197,7 @@ fn map(node: &Path, create: bool) -> std::io::Result<Mapping> {
     if create && file.metadata()?.len() < bytes as u64 {
         allocate(&file, bytes)?;
     }
-    Mapping::new(&file, bytes, create)
+    Mapping::new(&file, bytes, if create { Use::Share } else { Use::Look })
 }
 
 /// Reads a node's system time; without a time page, this computer's wall clock is taken.
@@ -250,11 +251,11 @@ impl TimeKeeper {
     /// # Errors
     /// When the page cannot be made.
     pub fn begin(node: &Arc<Node>, source: TimeSource, system_ns: u64, pace: f64) -> Result<Self, NodeError> {
-        let failed = |error| NodeError::Io(node.path().join("time"), error);
+        let failed = |error| NodeError::of(&node.path().join("time"), error);
         let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
-        let epoch = page.read().map_or(1, |last| last.epoch + 1);
+        let epoch = page.read().map_or(1, |last| last.epoch.saturating_add(1));
         page.fill(&TimeRecord {
             epoch,
             source,

@@ -12,10 +12,11 @@
 //! A value published that finds none is not counted, since it is no package; those that carry it to subscribers are.
 //! A new participant of the same index makes a new file: readers of the old one are not confused.
 
+use crate::files::{allocate, open_shared, open_to_read};
 use crate::layout::{MAGIC, VERSION};
-use crate::memory::Mapping;
+use crate::memory::{Mapping, Use};
 use crate::name::Name;
-use crate::node::{Node, NodeError, allocate, open_shared};
+use crate::node::{Node, NodeError};
 use crate::package::Type;
 use crate::step::step;
 use crate::word::Claimant;
@@ -129,7 +130,7 @@ impl Table {
             let file = open_shared(&unfinished, true)?;
             step!("traffic: file");
             allocate(&file, size_of::<TrafficPage>())?;
-            let mapping = Mapping::new(&file, size_of::<TrafficPage>(), true)?;
+            let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Keep)?;
             let header = &mapping.at::<TrafficPage>(0).header;
             header.version.store(VERSION, Ordering::Relaxed);
             header.participant.store(me.participant.into(), Ordering::Relaxed);
@@ -139,15 +140,13 @@ impl Table {
             step!("traffic: formatted");
             fs::rename(&unfinished, &path)?;
             step!("traffic: named");
-            // Refused when the memlock limit is small; the pages are present all the same.
-            let _ = mapping.lock_in_memory();
             Ok(mapping)
         };
         match made() {
             Ok(mapping) => Ok(Self { mapping, path, writers: AtomicU32::new(0) }),
             Err(error) => {
                 let _ = fs::remove_file(&unfinished);
-                Err(NodeError::Io(path, error))
+                Err(NodeError::of(&path, error))
             }
         }
     }
@@ -218,8 +217,8 @@ pub(crate) struct TableView(Mapping);
 impl TableView {
     /// The table of this participant, if it is there, whole, and of this use of the index.
     pub(crate) fn open(node: &Path, who: Claimant) -> Option<Self> {
-        let file = crate::node::open_to_read(&path_of(node, who.participant)).ok()?;
-        let mapping = Mapping::new(&file, size_of::<TrafficPage>(), false).ok()?;
+        let file = open_to_read(&path_of(node, who.participant)).ok()?;
+        let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Look).ok()?;
         let header = &mapping.at::<TrafficPage>(0).header;
         let said = [&header.version, &header.participant, &header.incarnation, &header.rows];
         let expected = [VERSION, who.participant.into(), who.incarnation, FLOWS as u32];

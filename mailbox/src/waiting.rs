@@ -1,11 +1,13 @@
 //! Waiting for mailboxes: how long, and whether awake for a moment before asleep.
 
-use crate::participant::Participant;
 use crate::receiver::Receiver;
 use crate::step::step;
 use crate::watch::Watches;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+/// Reading the clock takes as long as several looks.
+const LOOKS_A_CLOCK: usize = 16;
 
 /// How to wait. By default: asleep, for ever. A [`Duration`] is a timeout from now on, an `Option<Instant>` a deadline.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -52,8 +54,10 @@ impl Waiting {
         let spin = self.left().map_or(self.spin, |left| left.min(self.spin));
         let began = Instant::now();
         while began.elapsed() < spin {
-            if found() {
-                return true;
+            for _ in 0..LOOKS_A_CLOCK {
+                if found() {
+                    return true;
+                }
             }
             std::hint::spin_loop();
         }
@@ -65,7 +69,7 @@ impl Waiting {
 /// has passed. May return early for no reason. Says how long it slept, that is, left the processor to others. All must be of
 /// one participant, whose bell it is that wakes.
 ///
-/// Whoever makes `other` true from outside calls [`Participant::ring`] afterwards.
+/// Whoever makes `other` true from outside calls [`Participant::ring`](crate::Participant::ring) afterwards.
 ///
 /// Without a mailbox there is no bell to sleep on: then this returns at once, whatever `waiting` and `other` say, and a loop
 /// around it would spin. Who has no mailbox waits by other means.
@@ -73,27 +77,43 @@ impl Waiting {
 /// # Panics
 /// When the mailboxes are of different participants: their bells are different words.
 pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, other: impl Fn() -> bool) -> Duration {
-    let Some(participant) = receivers.first().map(|receiver| receiver.participant().clone()) else {
-        return Duration::ZERO;
-    };
-    wait(&participant, receivers, None, waiting.into(), other)
+    let mut slept = Duration::ZERO;
+    wait(receivers, None, waiting.into(), other, |sleep| slept = timed(sleep));
+    slept
 }
 
+/// How long this takes.
+pub(crate) fn timed(sleep: impl FnOnce()) -> Duration {
+    let began = Instant::now();
+    sleep();
+    began.elapsed()
+}
+
+/// Waits. To sleep it calls `asleep`, which calls what it is given; the clock is read by who wants to know how long that was.
 pub(crate) fn wait(
-    participant: &Arc<Participant>,
     receivers: &mut [&mut Receiver],
     watches: Option<&mut Watches>,
     waiting: Waiting,
     other: impl Fn() -> bool,
-) -> Duration {
-    assert!(receivers.iter().all(|receiver| Arc::ptr_eq(receiver.participant(), participant)));
+    asleep: impl FnOnce(&mut dyn FnMut()),
+) {
     receivers.iter_mut().for_each(|receiver| receiver.settle());
+    let receivers = &*receivers;
+    let of_watches = watches.as_ref().map(|watches| watches.participant().clone());
+    let Some(participant) = of_watches.as_ref().or(receivers.first().map(|receiver| receiver.participant())) else {
+        return;
+    };
+    assert!(receivers.iter().all(|receiver| Arc::ptr_eq(receiver.participant(), participant)));
     let watches = watches.filter(|watches| !watches.is_empty());
     let found = || other() || receivers.iter().any(|receiver| receiver.may_have());
+    let polled = || {
+        receivers.iter().for_each(|receiver| receiver.expect());
+        found()
+    };
     // Until here, and while it spins, nobody needs to ring.
-    if waiting.spin_until(found) {
+    if waiting.spin_until(polled) {
         watches.into_iter().for_each(Watches::look);
-        return Duration::ZERO;
+        return;
     }
     let entry = participant.entry();
     // Before `drowsy`: whatever is published after the looks below rings, and so changes this value.
@@ -101,14 +121,11 @@ pub(crate) fn wait(
     receivers.iter().for_each(|receiver| receiver.drowsy());
     step!("wait: drowsy");
     let idle = !found() && !waiting.is_over();
-    let began = Instant::now();
     match watches {
-        Some(watches) if idle => watches.sleep(entry.bell(), seen, waiting.left()),
+        Some(watches) if idle => asleep(&mut || watches.sleep(entry.bell(), seen, waiting.left())),
         Some(watches) => watches.look(),
-        None if idle => crate::doorbell::sleep(&entry.bell, seen, waiting.left()),
+        None if idle => asleep(&mut || crate::doorbell::sleep(&entry.bell, seen, waiting.left())),
         None => {}
     }
-    let slept = began.elapsed();
     receivers.iter().for_each(|receiver| receiver.awake());
-    if idle { slept } else { Duration::ZERO }
 }

@@ -4,7 +4,7 @@ use crate::bell::Bell;
 use crate::doorbell;
 use crate::participant::Participant;
 use crate::receiver::Receiver;
-use crate::waiting::{Waiting, wait};
+use crate::waiting::{Waiting, timed, wait};
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::sync::Arc;
@@ -139,8 +139,13 @@ impl Watches {
         waiting: impl Into<Waiting>,
         other: impl Fn() -> bool,
     ) -> Duration {
-        let participant = self.participant.clone();
-        wait(&participant, receivers, Some(self), waiting.into(), other)
+        let mut slept = Duration::ZERO;
+        wait(receivers, Some(self), waiting.into(), other, |sleep| slept = timed(sleep));
+        slept
+    }
+
+    pub(crate) fn participant(&self) -> &Arc<Participant> {
+        &self.participant
     }
 
     /// Asks which are ready now, and returns at once. One system call, or none if nothing is watched.

@@ -15,6 +15,7 @@ use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::config::Installation;
 use rohrpost::description::Description;
+use rohrpost::survey::purpose;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -78,6 +79,7 @@ fn completed(command: &str, arg: Arg) -> Arg {
     match (command, arg.get_id().as_str()) {
         // A name that there is not yet.
         ("new", _) => arg,
+        ("mailbox", "name") => from(arg, mailboxes),
         (_, "name" | "names" | "module" | "modules") => from(arg, modules),
         (_, "node") => from(arg, nodes),
         ("send", "function") => from(arg, own_functions),
@@ -138,6 +140,12 @@ fn modules() -> Vec<CompletionCandidate> {
         candidate(installation.classes.format(name), text)
     };
     modules.flat_map(|module| module.names()).map(name).collect()
+}
+
+fn mailboxes() -> Vec<CompletionCandidate> {
+    let Ok(running) = target().find() else { return Vec::new() };
+    let all = running.node.mailboxes().unwrap_or_default();
+    all.into_iter().map(|name| candidate(running.text(name), purpose(name.local()))).collect()
 }
 
 fn nodes() -> Vec<CompletionCandidate> {

@@ -1,6 +1,7 @@
 //! `rohrpost delay`: how long packages wait to be taken, and how old data are when they are published.
 
 use super::published::{Watched, data_of};
+use super::summary::class_name;
 use super::table::table;
 use super::target::{Running, Target};
 use super::units::short;
@@ -121,14 +122,11 @@ fn delays<'a>(name: &'a str, looked: &Looked, names: &[(u16, String)]) -> Delays
     let line = |wait: &Wait| {
         let before = earlier.iter().find(|known| (known.mailbox, known.class) == (wait.mailbox, wait.class));
         let latency = before.map_or(wait.latency.clone(), |before| wait.latency.since(&before.latency));
-        let class = wait.class.map_or("others".into(), |class| {
-            installation.classes.name(class).map_or_else(|| class.0.to_string(), ToOwned::to_owned)
-        });
         WaitLine {
             mailbox: installation.classes.format_full(wait.mailbox),
             purpose: purpose(wait.mailbox.local()),
             subscriber: wait.mailbox.module() != looked.module.module,
-            class,
+            class: class_name(installation, wait.class),
             received: latency.count(),
             waited_mean_s: latency.mean().map(|mean| mean.as_secs_f64()),
             waited_p50_s: latency.quantile(0.5).map(|found| found.as_secs_f64()),

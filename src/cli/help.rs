@@ -7,8 +7,8 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("To begin", &["demo", "new", "check", "launch"]),
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
     ("One of its modules", &["restart", "stop", "start"]),
-    ("To measure", &["hz", "bw", "delay", "graph", "ping", "send"]),
-    ("This computer", &["doctor", "clean", "completions", "version"]),
+    ("To measure", &["hz", "bw", "delay", "mailbox", "graph", "ping", "send"]),
+    ("This computer", &["doctor", "bench", "clean", "completions", "version"]),
     ("Else", &["run", "help"]),
 ];
 

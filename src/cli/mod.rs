@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand.
 
+mod bench;
 mod bw;
 mod call;
 mod check;
@@ -16,6 +17,7 @@ mod hz;
 mod launch;
 mod list;
 mod log;
+mod mailbox;
 mod manager;
 mod new;
 mod param;
@@ -64,6 +66,8 @@ enum Command {
     Start(control::Arguments),
     /// List the modules and mailboxes of a running node.
     List(list::Arguments),
+    /// Show one mailbox: its slots, losses and waits; disturbs nobody.
+    Mailbox(mailbox::Arguments),
     /// Watch modules, and switch them on and off.
     Top(top::Arguments),
     /// Ask modules how they are.
@@ -92,6 +96,8 @@ enum Command {
     Clean(clean::Arguments),
     /// Look whether this computer lets a robot run in time.
     Doctor(doctor::Arguments),
+    /// Measure how this computer hands packages over.
+    Bench(bench::Arguments),
     /// Begin a module of your own: a project that builds and runs.
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
@@ -114,6 +120,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Stop(arguments) => control::run(&arguments, control::Order::Stop),
         Command::Start(arguments) => control::run(&arguments, control::Order::Start),
         Command::List(arguments) => list::run(&arguments),
+        Command::Mailbox(arguments) => mailbox::run(&arguments),
         Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),
@@ -128,6 +135,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Param(arguments) => param::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),

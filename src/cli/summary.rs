@@ -1,11 +1,11 @@
 //! What a node does, as text: modules, and traffic by class.
 
 use super::table::{table, time};
-use rohrpost::Name;
 use rohrpost::config::Installation;
 use rohrpost::launch::Phase;
 use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, ParticipantInfo, saturating_sum};
 use rohrpost::survey::{ModuleSurvey, Survey};
+use rohrpost::{Class, Name};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -138,15 +138,18 @@ pub(super) fn losses(lost: impl Fn(Loss) -> u64) -> String {
     if replaced.is_empty() { missed } else { format!("{missed} ({})", list(&replaced)) }
 }
 
+/// A class as tables name it; none: all for which there was no row left.
+pub(super) fn class_name(installation: &Installation, class: Option<Class>) -> String {
+    let name = |class| installation.classes.name(class).map_or_else(|| class.0.to_string(), ToOwned::to_owned);
+    class.map_or("others".into(), name)
+}
+
 /// Traffic by class as a table: packages, losses by cause, waiting times.
 pub(super) fn print_classes(installation: &Installation, classes: &[ClassTraffic]) -> String {
     let rows = classes.iter().map(|class| {
-        let name = class.class.map_or("others".into(), |id| {
-            installation.classes.name(id).map_or_else(|| id.0.to_string(), ToOwned::to_owned)
-        });
         let quantile = |share| class.latency.quantile(share).map_or("-".into(), time);
         [
-            name,
+            class_name(installation, class.class),
             class.class.map_or("-".into(), |id| id.0.to_string()),
             class.received.to_string(),
             losses(|cause| class.lost(cause)),

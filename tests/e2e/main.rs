@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod bench;
 mod boot;
 mod check;
 mod completions;
@@ -15,6 +16,7 @@ mod demo;
 mod doctor;
 mod harness;
 mod launch;
+mod mailbox;
 mod mailboxes;
 mod measure;
 mod new;

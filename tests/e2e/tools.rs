@@ -22,11 +22,13 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "list" | "status" | "log" => &[],
         "top" => &["--once", "--interval", "0.1"],
         "graph" => &["--seconds", "0.1"],
-        "call" | "hz" | "bw" | "delay" | "ping" | "restart" | "stop" | "start" => &["probe.0"],
+        "call" | "mailbox" | "hz" | "bw" | "delay" | "ping" | "restart" | "stop" | "start" => &["probe.0"],
         "echo" => &["probe.0", "beat"],
         "send" => &["probe.0", "count", "1", "--count", "1"],
         "param" => &["list"],
-        "check" | "launch" | "demo" | "clean" | "doctor" | "new" | "completions" | "version" | "run" => return None,
+        "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run" => {
+            return None;
+        }
         other => panic!("`{other}` is new: say here how it is tested"),
     };
     Some([&[command], after].concat())

@@ -10,7 +10,7 @@ use std::path::Path;
 const OTHER: u32 = 99;
 
 /// Writes a layout version into a file of the node, where every version has it.
-fn write_version(file: &Path, version: u32) {
+pub(crate) fn write_version(file: &Path, version: u32) {
     let file = File::options().write(true).open(file).unwrap();
     file.write_all_at(&version.to_ne_bytes(), 8).unwrap();
 }

@@ -47,20 +47,23 @@ pub(crate) fn ci() -> Result<ExitCode, Failure> {
     cargo::run("clippy for the GUI bridge", &mut bridge_clippy())?;
     let bare = ["clippy", "--package", "rohrpost", "--package", "rohrpost-modules", "--no-default-features", "--lib"];
     cargo::run("clippy for what the author of a module compiles", cargo(&bare).args(["--", "--deny", "warnings"]))?;
-    no_command_line()?;
+    compiles_none_of("the author of a module", &["--no-default-features"], &NO_COMMAND_LINE)?;
+    compiles_none_of("a user of the command", &[], &["iceoryx2 ", "rerun "])?;
     test()
 }
 
-/// Without default features nothing of the command line, of the built-in modules or of Rerun may be compiled.
-fn no_command_line() -> Result<(), Failure> {
-    let arguments =
-        ["tree", "--package", "rohrpost", "--no-default-features", "--edges", "normal,build", "--prefix", "none"];
-    let output = cargo(&arguments).output().map_err(|error| format!("cargo tree: {error}"))?;
+/// Without default features nothing of the command line, of the built-in modules, of the benches or of Rerun may be compiled.
+const NO_COMMAND_LINE: [&str; 7] =
+    ["clap ", "comfy-table ", "serde_json ", "flate2 ", "rand ", "rerun ", "rohrpost-bench "];
+
+/// The root package with these features must need none of these crates.
+fn compiles_none_of(who: &str, features: &[&str], unwanted: &[&str]) -> Result<(), Failure> {
+    let arguments = ["tree", "--package", "rohrpost", "--edges", "normal,build", "--prefix", "none"];
+    let output = cargo(&arguments).args(features).output().map_err(|error| format!("cargo tree: {error}"))?;
     let tree = String::from_utf8_lossy(&output.stdout);
-    let unwanted = ["clap ", "comfy-table ", "serde_json ", "flate2 ", "rand ", "rerun "];
     let found: Vec<&str> = tree.lines().filter(|line| unwanted.iter().any(|name| line.starts_with(name))).collect();
     if !output.status.success() || !tree.starts_with("rohrpost ") || !found.is_empty() {
-        return Err(format!("the author of a module would compile {found:?} ({})", output.status));
+        return Err(format!("{who} would compile {found:?} ({})", output.status));
     }
     Ok(())
 }

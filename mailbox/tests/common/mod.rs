@@ -10,7 +10,7 @@ pub(crate) mod load;
 pub(crate) mod random;
 
 use rohrpost_mailbox::{Full, Label, Loss, MailboxInfo, Name, Node, Participant, Priority, Sender, Shape, Type};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -38,7 +38,10 @@ pub(crate) struct Ground {
 
 impl Ground {
     pub(crate) fn new() -> Self {
-        let directory = tempfile::tempdir().unwrap();
+        Self::within(tempfile::tempdir().unwrap())
+    }
+
+    pub(crate) fn within(directory: TempDir) -> Self {
         Self { path: directory.path().join("node"), _directory: Some(directory) }
     }
 
@@ -70,14 +73,20 @@ impl Ground {
 
     /// This test binary once more, in this role (see [`role`]).
     pub(crate) fn start(&self, role: &str) -> Process {
-        let mut child = Command::new(std::env::current_exe().unwrap())
+        self.start_with(role, |_| ())
+    }
+
+    /// The same, prepared in some way.
+    pub(crate) fn start_with(&self, role: &str, prepare: impl FnOnce(&mut Command)) -> Process {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command
             .args(["--exact", "role", "--nocapture", "--test-threads=1"])
             .env("ROHRPOST_TEST_ROLE", role)
             .env("ROHRPOST_TEST_GROUND", &self.path)
             .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+            .stdout(Stdio::piped());
+        prepare(&mut command);
+        let mut child = command.spawn().unwrap();
         let output = BufReader::new(child.stdout.take().unwrap());
         let (tell, told) = mpsc::channel();
         std::thread::spawn(move || {
@@ -129,6 +138,11 @@ impl Process {
         assert_eq!(self.child.try_wait().unwrap(), None, "it ended by itself");
         self.child.kill().unwrap();
         self.child.wait().unwrap();
+    }
+
+    /// A line into its standard input, if it was started with one.
+    pub(crate) fn answer(&self, line: &str) {
+        writeln!(self.child.stdin.as_ref().unwrap(), "{line}").unwrap();
     }
 
     pub(crate) fn signal(&self, signal: i32) {

@@ -7,6 +7,11 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_second_package_never_passes_the_first", 3),
     ("publishing_gives_the_order", 3),
     ("the_more_important_goes_first", 2),
+    ("the_urgent_passes_what_is_known", 2),
+    ("what_comes_as_the_level_sinks_is_next", 2),
+    ("no_alert_is_lost", 1),
+    ("a_new_owner_says_its_own_level", 2),
+    ("the_newest_is_found_in_its_place", 1),
     ("who_is_displaced_is_counted_and_not_received", 2),
     ("displacing_keeps_the_order", 2),
     ("who_outranks_all_is_not_refused", 3),
@@ -23,6 +28,7 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("no_wake_up_is_lost_in_poll", 2),
     ("no_wake_up_is_lost_in_poll_between_two", 1),
     ("a_dead_ringer_takes_no_wake_up_along", 2),
+    ("no_wake_up_is_lost_between_two_mailboxes", 2),
     ("a_retired_mailbox_keeps_nothing", 3),
     ("a_retired_mailbox_keeps_nothing_of_the_dead", 2),
     ("a_retired_mailbox_counts_the_displaced", 3),
@@ -67,8 +73,19 @@ const WRONG: &str = "assertion";
 /// The receiver sleeps for ever: nobody will ring.
 const ENDLESS: &str = "maximum number of branches";
 
-const FENCE_E: &str = "of a sender and a new owner likewise.\n        fence(Ordering::SeqCst);\n";
-const NO_FENCE_E: &str = "of a sender and a new owner likewise.\n";
+const FENCE_E: &str = "turns to less important packages likewise.\n        seq_cst_accesses();\n";
+const NO_FENCE_E: &str = "turns to less important packages likewise.\n";
+/// Every look is one with a horizon, as after a first one that senders were quicker than.
+const ONLY_WITH_HORIZON: Edit = edit(
+    "queue",
+    "        self.collect(slots, u64::MAX);\n        // ORDERING: the words",
+    "        // ORDERING: the words",
+);
+const WITHOUT_RETURN: Edit = edit("queue", "        if !slots.any_hint() {\n            return;\n        }\n", "");
+
+const DROWSY: &str = "        receivers.iter().for_each(|receiver| receiver.mailbox.slots().drowsy());\n";
+const LOWER: &str =
+    "            slots.lower_level(first);\n            self.level = first.0.into();\n            self.look(slots);\n";
 
 pub(crate) const BROKEN: &[Broken] = &[
     // ---- the word hands the body over: (A) to (D) ----
@@ -99,7 +116,7 @@ pub(crate) const BROKEN: &[Broken] = &[
                 "Word(self.word(slot).load(Ordering::Acquire))",
                 "Word(self.word(slot).load(Ordering::Relaxed))",
             ),
-            edit("queue", "ticket.load(Ordering::Acquire)", "ticket.load(Ordering::Relaxed)"),
+            edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
             edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)"),
         ],
         caught_by: "a_body_is_handed_over_whole",
@@ -146,8 +163,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
                 "slots",
-                "        let word = Word::ready(priority, claim.place.unwrap_or(ticket));\n",
-                "        let word = Word::ready(priority, claim.place.unwrap_or(ticket));\n        self.hint(slot);\n",
+                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n",
+                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n        self.hint(slot);\n",
             ),
         ],
         caught_by: "everything_arrives_once_and_in_order",
@@ -158,7 +175,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "hint_without_release",
         edits: &[edit(
             "slots",
-            "fetch_or(1 << (slot % 64), Ordering::Release)",
+            "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
             "fetch_or(1 << (slot % 64), Ordering::Relaxed)",
         )],
         caught_by: "everything_arrives_once_and_in_order",
@@ -189,14 +206,22 @@ pub(crate) const BROKEN: &[Broken] = &[
     // The receiver looks at slot 0, which is free; then both packages are published; then it sees the second in slot 1.
     Broken {
         name: "no_horizon",
-        edits: &[edit("queue", "if word.ticket() < horizon {", "if word.ticket() < u64::MAX {")],
+        edits: &[
+            ONLY_WITH_HORIZON,
+            WITHOUT_RETURN,
+            edit("queue", "if word.ticket() < horizon {", "if word.ticket() < u64::MAX {"),
+        ],
         caught_by: "a_second_package_never_passes_the_first",
         says: WRONG,
     },
     // The counter is read, but not what was published before: slot 0 looks free still.
     Broken {
         name: "horizon_without_acquire",
-        edits: &[edit("queue", "ticket.load(Ordering::Acquire)", "ticket.load(Ordering::Relaxed)")],
+        edits: &[
+            ONLY_WITH_HORIZON,
+            WITHOUT_RETURN,
+            edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
+        ],
         caught_by: "a_second_package_never_passes_the_first",
         says: WRONG,
     },
@@ -204,7 +229,9 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "ticket_without_release",
         edits: &[
-            edit("slots", "ticket.fetch_add(1, Ordering::AcqRel)", "ticket.fetch_add(1, Ordering::Acquire)"),
+            ONLY_WITH_HORIZON,
+            WITHOUT_RETURN,
+            edit("slots", "ticket.0.fetch_add(1, Ordering::AcqRel)", "ticket.0.fetch_add(1, Ordering::Acquire)"),
             edit("slots", FENCE_E, NO_FENCE_E),
         ],
         caught_by: "a_second_package_never_passes_the_first",
@@ -213,7 +240,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // A deferred slot must be looked at again though its hint is gone.
     Broken {
         name: "too_young_is_forgotten",
-        edits: &[edit("queue", "else { self.defer(slot) }", "else { }")],
+        edits: &[ONLY_WITH_HORIZON, WITHOUT_RETURN, edit("queue", "else { self.defer(slot) }", "else { }")],
         caught_by: "everything_arrives_once_and_in_order",
         says: WRONG,
     },
@@ -229,26 +256,141 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit(
                 "slots",
                 "return Ok(Claim { slot, word, place: None });",
-                "return Ok(Claim { slot, word, place: None, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
+                "return Ok(Claim { slot, word, place: None, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
                 "return Some(Claim { slot, word, place: None });",
-                "return Some(Claim { slot, word, place: None, ticket: self.hot.ticket.fetch_add(1, Ordering::AcqRel) });",
+                "return Some(Claim { slot, word, place: None, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "slot: old.slot, word, place: Some(old.word.ticket()) })",
-                "slot: old.slot, word, place: Some(old.word.ticket()), ticket: 0 })",
+                "slot: old.slot, word, place: Some(old.word) })",
+                "slot: old.slot, word, place: Some(old.word), ticket: 0 })",
             ),
             edit(
                 "slots",
-                "word: marked, place: Some(old.word.ticket()) })",
-                "word: marked, place: Some(old.word.ticket()), ticket: 0 })",
+                "word: marked, place: Some(old.word) })",
+                "word: marked, place: Some(old.word), ticket: 0 })",
             ),
-            edit("slots", "let ticket = self.hot.ticket.fetch_add(1, Ordering::AcqRel);", "let ticket = claim.ticket;"),
+            edit(
+                "slots",
+                "let ticket = self.hot.ticket.0.fetch_add(1, Ordering::AcqRel);",
+                "let ticket = claim.ticket;",
+            ),
         ],
         caught_by: "publishing_gives_the_order",
+        says: WRONG,
+    },
+    // The first look meets the second package of a sender, whose first came behind it, and is not followed by another.
+    Broken {
+        name: "no_look_for_more",
+        edits: &[edit("queue", "if !slots.any_hint() {", "if true {")],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+    // ---- the level, and the alert above it ----
+    Broken {
+        name: "nobody_alerts",
+        edits: &[edit("slots", "self.hot.alert.0.store(1, Ordering::Release);", "")],
+        caught_by: "the_urgent_passes_what_is_known",
+        says: WRONG,
+    },
+    // The alert is seen, and not what it was for; and it is cleared.
+    Broken {
+        name: "alert_without_release",
+        edits: &[
+            edit(
+                "slots",
+                "self.hot.alert.0.store(1, Ordering::Release);",
+                "self.hot.alert.0.store(1, Ordering::Relaxed);",
+            ),
+            edit("slots", FENCE_E, NO_FENCE_E),
+        ],
+        caught_by: "the_urgent_passes_what_is_known",
+        says: WRONG,
+    },
+    Broken {
+        name: "heed_without_acquire",
+        edits: &[edit("slots", "alert.0.swap(0, Ordering::AcqRel)", "alert.0.swap(0, Ordering::Release)")],
+        caught_by: "the_urgent_passes_what_is_known",
+        says: WRONG,
+    },
+    // What was looked at before an alert was cleared says nothing about what the alert was for.
+    Broken {
+        name: "heeds_after_the_look",
+        edits: &[edit(
+            "queue",
+            "        if slots.is_alerted() {\n            slots.heed();\n        }\n        self.look(slots);\n",
+            "        self.look(slots);\n        if slots.is_alerted() {\n            slots.heed();\n        }\n",
+        )],
+        caught_by: "the_urgent_passes_what_is_known",
+        says: WRONG,
+    },
+    // The second one's alert is overwritten unseen.
+    Broken {
+        name: "alert_cleared_by_a_store",
+        edits: &[
+            edit(
+                "slots",
+                "self.hot.alert.0.load(Ordering::Relaxed) != 0",
+                "self.hot.alert.0.load(Ordering::Acquire) != 0",
+            ),
+            edit(
+                "slots",
+                "self.hot.alert.0.swap(0, Ordering::AcqRel);",
+                "self.hot.alert.0.store(0, Ordering::Release);",
+            ),
+        ],
+        caught_by: "no_alert_is_lost",
+        says: WRONG,
+    },
+    // Who read the higher level did not alert, and is overlooked.
+    Broken {
+        name: "no_look_at_the_new_level",
+        edits: &[edit(
+            "queue",
+            LOWER,
+            "            slots.lower_level(first);\n            self.level = first.0.into();\n",
+        )],
+        caught_by: "what_comes_as_the_level_sinks_is_next",
+        says: WRONG,
+    },
+    Broken {
+        name: "the_new_level_is_said_after_the_look",
+        edits: &[edit(
+            "queue",
+            LOWER,
+            "            self.look(slots);\n            slots.lower_level(first);\n            self.level = first.0.into();\n",
+        )],
+        caught_by: "what_comes_as_the_level_sinks_is_next",
+        says: WRONG,
+    },
+    // Neither sees the other: the sender reads the old level, the receiver the old hints.
+    Broken {
+        name: "no_fence_j",
+        edits: &[edit("slots", "is seen by that look.\n        seq_cst_accesses();\n", "is seen by that look.\n")],
+        caught_by: "what_comes_as_the_level_sinks_is_next",
+        says: WRONG,
+    },
+    Broken {
+        name: "no_fence_e_at_the_level",
+        edits: &[edit("slots", FENCE_E, NO_FENCE_E)],
+        caught_by: "what_comes_as_the_level_sinks_is_next",
+        says: WRONG,
+    },
+    // The dead one's level stands: senders below it keep silent.
+    Broken {
+        name: "a_successor_trusts_the_level",
+        edits: &[edit("queue", "receives: 0, level: NO_LEVEL }", "receives: 0, level: 0 }")],
+        caught_by: "a_new_owner_says_its_own_level",
+        says: WRONG,
+    },
+    // The state's newer package waits until all that was known has been received.
+    Broken {
+        name: "no_look_after_a_miss",
+        edits: &[edit("queue", "            known = false;\n", "")],
+        caught_by: "the_newest_is_found_in_its_place",
         says: WRONG,
     },
     // The rank without the priority.
@@ -357,7 +499,7 @@ pub(crate) const BROKEN: &[Broken] = &[
                 "if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {",
                 "let late = self.last;\n        if let Some(instead) = None {",
             ),
-            edit("slots", "unwrap_or(ticket)", "unwrap_or(0)"),
+            edit("slots", "claim.place.map_or(ticket, Word::ticket)", "claim.place.map_or(0, Word::ticket)"),
             edit(
                 "rig",
                 "                self.last = (self.full == Full::Latest).then_some(posted);",
@@ -370,7 +512,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
     Broken {
         name: "the_newest_goes_to_the_end",
-        edits: &[edit("slots", "claim.place.unwrap_or(ticket)", "ticket")],
+        edits: &[edit("slots", "claim.place.map_or(ticket, Word::ticket)", "ticket")],
         caught_by: "the_newest_keeps_its_place",
         says: WRONG,
     },
@@ -418,7 +560,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "no_fence_f",
         edits: &[edit(
             "slots",
-            "Pairs with (E).\n        fence(Ordering::SeqCst);\n    }\n\n    /// Says that the receiver does not sleep.",
+            "Pairs with (E).\n        seq_cst_accesses();\n    }\n\n    /// Says that the receiver does not sleep.",
             "Pairs with (E).\n    }\n\n    /// Says that the receiver does not sleep.",
         )],
         caught_by: "no_wake_up_is_lost",
@@ -430,7 +572,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[
             edit("rig", "        let seen = bell.seen();\n", ""),
             edit("rig", "bell.may_poll(seen)", "bell.may_poll(bell.seen())"),
-            edit("rig", "self.mailbox.sleep(seen);", "self.mailbox.sleep(bell.seen());"),
+            edit("rig", "mailbox.sleep(seen);", "mailbox.sleep(bell.seen());"),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -439,8 +581,12 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "drowsy_after_the_last_look",
         edits: &[
-            edit("rig", "        slots.drowsy();\n", ""),
-            edit("rig", "self.mailbox.sleep(seen);", "slots.drowsy();\n            self.mailbox.sleep(seen);"),
+            edit("rig", DROWSY, ""),
+            edit(
+                "rig",
+                "                mailbox.sleep(seen);",
+                "                mailbox.slots().drowsy();\n                mailbox.sleep(seen);",
+            ),
         ],
         caught_by: "no_wake_up_is_lost",
         says: ENDLESS,
@@ -455,6 +601,19 @@ pub(crate) const BROKEN: &[Broken] = &[
             "                    self.mailbox.ring();\n                    slots.awake();\n",
         )],
         caught_by: "no_wake_up_is_lost_between_two",
+        says: ENDLESS,
+    },
+    // ---- sleeping on several mailboxes ----
+    Broken {
+        name: "drowsy_in_one_mailbox_only",
+        edits: &[edit("rig", DROWSY, "        receivers[0].mailbox.slots().drowsy();\n")],
+        caught_by: "no_wake_up_is_lost_between_two_mailboxes",
+        says: ENDLESS,
+    },
+    Broken {
+        name: "looks_at_one_mailbox_only",
+        edits: &[edit("rig", "!receivers.iter().any(found)", "!found(&receivers[0])")],
+        caught_by: "no_wake_up_is_lost_between_two_mailboxes",
         says: ENDLESS,
     },
     // ---- sleeping in poll ----
@@ -535,7 +694,11 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Retired between claim and publishing.
     Broken {
         name: "retirement_seen_only_at_claim",
-        edits: &[edit("slots", "if self.is_retired() && self.change(slot, word, claim.word) {", "if false {")],
+        edits: &[edit(
+            "slots",
+            "if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {",
+            "if false {",
+        )],
         caught_by: "a_retired_mailbox_keeps_nothing",
         says: WRONG,
     },
@@ -544,8 +707,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "taken_back_without_compare",
         edits: &[edit(
             "slots",
-            "if self.is_retired() && self.change(slot, word, claim.word) {",
-            "if self.is_retired() && { self.word(slot).swap(claim.word.0, Ordering::AcqRel); true } {",
+            "if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {",
+            "if receiver.retired.load(Ordering::SeqCst) != 0 && { self.word(slot).swap(claim.word.0, Ordering::AcqRel); true } {",
         )],
         caught_by: "a_retired_mailbox_keeps_nothing",
         says: WRONG,

@@ -26,7 +26,8 @@
 //! What this does not show:
 //!
 //! - Loom lets a load read old values, but each read-modify-write reads the newest, and failing compare-and-swaps too.
-//! - Its SeqCst fences order more than C11's: all are one lock, in the order of execution.
+//! - Its SeqCst fences order more than C11's: all are one lock, in the order of execution. SeqCst accesses are no more than AcqRel
+//!   to it, so where the core relies on their one order (`seq_cst_accesses`), the models have a fence in the same place.
 //! - It switches threads where two meet in an atomic, but remembers only the last access to each, and so overlooks orders:
 //!   without the ticks of `step.rs` it passed a claim without Acquire. Between two steps it may overlook some still.
 //! - Some orderings are there twice, and one alone can be dropped unseen: a taken body is handed over by word, hint and
@@ -42,6 +43,14 @@ mod name {
 mod step;
 mod sync {
     pub(crate) use loom::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+
+    /// Loom knows the order of SeqCst fences, not that of SeqCst accesses.
+    pub(crate) fn seq_cst_accesses() {
+        fence(Ordering::SeqCst);
+    }
+
+    pub(crate) fn prefetch_to_read<T>(_: *const T) {}
+    pub(crate) fn prefetch_to_write<T>(_: *const T) {}
 }
 #[allow(unused, unreachable_pub, clippy::all, clippy::unwrap_used)]
 mod variants {

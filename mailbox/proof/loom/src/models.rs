@@ -2,11 +2,13 @@
 //! that a load may read. This file is compiled beside the real slot core and beside each broken one.
 
 use crate::name::Priority;
+use crate::queue::Queue;
 use crate::rig::{Mailbox, Receiver, Sender, Sent, of_first, sorted};
 use crate::slots::{Full, Published};
 use crate::step::{dies_at, reached};
 use crate::sync::Ordering;
 use loom::thread;
+use std::sync::Arc;
 
 // ---- sending and receiving ----
 
@@ -35,11 +37,12 @@ pub(crate) fn everything_arrives_once_and_in_order() {
     assert_eq!(sorted(received), [1, 2, 3]);
 }
 
-/// The receiver looks at slots that it was not told of, and meets the second package before it could see the first.
+/// The receiver looks at slots that it was not told of, and meets the second package before it could see the first. It knows
+/// the level: what it finds it takes, without another look.
 pub(crate) fn a_second_package_never_passes_the_first() {
-    let mailbox = Mailbox::new(2);
+    let (mailbox, queue) = one_received(&[(10, 9)]);
     let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
-    let mut receiver = mailbox.receiver();
+    let mut receiver = Receiver { queue, ..mailbox.receiver() };
     receiver.search();
     let mut received = receiver.take_times(1);
     assert_eq!(sender.join().unwrap(), [1, 2]);
@@ -78,6 +81,83 @@ pub(crate) fn the_more_important_goes_first() {
         other => panic!("{other:?} came first"),
     };
     assert_eq!(rest, expected);
+}
+
+// ---- receiving without looking again: the level, and the alert above it ----
+
+/// The receiver has taken the first of these packages, and said of what priority it was. The others are still there.
+fn one_received(packages: &[(u8, u8)]) -> (Arc<Mailbox>, Queue) {
+    let mailbox = Mailbox::new(4);
+    assert_eq!(mailbox.sender(3, Full::Displace).send_all(packages).len(), packages.len());
+    let mut receiver = mailbox.receiver();
+    assert_eq!(receiver.take(), Some(packages[0].1));
+    let queue = receiver.queue;
+    (mailbox, queue)
+}
+
+/// A more important package comes while the receiver works off less important ones that it knows: once sent, it is next.
+pub(crate) fn the_urgent_passes_what_is_known() {
+    let (mailbox, queue) = one_received(&[(10, 1), (10, 2), (10, 3)]);
+    let mut receiver = Receiver { queue, ..mailbox.receiver() };
+    let urgent = mailbox.send_from(1, Full::Displace, &[(20, 9)]);
+    let first = receiver.take();
+    urgent.join().unwrap();
+    let expected: &[u8] = if first == Some(9) { &[2, 3] } else { &[9, 3] };
+    assert_eq!(receiver.drain(), expected);
+}
+
+/// The same while it turns from more important ones to less important ones, and the sender has read the level before.
+pub(crate) fn what_comes_as_the_level_sinks_is_next() {
+    let (mailbox, queue) = one_received(&[(20, 1), (10, 2), (10, 3)]);
+    let mut receiver = Receiver { queue, ..mailbox.receiver() };
+    let between = mailbox.send_from(1, Full::Displace, &[(15, 9)]);
+    let first = receiver.take();
+    between.join().unwrap();
+    let expected: &[u8] = if first == Some(9) { &[2, 3] } else { &[9, 3] };
+    assert_eq!(receiver.drain(), expected);
+}
+
+/// Two alert at once: clearing the alert of one does not lose that of the other.
+pub(crate) fn no_alert_is_lost() {
+    let (mailbox, queue) = one_received(&[(20, 1), (20, 2)]);
+    let mut receiver = Receiver { queue, ..mailbox.receiver() };
+    let one = mailbox.send_from(1, Full::Displace, &[(30, 7), (30, 8)]);
+    let other = mailbox.send_from(2, Full::Displace, &[(40, 9)]);
+    let first = receiver.take();
+    one.join().unwrap();
+    other.join().unwrap();
+    let rest = receiver.drain();
+    let expected: &[u8] = match first {
+        Some(9) => &[7, 8, 2],
+        Some(7) => &[9, 8, 2],
+        _ => &[9, 7, 8],
+    };
+    assert_eq!(rest, expected);
+}
+
+/// The receiver dies, and what it said of the level stays. Its successor knows nothing yet, and says so before it relies on it.
+pub(crate) fn a_new_owner_says_its_own_level() {
+    let (mailbox, _dead) = one_received(&[(30, 1), (10, 2), (10, 3)]);
+    let between = mailbox.send_from(1, Full::Displace, &[(20, 9)]);
+    let mut owner = mailbox.receiver();
+    owner.search();
+    let first = owner.take();
+    between.join().unwrap();
+    let expected: &[u8] = if first == Some(9) { &[2, 3] } else { &[9, 3] };
+    assert_eq!(owner.drain(), expected);
+}
+
+/// A state that the receiver knows is sent anew: the newer one is received in the place of the older, not after all that is known.
+pub(crate) fn the_newest_is_found_in_its_place() {
+    let mailbox = Mailbox::new(4);
+    assert_eq!(mailbox.sender(2, Full::Reject).send(10, 5), Sent::Accepted);
+    let mut state = mailbox.sender(1, Full::Latest);
+    assert_eq!(state.send(10, 1), Sent::Accepted);
+    assert_eq!(mailbox.sender(3, Full::Reject).send(10, 6), Sent::Accepted);
+    let mut receiver = mailbox.receiver();
+    assert_eq!(receiver.take(), Some(5));
+    assert_eq!(state.send(10, 2), Sent::Accepted);
+    assert_eq!(receiver.drain(), [2, 6]);
 }
 
 // ---- full mailboxes ----
@@ -311,6 +391,24 @@ pub(crate) fn a_dead_ringer_takes_no_wake_up_along() {
     let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
     assert_eq!(receiver.receive(), Some(1));
     dead.join().unwrap();
+}
+
+/// One receiver of two mailboxes, with one bell: whatever comes to either wakes it.
+pub(crate) fn no_wake_up_is_lost_between_two_mailboxes() {
+    let first = Mailbox::new(1);
+    let second = Mailbox::beside(&first, 1);
+    let senders = [&first, &second].map(|mailbox| mailbox.send_from(1, Full::Reject, &[(10, 1)]));
+    let mut receivers = [first.receiver(), second.receiver()];
+    let mut received = [0, 0];
+    while received != [1, 1] {
+        for (receiver, received) in receivers.iter_mut().zip(&mut received) {
+            *received += receiver.drain().len();
+        }
+        if received != [1, 1] {
+            Receiver::wait_any(&mut receivers);
+        }
+    }
+    senders.into_iter().for_each(|sender| assert_eq!(sender.join().unwrap(), [1]));
 }
 
 // ---- giving up ----

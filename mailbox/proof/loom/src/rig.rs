@@ -6,7 +6,7 @@
 use crate::name::Priority;
 use crate::bell::Bell;
 use crate::queue::Queue;
-use crate::slots::{Full, HINT_WORDS, Hot, NoSlot, Posted, Published, Slots};
+use crate::slots::{Bodies, Full, HINT_WORDS, Hot, Line, NoSlot, Posted, Published, ReceiverSays, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use crate::word::{Claimant, FREE, Victim, Word};
@@ -19,10 +19,7 @@ pub(super) struct Mailbox {
     pub(super) hot: Hot,
     pub(super) words: Vec<AtomicU64>,
     pub(super) bodies: Vec<UnsafeCell<u8>>,
-    rings: AtomicU32,
-    polling: AtomicU32,
-    /// Bytes in the pipe. The kernel would order more than these plain accesses do.
-    pipe: AtomicU32,
+    bell: Arc<Sleeper>,
     /// Not 0: the receiver has something else to do. Whoever says so rings.
     pub(super) other: AtomicU32,
     /// One bit for each dead participant.
@@ -31,25 +28,45 @@ pub(super) struct Mailbox {
     victims: Mutex<Vec<Victim>>,
 }
 
+/// A participant's bell. It may receive from several mailboxes.
+#[derive(Default)]
+struct Sleeper {
+    rings: AtomicU32,
+    polling: AtomicU32,
+    /// Bytes in the pipe. The kernel would order more than these plain accesses do.
+    pipe: AtomicU32,
+}
+
 // SAFETY: the bodies are the only part that is not Sync by itself, and loom reports every race on them.
 unsafe impl Sync for Mailbox {}
 
 impl Mailbox {
     pub(super) fn new(slots: usize) -> Arc<Self> {
+        Self::with_bell(slots, Arc::default())
+    }
+
+    /// One more mailbox of the same receiver.
+    pub(super) fn beside(other: &Self, slots: usize) -> Arc<Self> {
+        Self::with_bell(slots, other.bell.clone())
+    }
+
+    fn with_bell(slots: usize, bell: Arc<Sleeper>) -> Arc<Self> {
         reached("mailbox: new");
         let hot = Hot {
-            ticket: AtomicU64::new(0),
-            sleeping: AtomicU32::new(0),
-            retired: AtomicU32::new(0),
-            ready: [(); HINT_WORDS].map(|()| AtomicU64::new(0)),
+            ticket: Line(AtomicU64::new(0)),
+            ready: Line([(); HINT_WORDS].map(|()| AtomicU64::new(0))),
+            receiver: Line(ReceiverSays {
+                sleeping: AtomicU32::new(0),
+                level: AtomicU32::new(0),
+                retired: AtomicU32::new(0),
+            }),
+            alert: Line(AtomicU32::new(0)),
         };
         Arc::new(Self {
             hot,
             words: (0..slots).map(|_| AtomicU64::new(FREE.0)).collect(),
             bodies: (0..slots).map(|_| UnsafeCell::new(0)).collect(),
-            rings: AtomicU32::new(0),
-            polling: AtomicU32::new(0),
-            pipe: AtomicU32::new(0),
+            bell,
             other: AtomicU32::new(0),
             dead: AtomicU32::new(0),
             victims: Mutex::default(),
@@ -57,7 +74,8 @@ impl Mailbox {
     }
 
     pub(super) fn slots(&self) -> Slots<'_> {
-        Slots::new(&self.hot, &self.words, 1, self.words.len())
+        let unseen = Bodies { first: std::ptr::null(), bytes: 0 };
+        Slots::new(&self.hot, &self.words, 1, self.words.len(), unseen)
     }
 
     pub(super) fn sender(&self, participant: u16, full: Full) -> Sender<'_> {
@@ -119,28 +137,28 @@ impl Mailbox {
     }
 
     fn bell(&self) -> Bell<'_> {
-        Bell { rings: &self.rings, polling: &self.polling }
+        Bell { rings: &self.bell.rings, polling: &self.bell.polling }
     }
 
     pub(super) fn ring(&self) {
         if self.bell().ring() {
-            self.pipe.fetch_add(1, Ordering::Relaxed);
+            self.bell.pipe.fetch_add(1, Ordering::Relaxed);
         }
     }
 
     /// A futex that never returns early: who is not rung does not wake, and loom gives up on a program without end.
     pub(super) fn sleep(&self, seen: u32) {
-        while self.rings.load(Ordering::Relaxed) == seen {
+        while self.bell.rings.load(Ordering::Relaxed) == seen {
             thread::yield_now();
         }
     }
 
     /// A `poll` that never returns early, unless it is told not to wait; then the pipe is emptied.
     fn poll(&self, sleeps: bool) {
-        while sleeps && self.pipe.load(Ordering::Relaxed) == 0 {
+        while sleeps && self.bell.pipe.load(Ordering::Relaxed) == 0 {
             thread::yield_now();
         }
-        self.pipe.swap(0, Ordering::Relaxed);
+        self.bell.pipe.swap(0, Ordering::Relaxed);
     }
 }
 
@@ -244,21 +262,27 @@ impl Receiver<'_> {
         }
     }
 
-    pub(super) fn wait(&mut self) {
-        let slots = self.mailbox.slots();
-        let bell = self.mailbox.bell();
+    fn wait(&mut self) {
+        Self::wait_any(std::slice::from_mut(self));
+    }
+
+    /// All of one bell.
+    pub(super) fn wait_any(receivers: &mut [Self]) {
+        let mailbox = receivers[0].mailbox;
+        let bell = mailbox.bell();
         let seen = bell.seen();
-        slots.drowsy();
-        if self.mailbox.other.load(Ordering::Relaxed) == 0 && !self.queue.may_have_more(&slots) {
-            if self.polls {
+        receivers.iter().for_each(|receiver| receiver.mailbox.slots().drowsy());
+        let found = |receiver: &Self| receiver.queue.may_have_more(&receiver.mailbox.slots());
+        if mailbox.other.load(Ordering::Relaxed) == 0 && !receivers.iter().any(found) {
+            if receivers[0].polls {
                 let quiet = bell.may_poll(seen);
-                self.mailbox.poll(quiet);
+                mailbox.poll(quiet);
                 bell.polled();
             } else {
-                self.mailbox.sleep(seen);
+                mailbox.sleep(seen);
             }
         }
-        slots.awake();
+        receivers.iter().for_each(|receiver| receiver.mailbox.slots().awake());
     }
 
     /// Frees what the dead left, and looks at every slot.

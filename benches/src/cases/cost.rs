@@ -1,0 +1,179 @@
+//! What one send costs its sender while the receiver is awake, on another processor.
+//!
+//! The receiver has taken everything before the clock starts, and looks for more. Only the sends are timed; what the clock
+//! itself takes is measured beforehand and subtracted.
+
+use super::Case;
+use crate::floors::ring::DEPTH;
+use crate::floors::vyukov::{Memory, Vyukov};
+use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
+use crate::one_way::{Ground, Retry, Sink, Source};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use rohrpost_mailbox::{Full, monotonic_ns};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+const BYTES: usize = 64;
+const WARM_UP: usize = 200;
+/// From the receiver's last word to the next burst: by then it looks for more.
+/// So many bursts, each with its own clock readings, make one figure: some processors count in steps of 10 ns.
+const GROUP: usize = 16;
+const PAUSE_NS: u64 = 400;
+const PATIENCE: Duration = Duration::from_secs(15);
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    // The floor of one send does what any queue must whose receiver may sleep; that of many is the bare queue.
+    let single = Versus { name: "Vyukov, wakeable", p50: Some(Target::AtMost(1.3)), p99: None };
+    let many = Versus { name: "Vyukov", p50: Some(Target::AtMost(2.0)), p99: None };
+    vec![Box::new(Cost { burst: 1, versus: single }), Box::new(Cost { burst: 16, versus: many })]
+}
+
+struct Cost {
+    /// Packages sent one after the other.
+    burst: usize,
+    versus: Versus,
+}
+
+impl Case for Cost {
+    fn name(&self) -> String {
+        format!("cost-of-{}", self.burst)
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let bursts = settings.count(32_000) / self.burst + GROUP;
+        let ours = Contender::sampled("rohrpost", || {
+            let ground = Ground::new(DEPTH, BYTES, Full::Displace)?;
+            cost(self.burst, bursts, || ground.sink(100, Retry::Never), || ground.source(true))
+        });
+        let wakeable = Contender::sampled("Vyukov, wakeable", || vyukov::<true>(self.burst, bursts));
+        let bare = Contender::sampled("Vyukov", || vyukov::<false>(self.burst, bursts));
+        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "ns" };
+        Ok(compare(settings, &subject, &[ours, wakeable, bare], &[self.versus]))
+    }
+}
+
+fn vyukov<const FENCED: bool>(burst: usize, bursts: usize) -> Result<Vec<f64>, Failure> {
+    let memory = Shared::<Memory>::new()?;
+    let open = || Ok(Vyukov::<FENCED>::new(&memory, BYTES));
+    open()?.format();
+    cost(burst, bursts, open, open)
+}
+
+#[repr(C)]
+struct Turn {
+    gate: Gate,
+    samples: Samples,
+    /// On lines of its own: whoever sends looks at it again and again.
+    received: crate::floors::ring::Line<AtomicU64>,
+}
+
+// SAFETY: atomics only.
+unsafe impl Zeroable for Turn {}
+
+/// Nanoseconds a send, one figure for each group of bursts.
+fn cost<I: Sink, O: Source>(
+    burst: usize,
+    bursts: usize,
+    sink: impl Fn() -> Result<I, Failure>,
+    source: impl Fn() -> Result<O, Failure>,
+) -> Result<Vec<f64>, Failure> {
+    let turn = Shared::<Turn>::new()?;
+    let all = (burst * (WARM_UP + bursts)) as u64;
+    let receiver = Child::start(|| {
+        let mut source = source()?;
+        settle(End::Pong, Placement::TwoCores, Scheduling::Fifo)?;
+        turn.gate.meet(2)?;
+        turn.gate.meet(4)?;
+        let mut message = [0; BYTES];
+        for number in 1..=all {
+            source.receive(&mut message)?;
+            turn.received.0.store(number, Ordering::Release);
+        }
+        Ok(())
+    })?;
+    let sender = Child::start(|| {
+        turn.gate.meet(2)?;
+        let mut sink = sink()?;
+        settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
+        let clock = Clock::new();
+        turn.gate.meet(4)?;
+        let (mut sent, mut group_ns) = (0, 0.0);
+        for number in 0..WARM_UP + bursts {
+            let began = Clock::now();
+            for _ in 0..burst {
+                sink.send(&[7; BYTES])?;
+            }
+            let took_ns = clock.ns(began, Clock::now());
+            if number >= WARM_UP {
+                group_ns += took_ns;
+            }
+            if number >= WARM_UP && (number + 1 - WARM_UP).is_multiple_of(GROUP) {
+                turn.samples.push(std::mem::take(&mut group_ns) / (GROUP * burst) as f64);
+            }
+            sent += burst as u64;
+            await_received(&turn.received.0, sent)?;
+        }
+        Ok(())
+    })?;
+    let deadline = Instant::now() + PATIENCE;
+    sender.finish(deadline)?;
+    receiver.finish(deadline)?;
+    Ok(turn.samples.all())
+}
+
+/// Until the receiver has got all, and a while longer.
+fn await_received(received: &AtomicU64, sent: u64) -> Result<(), Failure> {
+    let give_up = monotonic_ns() + PATIENCE.as_nanos() as u64;
+    while received.load(Ordering::Acquire) < sent {
+        if monotonic_ns() > give_up {
+            return Err(Failure::Failed(format!("not all of {sent} packages came")));
+        }
+    }
+    let go_on = monotonic_ns() + PAUSE_NS;
+    while monotonic_ns() < go_on {}
+    Ok(())
+}
+
+/// Times spans of some tens of nanoseconds: the processor's counter, where it has one that can be read in order.
+struct Clock {
+    ns_per_tick: f64,
+    /// Of two readings with nothing in between, the median.
+    own_ticks: f64,
+}
+
+impl Clock {
+    fn new() -> Self {
+        let (began, began_ns) = (Self::now(), monotonic_ns());
+        while monotonic_ns() < began_ns + 10_000_000 {}
+        let (ended, ended_ns) = (Self::now(), monotonic_ns());
+        let spans = (0..1001).map(|_| {
+            let began = Self::now();
+            (Self::now() - began) as f64
+        });
+        let own_ticks = crate::statistics::median(spans).unwrap_or_default();
+        Self { ns_per_tick: (ended_ns - began_ns) as f64 / (ended - began).max(1) as f64, own_ticks }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn now() -> u64 {
+        use std::arch::x86_64::{_mm_lfence, _rdtsc};
+        // SAFETY: any x86-64 has both; neither touches memory. The fences keep what is timed between two readings.
+        unsafe {
+            _mm_lfence();
+            let ticks = _rdtsc();
+            _mm_lfence();
+            ticks
+        }
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn now() -> u64 {
+        monotonic_ns()
+    }
+
+    fn ns(&self, began: u64, ended: u64) -> f64 {
+        ((ended - began) as f64 - self.own_ticks).max(0.0) * self.ns_per_tick
+    }
+}

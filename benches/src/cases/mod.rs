@@ -1,0 +1,49 @@
+//! The cases. To add one: something that has a name and gives rows, and a line in [`all`].
+
+mod cost;
+mod flood;
+mod latency;
+mod many;
+mod memory;
+mod proof;
+mod rates;
+mod rivals;
+mod startup;
+
+pub use startup::run_hidden_program;
+
+use crate::harness::{Failure, Scheduling};
+use crate::rounds::Row;
+use crate::settings::Settings;
+
+/// Something that is measured, against whom, and with which target.
+pub trait Case {
+    /// As `--only` and the table call it.
+    fn name(&self) -> String;
+
+    /// Measures. A contender that fails or is skipped is a row that says so; `Err` is for what hits the whole case.
+    ///
+    /// # Errors
+    /// When the case cannot be begun.
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure>;
+}
+
+/// All cases, in the order in which they are measured.
+pub fn all() -> Vec<Box<dyn Case>> {
+    let all = [
+        latency::cases(),
+        rates::cases(),
+        flood::cases(),
+        cost::cases(),
+        proof::cases(),
+        memory::cases(),
+        many::cases(),
+        startup::cases(),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// The few that tell in seconds how this computer does: blocking and spinning beside the two floors.
+pub fn self_test(scheduling: Scheduling) -> Vec<Box<dyn Case>> {
+    latency::self_test(scheduling)
+}

@@ -1,0 +1,113 @@
+//! How many packages a second: one sender or four, the mailbox always about to be full.
+//!
+//! The mailbox rejects what finds no room and its sender tries again, so nothing is lost: the rings and queues beside it make
+//! their senders wait, too.
+
+use super::Case;
+use crate::floors::Queue;
+use crate::floors::ring::{Bare, DEPTH, Futex, RingReceiver, RingSender, Shared as Ring};
+use crate::harness::{Failure, Scheduling, Shared};
+use crate::one_way::{Ground, QueueSink, Retry, Stream, rate};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::Summary;
+use rohrpost_mailbox::Full;
+use std::time::Duration;
+
+/// Long enough for some hundred thousand packages, short enough that the kernel's fair server stays out.
+const TURN: Duration = Duration::from_millis(500);
+/// Turns of an empty loop before a refused sender tries again: about what the receiver takes for some packages.
+const RETRY: Retry = Retry::Spin(64);
+const PRIORITIES: [u8; 4] = [20, 50, 80, 110];
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let one = |spins, bytes, bound| -> Box<dyn Case> { Box::new(OneSender { spins, bytes, bound }) };
+    vec![one(false, 64, 1.0), one(false, 4096, 1.0), one(true, 64, 0.25), one(true, 4096, 0.85), Box::new(FourSenders)]
+}
+
+struct OneSender {
+    /// Whether the receiver spins; else it sleeps.
+    spins: bool,
+    bytes: usize,
+    /// Of the floor's rate.
+    bound: f64,
+}
+
+impl Case for OneSender {
+    fn name(&self) -> String {
+        if self.spins { "rate-spinning" } else { "rate-blocking" }.into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let stream = stream(settings, self.bytes, 1);
+        let ours = rated("rohrpost", || ours(&stream, self.spins, RETRY));
+        let futex = rated("futex ring", || {
+            let ring = Shared::<Ring>::new()?;
+            rate(&stream, |_| Ok(Futex::<RingSender>::sender(&ring)), || Ok(Futex::<RingReceiver>::receiver(&ring)))
+        });
+        let bare = rated("ring", || {
+            let ring = Shared::<Ring>::new()?;
+            rate(&stream, |_| Ok(Bare::<RingSender>::sender(&ring)), || Ok(Bare::<RingReceiver>::receiver(&ring)))
+        });
+        let queue = rated("posix-mq", || {
+            let queue = Queue::new(DEPTH, self.bytes)?;
+            rate(&stream, |_| Ok(QueueSink::new(&queue, 0)), || Ok(&queue))
+        });
+        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "packages/s" };
+        let floor = if self.spins { bare } else { futex };
+        let versus = [Versus { name: floor.name, p50: Some(Target::AtLeast(self.bound)), p99: None }];
+        #[allow(unused_mut)]
+        let mut contenders = vec![ours, floor, queue];
+        #[cfg(feature = "peers")]
+        contenders.extend(self.peers(&stream));
+        Ok(compare(settings, &subject, &contenders, &versus))
+    }
+}
+
+#[cfg(feature = "peers")]
+impl OneSender {
+    fn peers<'a>(&self, stream: &'a Stream) -> Vec<Contender<'a>> {
+        use crate::one_way::{channel_rate, iceoryx_rate};
+        if self.spins {
+            vec![
+                rated("iceoryx2 spinning", || iceoryx_rate(stream, false)),
+                rated("crossbeam, 1 process", || channel_rate(stream)),
+            ]
+        } else {
+            vec![rated("iceoryx2 listener", || iceoryx_rate(stream, true))]
+        }
+    }
+}
+
+struct FourSenders;
+
+impl Case for FourSenders {
+    fn name(&self) -> String {
+        "rate-four-senders".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let (one, four) = (stream(settings, 64, 1), stream(settings, 64, PRIORITIES.len()));
+        // All senders share a processor: who is refused lets the others go on.
+        let four = rated("rohrpost", move || ours(&four, true, Retry::Yield));
+        let one = rated("one sender", move || ours(&one, true, Retry::Yield));
+        let subject = Subject { case: self.name(), bytes: Some(64), unit: "packages/s" };
+        let versus = [Versus { name: one.name, p50: Some(Target::AtLeast(0.5)), p99: None }];
+        Ok(compare(settings, &subject, &[four, one], &versus))
+    }
+}
+
+fn stream(settings: &Settings, bytes: usize, senders: usize) -> Stream {
+    let messages = if settings.quick { settings.count(usize::MAX) as u64 } else { u64::MAX };
+    Stream { bytes, messages, senders, scheduling: Scheduling::Fifo, cap: TURN }
+}
+
+fn rated<'a>(name: &'static str, turn: impl Fn() -> Result<f64, Failure> + 'a) -> Contender<'a> {
+    Contender { name, turn: Box::new(move || Ok(Summary::single(turn()?))) }
+}
+
+fn ours(stream: &Stream, spins: bool, retry: Retry) -> Result<f64, Failure> {
+    let ground = Ground::new(DEPTH, stream.bytes, Full::Reject)?;
+    rate(stream, |sender| ground.sink(PRIORITIES[sender % PRIORITIES.len()], retry), || ground.source(spins))
+}

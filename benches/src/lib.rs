@@ -1,0 +1,31 @@
+//! Rohrpost's mailboxes, measured beside the floors of this very computer and beside what else could be used.
+//!
+//! ```text
+//!  cases ── which contenders, which sizes, which targets ──▶ rounds ── one contender after the other, round after round
+//!    │                                                         │
+//!    │   ours · floors · peers: how each sends and receives    ▼
+//!    └────────────────────────────▶ harness ── two processes, pinned and scheduled, samples in shared memory
+//!                                                              │
+//!                             table (people, JSON) ◀── rows ◀── statistics: ratios within a round, medians over rounds
+//! ```
+//!
+//! A case is added in `cases`: anything that has a name and gives rows. All processes are forked from a parent without
+//! threads, end when it ends, and are killed when their time is over.
+
+pub mod cases;
+pub mod counting;
+pub mod environment;
+pub mod floors;
+pub mod harness;
+pub mod one_way;
+pub mod ours;
+#[cfg(feature = "peers")]
+pub mod peers;
+pub mod report;
+pub mod rounds;
+pub mod settings;
+pub mod statistics;
+pub mod table;
+
+pub use harness::Failure;
+pub use settings::Settings;

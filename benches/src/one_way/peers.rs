@@ -1,0 +1,81 @@
+//! iceoryx2 between processes and crossbeam's channel between threads, one way.
+
+use super::{Sink, Source, Stream, Turn, receive_all, send_all};
+use crate::Failure;
+use crate::harness::{Child, End, Placement, Scratch, Shared, settle};
+use crate::peers::{IceoryxReceiver, IceoryxSender};
+use crossbeam_channel::{Receiver, Sender, bounded};
+use std::time::Instant;
+
+/// How many messages wait at most.
+const DEPTH: usize = crate::floors::ring::DEPTH;
+
+impl Sink for IceoryxSender {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.publish(message)
+    }
+}
+
+impl Source for IceoryxReceiver {
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        self.take(message)
+    }
+}
+
+/// Messages a second through iceoryx2; the receiver spins, or waits for a notifier.
+///
+/// # Errors
+/// As [`super::rate`].
+pub fn iceoryx_rate(stream: &Stream, listens: bool) -> Result<f64, Failure> {
+    let scratch = Scratch::new()?;
+    let sink = |_| IceoryxSender::open(&scratch, stream.bytes, DEPTH, listens);
+    super::rate(stream, sink, || IceoryxReceiver::open(&scratch, DEPTH, listens))
+}
+
+struct ChannelSink<const N: usize>(Sender<[u8; N]>);
+
+impl<const N: usize> Sink for ChannelSink<N> {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        let message = message.try_into().map_err(|error| Failure::of("message", error))?;
+        self.0.send(message).map_err(|error| Failure::of("channel", error))
+    }
+}
+
+struct ChannelSource<const N: usize>(Receiver<[u8; N]>);
+
+impl<const N: usize> Source for ChannelSource<N> {
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        message.copy_from_slice(&self.0.recv().map_err(|error| Failure::of("channel", error))?);
+        Ok(())
+    }
+}
+
+/// Messages a second through crossbeam's channel, between two threads of a process of its own.
+///
+/// # Errors
+/// As [`super::rate`].
+pub fn channel_rate(stream: &Stream) -> Result<f64, Failure> {
+    match stream.bytes {
+        64 => between_threads::<64>(stream),
+        4096 => between_threads::<4096>(stream),
+        bytes => Err(Failure::Skipped(format!("its messages are types; there is none of {bytes} B"))),
+    }
+}
+
+fn between_threads<const N: usize>(stream: &Stream) -> Result<f64, Failure> {
+    let turn = Shared::<Turn>::new()?;
+    let process = Child::start(|| {
+        let (sender, receiver) = bounded(DEPTH);
+        std::thread::scope(|scope| {
+            let receiving = scope.spawn(|| {
+                settle(End::Pong, Placement::TwoCores, stream.scheduling)?;
+                receive_all(&mut ChannelSource::<N>(receiver), stream, &turn)
+            });
+            settle(End::Ping, Placement::TwoCores, stream.scheduling)?;
+            let sent = send_all(&mut ChannelSink(sender), stream, 0);
+            receiving.join().map_err(|_| Failure::Failed("the receiving thread panicked".into()))?.and(sent)
+        })
+    })?;
+    process.finish(Instant::now() + stream.patience())?;
+    Ok(turn.rate())
+}

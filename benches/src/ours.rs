@@ -1,0 +1,79 @@
+//! Rohrpost's own mailboxes, by nothing but their public interface.
+
+use crate::harness::{End, Failure, Link, Meetings};
+use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Sender, Shape, Type, Waiting};
+use std::path::Path;
+use std::time::Duration;
+
+/// How long a spinning receiver looks before it sleeps: longer than any message takes, so that it never sleeps.
+const SPIN: Duration = Duration::from_millis(100);
+
+/// How messages are sent and received.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum How {
+    /// Copied in and out; the receiver sleeps.
+    Blocking,
+    /// Copied in and out; the receiver looks again and again before it would sleep.
+    Spinning,
+    /// The same, written and read in place.
+    Loaned,
+}
+
+/// One end: a mailbox of its own, and the way into the other's.
+pub struct Mailboxes {
+    receiver: Receiver,
+    sender: Sender,
+    label: Label,
+    how: How,
+    waiting: Waiting,
+    /// Bytes of each package, of which the link's user sees the head when they are loaned.
+    bytes: usize,
+}
+
+impl Mailboxes {
+    /// Opens an end on the node in this directory.
+    ///
+    /// # Errors
+    /// When the mailboxes cannot be made.
+    pub fn open(directory: &Path, end: End, bytes: usize, how: How, meetings: &mut Meetings) -> Result<Self, Failure> {
+        let failed = |error: &dyn std::fmt::Display| Failure::of("mailbox", error);
+        let body_bytes_max = u16::try_from(bytes).map_err(|error| failed(&error))?;
+        let (mine, other) = match end {
+            End::Ping => (Name::new(1, 1, 0, 0), Name::new(1, 2, 0, 0)),
+            End::Pong => (Name::new(1, 2, 0, 0), Name::new(1, 1, 0, 0)),
+        };
+        let node = Node::create(directory, 0o700).map_err(|error| failed(&error))?;
+        let participant = Participant::join(&node, mine).map_err(|error| failed(&error))?;
+        let shape = Shape { body_bytes_max, ..Shape::default() };
+        let receiver = participant.receiver(mine, shape).map_err(|error| failed(&error))?;
+        meetings.meet()?;
+        let sender = participant.sender(other).map_err(|error| failed(&error))?;
+        let spin = if how == How::Blocking { Duration::ZERO } else { SPIN };
+        let label = Label { from: mine, kind: Type::command(16), ..Label::default() };
+        Ok(Self { receiver, sender, label, how, waiting: Waiting { spin, deadline: None }, bytes })
+    }
+}
+
+impl Link for Mailboxes {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        let sent = match self.how {
+            How::Blocking | How::Spinning => self.sender.send(&self.label, &[message]),
+            How::Loaned => self.sender.loan(self.label.priority).and_then(|mut loan| {
+                loan.body()[..message.len()].copy_from_slice(message);
+                loan.send(&self.label, self.bytes)
+            }),
+        };
+        sent.map_err(|error| Failure::of("send", error))
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        let package = self.receiver.receive_timeout(self.waiting);
+        let package = package.ok_or_else(|| Failure::Failed("waited without a deadline, and got nothing".into()))?;
+        let body = package.body();
+        if body.len() != self.bytes || body.len() < message.len() {
+            return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), self.bytes)));
+        }
+        message.copy_from_slice(&body[..message.len()]);
+        Ok(())
+    }
+}

@@ -1,0 +1,70 @@
+//! A run: the computer, the cases one after the other, each told as soon as it is measured.
+
+use crate::cases::Case;
+use crate::environment::{self, Environment};
+use crate::harness::{self, Failure};
+use crate::rounds::Row;
+use crate::settings::Settings;
+use crate::table;
+
+/// What a run found.
+pub struct Report {
+    /// The computer.
+    pub environment: Environment,
+    /// All rows of all cases.
+    pub rows: Vec<Row>,
+}
+
+impl Report {
+    /// Whether every contender did what it should. A missed target is no failure.
+    pub fn is_sound(&self) -> bool {
+        !self.rows.iter().any(|row| matches!(row.result, Err(Failure::Failed(_))))
+    }
+}
+
+/// Measures these cases, those that the settings want, and tells `say` every line or table; false from it ends the run:
+/// nobody reads. Meanwhile the signals that end a program end this run alone, and what it made is removed.
+///
+/// The calling process must have no other thread.
+///
+/// # Errors
+/// When a word of the settings names no case, when a case cannot be begun, or after a signal.
+pub fn run(
+    settings: &Settings,
+    cases: &[Box<dyn Case>],
+    json: bool,
+    say: impl Fn(String) -> bool,
+) -> Result<Report, Failure> {
+    check_names(&settings.only, cases)?;
+    harness::heed();
+    harness::sweep();
+    let environment = Environment::look()?;
+    let mut report = Report { environment, rows: Vec::new() };
+    let head = &report.environment;
+    let mut is_read =
+        say(if json { table::json_environment(head) } else { format!("{}\n", table::human_environment(head)) });
+    for case in cases.iter().filter(|case| settings.wants(&case.name())) {
+        if !is_read {
+            break;
+        }
+        let rows = case.run(settings)?;
+        if harness::interrupted() {
+            return Err(Failure::Failed("interrupted".into()));
+        }
+        is_read = if json { rows.iter().all(|row| say(table::json(row))) } else { say(table::human(&rows)) };
+        report.rows.extend(rows);
+    }
+    let load = environment::load();
+    say(if json { table::json_load_afterwards(&load) } else { format!("load afterwards  {load}") });
+    Ok(report)
+}
+
+/// Each word that was asked for must be part of a case's name.
+fn check_names(only: &[String], cases: &[Box<dyn Case>]) -> Result<(), Failure> {
+    let mut names: Vec<String> = cases.iter().map(|case| case.name()).collect();
+    names.dedup();
+    match only.iter().find(|word| !names.iter().any(|name| name.contains(word.as_str()))) {
+        None => Ok(()),
+        Some(word) => Err(Failure::Failed(format!("no case is called `{word}`; there are: {}", names.join("; ")))),
+    }
+}

@@ -1,0 +1,174 @@
+//! Contenders of a case, one after the other, round after round; and the rows that come of it.
+
+use crate::harness::{Failure, alone, interrupted};
+use crate::settings::Settings;
+use crate::statistics::{Ratio, Summary, median};
+use std::time::Duration;
+
+/// Lets the kernel's fair server and everybody else have the processors between two turns.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Somebody who is measured in a case.
+pub struct Contender<'a> {
+    /// As the table calls it.
+    pub name: &'static str,
+    /// One turn.
+    pub turn: Box<dyn Fn() -> Result<Summary, Failure> + 'a>,
+}
+
+impl<'a> Contender<'a> {
+    /// One whose turn gives samples, of which the quantiles count.
+    pub fn sampled(name: &'static str, turn: impl Fn() -> Result<Vec<f64>, Failure> + 'a) -> Self {
+        let turn = move || Summary::of(&mut turn()?).ok_or_else(|| Failure::Failed("not one sample".into()));
+        Self { name, turn: Box::new(turn) }
+    }
+}
+
+/// What has to be reached, as a ratio to another contender.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Target {
+    /// Of times and sizes.
+    AtMost(f64),
+    /// Of rates.
+    AtLeast(f64),
+}
+
+impl Target {
+    /// The ratio itself.
+    pub fn bound(self) -> f64 {
+        match self {
+            Self::AtMost(bound) | Self::AtLeast(bound) => bound,
+        }
+    }
+
+    /// Whether this ratio reaches it.
+    pub fn is_met(self, ratio: f64) -> bool {
+        match self {
+            Self::AtMost(bound) => ratio <= bound,
+            Self::AtLeast(bound) => ratio >= bound,
+        }
+    }
+}
+
+/// A contender to compare ours with.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Versus {
+    /// Its name in the same case.
+    pub name: &'static str,
+    /// What the ratio of the medians must reach; none: for information.
+    pub p50: Option<Target>,
+    /// What the ratio of the 99 % quantiles must reach.
+    pub p99: Option<Target>,
+}
+
+/// One line of the table: what a contender did, and how it stands to another.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Row {
+    /// Which case.
+    pub case: String,
+    /// Size of a message, where there is one.
+    pub bytes: Option<usize>,
+    /// Who did it.
+    pub who: &'static str,
+    /// Unit of the figures, `us` or `packages/s` say.
+    pub unit: &'static str,
+    /// Medians over rounds (of the maximum: the largest), or why there are none.
+    pub result: Result<Summary, Failure>,
+    /// Whom it is compared with.
+    pub versus: Option<Versus>,
+    /// Of the medians, taken within each round.
+    pub ratio_p50: Option<Ratio>,
+    /// Of the 99 % quantiles.
+    pub ratio_p99: Option<Ratio>,
+}
+
+impl Row {
+    /// Whether every target is met; none where there is no target, or where what it is compared with was skipped.
+    pub fn met(&self) -> Option<bool> {
+        let versus = self.versus?;
+        if versus.p50.is_none() && versus.p99.is_none() {
+            return None;
+        }
+        if matches!(self.result, Err(Failure::Failed(_))) {
+            return Some(false);
+        }
+        let reached = |target: Option<Target>, ratio: Option<Ratio>| match (target, ratio) {
+            (None, _) => Some(true),
+            (Some(target), Some(ratio)) => Some(target.is_met(ratio.median)),
+            (Some(_), None) => None,
+        };
+        Some(reached(versus.p50, self.ratio_p50)? && reached(versus.p99, self.ratio_p99)?)
+    }
+}
+
+/// What is measured: the columns that all rows of a case share.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The case's name.
+    pub case: String,
+    /// Size of a message, where there is one.
+    pub bytes: Option<usize>,
+    /// Unit of the figures.
+    pub unit: &'static str,
+}
+
+/// Measures all contenders, interleaved, and compares the first one, which is ours, with each of `versus`. Rows: ours, once for
+/// each comparison (once without, if there is none), then the others.
+pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender], versus: &[Versus]) -> Vec<Row> {
+    let turns = interleave(settings, contenders);
+    let row = |at: usize, versus: Option<&Versus>| {
+        let of = |name| contenders.iter().position(|contender| contender.name == name).map(|at| turns[at].as_slice());
+        let other = versus.and_then(|versus| of(versus.name)).unwrap_or_default();
+        Row {
+            case: subject.case.clone(),
+            bytes: subject.bytes,
+            who: contenders[at].name,
+            unit: subject.unit,
+            result: over_rounds(&turns[at]),
+            versus: versus.copied(),
+            ratio_p50: ratio(&turns[at], other, |summary| Some(summary.p50)),
+            ratio_p99: ratio(&turns[at], other, |summary| summary.p99),
+        }
+    };
+    let ours = versus.iter().map(Some).chain(versus.is_empty().then_some(None)).map(|versus| row(0, versus));
+    let others = (1..contenders.len()).map(|at| row(at, None));
+    ours.chain(others).collect()
+}
+
+type Turns = Vec<Result<Summary, Failure>>;
+
+/// For each contender its turns, one a round. Who failed or was skipped once has no further turn.
+fn interleave(settings: &Settings, contenders: &[Contender]) -> Vec<Turns> {
+    let mut turns: Vec<Turns> = contenders.iter().map(|_| Vec::new()).collect();
+    for _ in 0..settings.rounds.max(1) {
+        for (contender, turns) in contenders.iter().zip(&mut turns) {
+            if !turns.iter().any(Result::is_err) && !interrupted() {
+                std::thread::sleep(PAUSE);
+                turns.push(alone().and_then(|_alone| (contender.turn)()));
+            }
+        }
+    }
+    turns
+}
+
+/// Ratio of one figure to another's in the same round. Who did not do every round has none.
+fn ratio(
+    ours: &[Result<Summary, Failure>],
+    others: &[Result<Summary, Failure>],
+    figure: fn(&Summary) -> Option<f64>,
+) -> Option<Ratio> {
+    let pairs =
+        ours.iter().zip(others).map(|(our, other)| Some(figure(our.as_ref().ok()?)? / figure(other.as_ref().ok()?)?));
+    Ratio::of(pairs.collect::<Option<Vec<f64>>>()?)
+}
+
+fn over_rounds(turns: &[Result<Summary, Failure>]) -> Result<Summary, Failure> {
+    let rounds = turns.iter().cloned().collect::<Result<Vec<Summary>, Failure>>()?;
+    let middle = |figure: fn(&Summary) -> Option<f64>| median(rounds.iter().filter_map(figure));
+    Ok(Summary {
+        p50: middle(|round| Some(round.p50)).ok_or_else(|| Failure::Failed("not one round".into()))?,
+        p99: middle(|round| round.p99),
+        p999: middle(|round| round.p999),
+        max: rounds.iter().filter_map(|round| round.max).reduce(f64::max),
+    })
+}

@@ -1,0 +1,34 @@
+//! How much is measured.
+
+use std::path::PathBuf;
+
+/// How much a run measures. All cases obey it.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Rounds; in each, every contender of a case has its turn.
+    pub rounds: usize,
+    /// Only cases whose names contain one of these; all if empty.
+    pub only: Vec<String>,
+    /// A few hundred messages a turn: shows that everything runs, and measures little.
+    pub quick: bool,
+    /// The `rohrpost` command to measure; none: the one beside this program.
+    pub rohrpost: Option<PathBuf>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { rounds: 5, only: Vec::new(), quick: false, rohrpost: None }
+    }
+}
+
+impl Settings {
+    /// Whether a case was asked for.
+    pub fn wants(&self, case: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|part| case.contains(part.as_str()))
+    }
+
+    /// How many of something a turn does: `full`, or far fewer in a quick run.
+    pub fn count(&self, full: usize) -> usize {
+        if self.quick { full.min(300) } else { full }
+    }
+}

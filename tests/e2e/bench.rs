@@ -1,0 +1,49 @@
+//! `rohrpost bench local`. What its sentence says of other computers is tested beside its code, how it measures in `benches`.
+
+use crate::harness::{OUTPUT, Place, probe};
+use serde_json::Value;
+
+/// Sizes of each case, and the floor beside it.
+const CASES: [(&str, &str); 2] = [("blocking", "futex"), ("spinning", "spin")];
+
+#[test]
+fn the_self_test_has_all_figures() {
+    let place = Place::new();
+    let said = place.say(&["bench", "local", "--json"]);
+    let lines: Vec<Value> = said.ok().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.first().unwrap()["case"], "environment");
+    assert_eq!(lines.last().unwrap()["case"], "environment-after");
+    for (case, floor) in CASES {
+        for bytes in [64, 1024] {
+            let row = |who: &str| {
+                let is_it = |line: &&Value| line["case"] == case && line["bytes"] == bytes && line["who"] == who;
+                lines.iter().find(is_it).unwrap_or_else(|| panic!("no {case} {bytes} {who}: {lines:#?}"))
+            };
+            for row in [row("rohrpost"), row(floor)] {
+                assert!(row["p50"].as_f64().unwrap() > 0.0 && row["unit"] == "us", "{row}");
+            }
+            let ours = row("rohrpost");
+            assert!(
+                ours["vs"] == floor && ours["ratio_p50"].as_f64().unwrap() > 0.0 && ours["met"].is_boolean(),
+                "{ours}"
+            );
+        }
+    }
+    assert_eq!(lines.len(), 2 + 2 * 2 * 2, "{lines:#?}");
+    place.assert_empty();
+}
+
+#[test]
+fn a_robot_that_runs_is_not_disturbed_and_whoever_measures_is_told() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let pid = robot.pid("probe.0");
+    let said = place.say(&["bench", "local"]);
+    assert!(said.err.starts_with("warning: ") && said.err.contains("is launched on this computer"), "{said:?}");
+    assert!(said.out.contains("LOOK: ") && said.out.contains("a node is launched"), "{said:?}");
+    let rows = said.out.lines().filter(|line| line.starts_with(" blocking ") || line.starts_with(" spinning ")).count();
+    assert_eq!((said.code, rows), (Some(0), 8), "{said:?}");
+    assert_eq!(robot.pid("probe.0"), pid);
+    launch.stop();
+    place.assert_empty();
+}
