@@ -143,10 +143,12 @@ const OPERATIONS: &[Operation] = &[
 fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
     ptrace::traceme().unwrap();
     let stop = || raise(Signal::SIGSTOP).unwrap();
-    let send = |sender: &mut Sender, priority| match sender.send(&label(priority, 1), &[b"step", b" by step"]) {
+    // Full: it may look at each slot just while that one is in use, since the others act between any two of its instructions.
+    let told = |sent| match sent {
         Ok(()) | Err(SendError::Full(_)) => {}
         Err(error) => panic!("{error}"),
     };
+    let send = |sender: &mut Sender, priority| told(sender.send(&label(priority, 1), &[b"step", b" by step"]));
     let me = ground.join();
     match operation.does {
         Does::Receive => {
@@ -162,9 +164,10 @@ fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
             }
             stop();
             if matches!(operation.does, Does::Loan(_)) {
-                let mut loan = sender.loan(priority).unwrap();
-                loan.body()[..12].fill(1);
-                loan.send(&label(priority, 1), 12).unwrap();
+                told(sender.loan(priority).and_then(|mut loan| {
+                    loan.body()[..12].fill(1);
+                    loan.send(&label(priority, 1), 12)
+                }));
             } else {
                 send(&mut sender, priority);
             }
