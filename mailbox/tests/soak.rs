@@ -22,6 +22,8 @@ use std::time::{Duration, Instant};
 
 const PROCESSES: usize = 4;
 const SENDERS: usize = 8;
+/// Fewer would prove little.
+const TAKEN_MIN: u64 = 1000;
 /// Says that it lives so often.
 const TELL_EVERY: Duration = Duration::from_secs(10);
 
@@ -79,7 +81,8 @@ fn soak(ground: &Ground, shape: Shape, way: Way, time: Duration) -> u64 {
     let threads = start_threads(board, ground, shape.full);
 
     let (began, mut told) = (Instant::now(), Instant::now());
-    while began.elapsed() < time {
+    // However busy the computer is, some are received.
+    while began.elapsed() < time || listener.taken < TAKEN_MIN {
         listener.once();
         if told.elapsed() > TELL_EVERY {
             told = Instant::now();
@@ -140,7 +143,6 @@ fn check(info: &MailboxInfo, tally: &Tally) {
     assert_eq!(cannot_be, [0; 3]);
     assert_eq!(info.shape.full == Full::Latest, lost(info, Loss::Replaced) > 0, "only newer states replace: {info:#?}");
     assert!(info.shape.full != Full::Reject || lost(info, Loss::Displaced) == 0);
-    assert!(tally.received > 100, "too quiet to prove anything: {info:#?}");
 }
 
 /// What the senders' own tables say is the same. A loan that was asked for and not lent had no type yet; they do not count it.

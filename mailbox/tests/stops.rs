@@ -129,9 +129,12 @@ enum Does {
 }
 
 const SLOTS: u16 = 4;
+/// How it ended.
+const DONE: u32 = 1;
+const REFUSED: u32 = 2;
 const OPERATIONS: &[Operation] = &[
     Operation { name: "send", full: Full::Reject, filled: 2, does: Does::Send(LOW) },
-    Operation { name: "send a loan", full: Full::Latest, filled: 2, does: Does::Loan(LOW) },
+    Operation { name: "send a loan", full: Full::Latest, filled: 2, does: Does::Loan(HIGH) },
     Operation { name: "send and displace", full: Full::Displace, filled: 4, does: Does::Send(HIGH) },
     Operation { name: "send and be refused", full: Full::Displace, filled: 4, does: Does::Send(LOW) },
     Operation { name: "send and replace", full: Full::Latest, filled: 2, does: Does::Renew(Priority(1)) },
@@ -143,17 +146,20 @@ const OPERATIONS: &[Operation] = &[
 fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
     ptrace::traceme().unwrap();
     let stop = || raise(Signal::SIGSTOP).unwrap();
-    let send = |sender: &mut Sender, priority| match sender.send(&label(priority, 1), &[b"step", b" by step"]) {
-        Ok(()) | Err(SendError::Full(_)) => {}
+    // Full: it may look at each slot just while that one is in use, since the others act between any two of its instructions.
+    let told = |sent| match sent {
+        Ok(()) => DONE,
+        Err(SendError::Full(_)) => REFUSED,
         Err(error) => panic!("{error}"),
     };
+    let send = |sender: &mut Sender, priority| told(sender.send(&label(priority, 1), &[b"step", b" by step"]));
     let me = ground.join();
     match operation.does {
         Does::Receive => {
             let mut receiver = me.receiver(MAILBOX, operation.shape()).unwrap();
             stop();
             drop(receiver.try_receive());
-            done.store(1, SeqCst);
+            done.store(DONE, SeqCst);
         }
         Does::Send(priority) | Does::Loan(priority) | Does::Renew(priority) => {
             let mut sender = me.sender(MAILBOX).unwrap();
@@ -161,14 +167,15 @@ fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
                 send(&mut sender, priority);
             }
             stop();
-            if matches!(operation.does, Does::Loan(_)) {
-                let mut loan = sender.loan(priority).unwrap();
-                loan.body()[..12].fill(1);
-                loan.send(&label(priority, 1), 12).unwrap();
+            let how = if matches!(operation.does, Does::Loan(_)) {
+                told(sender.loan(priority).and_then(|mut loan| {
+                    loan.body()[..12].fill(1);
+                    loan.send(&label(priority, 1), 12)
+                }))
             } else {
-                send(&mut sender, priority);
-            }
-            done.store(1, SeqCst);
+                send(&mut sender, priority)
+            };
+            done.store(how, SeqCst);
         }
     }
 }
@@ -222,8 +229,10 @@ impl Operation {
 
     /// Stops it after each instruction, so that others go on; then kills it after some.
     fn prove(&self, ground: &Ground) {
-        let instructions = self.lead(ground, u64::MAX, Others::go_on);
-        assert!(instructions > 200, "{}: only {instructions} instructions", self.name);
+        let (stops, adversely) = self.lead(ground, u64::MAX, Others::go_on);
+        let (instructions, ended) = self.lead(ground, u64::MAX, |_, _| ());
+        let expected = if self.name == "send and be refused" { REFUSED } else { DONE };
+        assert_eq!((ended, instructions > 200), (expected, true), "{}: {instructions} instructions", self.name);
         let kills = kills().min(instructions);
         for kill in 0..kills {
             self.lead(ground, 1 + kill * instructions / kills, |_, _| ());
@@ -232,13 +241,14 @@ impl Operation {
             }
         }
         tell(format_args!(
-            "{}: stopped after each of {instructions} instructions, killed after {kills} of them",
-            self.name
+            "{}: stopped after each of {stops} instructions (refused: {}), killed after {kills} of {instructions}",
+            self.name,
+            adversely == REFUSED
         ));
     }
 
-    /// Leads a process through it, for so many instructions at most, then kills it. Returns how many there were.
-    fn lead(&self, ground: &Ground, most: u64, mut meanwhile: impl FnMut(&mut Others, &str)) -> u64 {
+    /// Leads a process through it, for so many instructions at most, then kills it. Returns how many there were, and how it ended.
+    fn lead(&self, ground: &Ground, most: u64, mut meanwhile: impl FnMut(&mut Others, &str)) -> (u64, u32) {
         drop(ground.join().receiver(MAILBOX, self.shape()).unwrap());
         let done = shared();
         let actor = Actor::new(|| led(self, ground, done));
@@ -252,10 +262,14 @@ impl Operation {
             instructions += 1;
             meanwhile(&mut others, self.name);
         }
+        // Stopped in its midst, whatever it holds there.
+        if done.load(SeqCst) == 0 {
+            others.go_on(self.name);
+        }
         actor.kill();
         ground.node().announce_death();
         self.check(ground, others);
-        instructions
+        (instructions, done.load(SeqCst))
     }
 
     /// All that others sent was received or counted as lost, at most one too many; and all slots come into use again.

@@ -177,6 +177,12 @@ impl Storm {
     /// One of them, wherever it is; another takes its seat.
     fn kill_one(&mut self) {
         let seat = self.random.below(self.actors.len() as u64) as usize;
+        self.deadline = Instant::now() + PATIENCE;
+        // Some while they start; most at work, however busy the computer is.
+        if !self.random.one_in(4) {
+            self.wait("whoever is to be killed works", |storm| storm.board.seat(seat).is_ready());
+            std::thread::sleep(Duration::from_micros(self.random.below(500)));
+        }
         let actor = self.actors.swap_remove(seat);
         self.kill(actor, seat);
         let instead = self.start(seat);

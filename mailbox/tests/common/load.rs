@@ -138,7 +138,9 @@ impl Way {
 /// Receives from several mailboxes.
 pub(crate) struct Listener {
     board: Board,
-    pub(crate) receivers: Vec<Receiver>,
+    receivers: Vec<Receiver>,
+    /// Packages so far.
+    pub(crate) taken: u64,
     way: Way,
     random: Random,
     watches: Option<(Watches, UnixStream)>,
@@ -153,7 +155,7 @@ impl Listener {
             watches.add(&near, Interest::Read).unwrap();
             (watches, far)
         });
-        Self { board, receivers, way, random: Random::new(me.incarnation().into()), watches }
+        Self { board, receivers, taken: 0, way, random: Random::new(me.incarnation().into()), watches }
     }
 
     /// Waits, then takes some of what is there.
@@ -163,6 +165,7 @@ impl Listener {
             for _ in 0..self.random.below(40) {
                 let Some(package) = receiver.try_receive() else { break };
                 self.board.received(&package);
+                self.taken += 1;
                 let again = package.head().options.has(Options::REDELIVERED);
                 if self.random.one_in(if again { 2 } else { 100 }) {
                     // With a package in hand, which may be its end; the mailbox fills.
