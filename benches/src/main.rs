@@ -70,8 +70,5 @@ fn local(arguments: &Local) -> Result<bool, Failure> {
     let settings =
         Settings { rounds, only: arguments.only.clone(), quick: arguments.quick, rohrpost: arguments.rohrpost.clone() };
     let say = |text: String| writeln!(io::stdout(), "{text}").is_ok();
-    let waits = || {
-        let _ = writeln!(io::stderr(), "waiting: another bench runs on this computer");
-    };
-    Ok(report::run(&settings, &cases::all(), arguments.json, say, waits)?.is_sound())
+    Ok(report::run(&settings, &cases::all(), arguments.json, say)?.is_sound())
 }

@@ -23,8 +23,7 @@ impl Report {
 }
 
 /// Measures these cases, those that the settings want, and tells `say` every line or table; false from it ends the run:
-/// nobody reads. Waits until no other bench measures on this computer, and says so to `waits`. Meanwhile the signals that end a
-/// program end this run alone, and what it made is removed.
+/// nobody reads. Meanwhile the signals that end a program end this run alone, and what it made is removed.
 ///
 /// The calling process must have no other thread.
 ///
@@ -35,11 +34,9 @@ pub fn run(
     cases: &[Box<dyn Case>],
     json: bool,
     say: impl Fn(String) -> bool,
-    waits: impl FnOnce(),
 ) -> Result<Report, Failure> {
     check_names(&settings.only, cases)?;
     harness::heed();
-    let _alone = harness::alone(waits)?;
     harness::sweep();
     let environment = Environment::look()?;
     let mut report = Report { environment, rows: Vec::new() };

@@ -1,6 +1,6 @@
 //! Contenders of a case, one after the other, round after round; and the rows that come of it.
 
-use crate::harness::{Failure, interrupted};
+use crate::harness::{Failure, alone, interrupted};
 use crate::settings::Settings;
 use crate::statistics::{Ratio, Summary, median};
 use std::time::Duration;
@@ -144,7 +144,7 @@ fn interleave(settings: &Settings, contenders: &[Contender]) -> Vec<Turns> {
         for (contender, turns) in contenders.iter().zip(&mut turns) {
             if !turns.iter().any(Result::is_err) && !interrupted() {
                 std::thread::sleep(PAUSE);
-                turns.push((contender.turn)());
+                turns.push(alone().and_then(|_alone| (contender.turn)()));
             }
         }
     }

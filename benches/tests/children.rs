@@ -1,6 +1,8 @@
 //! Children end when their time is over, when they fail, and when their parent is gone. Without the test harness, whose
 //! threads must not be forked.
 
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
 use rohrpost_bench::Failure;
 use rohrpost_bench::harness::{Child, Shared, Zeroable};
 use std::path::Path;

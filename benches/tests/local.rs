@@ -1,5 +1,7 @@
 //! All cases, run small: every contender delivers what it should, every line says what it has to, and nothing is left behind.
 
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::{Map, Value};

@@ -29,6 +29,7 @@ const LATE_US: f64 = 100.0;
 const TUNING: &str = "docs/src/tuning.md";
 
 #[derive(clap::Args)]
+#[command(after_help = "Example: rohrpost bench local")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -62,8 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         ));
     }
     let settings = Settings { rounds: ROUNDS, ..Settings::default() };
-    let waits = || warn("waiting: another bench runs on this computer");
-    let report = report::run(&settings, &cases::self_test(scheduling), arguments.json, say, waits)?;
+    let report = report::run(&settings, &cases::self_test(scheduling), arguments.json, say)?;
     if !arguments.json {
         say(format!("\n{}", meaning(&report, scheduling, &Hints::look())));
     }

@@ -8,6 +8,10 @@ use std::time::{Duration, Instant};
 /// Most samples of one turn.
 const SAMPLES_MAX: usize = 20_000;
 
+/// With so few a turn that is over goes on: where others keep the processors busy and nothing is real-time, a round trip can
+/// take milliseconds.
+const SAMPLES_MIN: usize = 50;
+
 /// Bytes at the head of each message: its number. All other bytes follow from it.
 const NUMBER_BYTES: usize = 8;
 
@@ -59,7 +63,7 @@ pub struct Cell {
     pub scheduling: Scheduling,
     /// Sleep before each message; none: one after the other.
     pub pace: Option<Duration>,
-    /// Ends the turn with the samples there are. Below 0.9 s for who never sleeps: the kernel's fair server stops a real-time
+    /// Ends the turn with the samples there are; a quarter of it ends the warm-up. Below 0.9 s for who never sleeps: the kernel's fair server stops a real-time
     /// process that keeps others out for 50 ms in each second.
     pub cap: Duration,
 }
@@ -121,7 +125,8 @@ pub fn ping(link: &mut impl Link, cell: &Cell) -> Result<Vec<u64>, Failure> {
     let mut message = vec![0; cell.bytes];
     let mut echo = vec![0; cell.bytes];
     let mut round_trips = Vec::with_capacity(cell.messages);
-    let over = Instant::now() + cell.cap;
+    let began = Instant::now();
+    let mut is_warm = cell.warm_up == 0;
     for number in 0..(cell.warm_up + cell.messages) as u64 {
         fill(&mut message, number);
         if let Some(pace) = cell.pace {
@@ -132,10 +137,12 @@ pub fn ping(link: &mut impl Link, cell: &Cell) -> Result<Vec<u64>, Failure> {
         link.receive(&mut echo)?;
         let back = monotonic_ns();
         check_echo(&message, &echo)?;
-        if number >= cell.warm_up as u64 {
+        if is_warm {
             round_trips.push(back.saturating_sub(sent));
         }
-        if Instant::now() > over {
+        let spent = began.elapsed();
+        is_warm |= number + 1 >= cell.warm_up as u64 || spent > cell.cap / 4;
+        if spent > cell.cap && round_trips.len() >= SAMPLES_MIN.min(cell.messages) {
             break;
         }
     }
