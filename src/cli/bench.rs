@@ -29,6 +29,7 @@ const LATE_US: f64 = 100.0;
 const TUNING: &str = "docs/src/tuning.md";
 
 #[derive(clap::Args)]
+#[command(after_help = "Example: rohrpost bench local")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     what: What,

@@ -2,19 +2,16 @@
 //!
 //! Each turn makes its node anew, in a process of its own.
 
-use super::Case;
+use super::{Case, Done, as_failure};
 use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Shape, Type, monotonic_ns, node_directory};
-use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
-
-type Done<T> = Result<T, Box<dyn Error>>;
 
 const MAILBOXES: usize = 1_000;
 /// Times that all are listed in a turn.
@@ -76,12 +73,7 @@ impl Case for What {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let ours = Contender::sampled("rohrpost", || {
-            sample_in_child(PATIENCE, |samples| {
-                self.turn(settings, samples).map_err(|error| match error.downcast::<Failure>() {
-                    Ok(failure) => *failure,
-                    Err(error) => Failure::of("many mailboxes", error),
-                })
-            })
+            sample_in_child(PATIENCE, |samples| self.turn(settings, samples).map_err(as_failure("many mailboxes")))
         });
         let (name, limit_us) = self.limit();
         let limit = Contender {

@@ -16,6 +16,17 @@ use crate::harness::{Failure, Scheduling};
 use crate::rounds::Row;
 use crate::settings::Settings;
 
+/// What goes wrong in a turn that does many different things.
+type Done<T> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
+
+/// As a turn has to say it. What was skipped remains so.
+fn as_failure(what: &str) -> impl Fn(Box<dyn std::error::Error + Send + Sync>) -> Failure {
+    move |error| match error.downcast::<Failure>() {
+        Ok(failure) => *failure,
+        Err(error) => Failure::of(what, error),
+    }
+}
+
 /// Something that is measured, against whom, and with which target.
 pub trait Case {
     /// As `--only` and the table call it.

@@ -9,7 +9,7 @@
 //! role, so that exec costs all the same; what they do after `main` has rows of its own. All have their defaults: a mailbox of
 //! `Shape::default()`, a queue of the kernel's default size.
 
-use super::Case;
+use super::{Case, Done, as_failure};
 use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
@@ -17,13 +17,10 @@ use nix::mqueue::{MQ_OFlag, MqdT, mq_close, mq_open, mq_send, mq_timedreceive, m
 use nix::sys::stat::Mode;
 use nix::sys::time::TimeSpec;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Shape, Type, monotonic_ns, realtime_ns};
-use std::error::Error;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
-
-type Done<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 /// Starts of a turn.
 const STARTS: usize = 21;
@@ -99,31 +96,35 @@ impl Case for Startup {
 impl Startup {
     /// Microseconds of each start.
     fn turn<G: Ground>(&self, starts: usize, ground: impl FnOnce() -> Done<G>) -> Result<Vec<f64>, Failure> {
-        sample_in_child(PATIENCE, |samples| {
-            settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
-            self.start_all(starts, ground, samples).map_err(|error| Failure::of("start-up", error))
-        })
+        sample_in_child(PATIENCE, |samples| self.start_all(starts, ground, samples).map_err(as_failure("start-up")))
     }
 
     fn start_all<G: Ground>(&self, starts: usize, ground: impl FnOnce() -> Done<G>, samples: &Samples) -> Done<()> {
         let mut ground = ground()?;
-        for _ in 0..starts {
-            if self.start == Start::Waiting {
-                ground.make_waiting()?;
-            }
-            let role = ground.role(self.start)?;
-            let times = std::thread::scope(|scope| {
-                let program = scope.spawn(|| run(&role));
+        std::thread::scope(|scope| {
+            let (roles, to_start) = mpsc::channel();
+            let (done, ended) = mpsc::channel();
+            // Before this thread is bound to its processor: the other one must not inherit that.
+            scope.spawn(move || {
+                let settled = settle(End::Pong, Placement::TwoCores, Scheduling::Fifo);
+                to_start.into_iter().try_for_each(|role: String| done.send(settled.clone().map(|()| run(&role))))
+            });
+            settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
+            for _ in 0..starts {
+                if self.start == Start::Waiting {
+                    ground.make_waiting()?;
+                }
+                roles.send(ground.role(self.start)?)?;
                 if self.start == Start::New {
                     ground.answer_hello()?;
                 }
-                program.join().map_err(|_| "the thread that starts the program panicked")?
-            })?;
-            ground.forget()?;
-            let began_ns = if self.from == From::Exec { times.exec_ns } else { times.main_ns };
-            samples.push((times.first_ns - began_ns) as f64 / 1000.0);
-        }
-        Ok(())
+                let times = ended.recv()???;
+                ground.forget()?;
+                let began_ns = if self.from == From::Exec { times.exec_ns } else { times.main_ns };
+                samples.push((times.first_ns - began_ns) as f64 / 1000.0);
+            }
+            Ok(())
+        })
     }
 }
 
@@ -134,9 +135,8 @@ struct Times {
     first_ns: u64,
 }
 
-/// Starts the program on the other processor, and waits for its end.
+/// Starts the program on this thread's processor, and waits for its end.
 fn run(role: &str) -> Done<Times> {
-    settle(End::Pong, Placement::TwoCores, Scheduling::Fifo)?;
     let mut command = Command::new(std::env::current_exe()?);
     command.env(ROLE, role).stdin(Stdio::null()).stdout(Stdio::piped());
     let exec_ns = monotonic_ns();
