@@ -12,6 +12,7 @@
 
 use crate::node::Node;
 use crate::step::step;
+use nix::errno::Errno;
 use nix::fcntl::{OFlag, openat};
 use nix::sys::stat::{Mode, fchmod, fstat};
 use nix::unistd::{UnlinkatFlags, mkfifo, unlinkat, write};
@@ -21,12 +22,22 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
+/// Whether a sleep was one.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Slept {
+    /// Perhaps.
+    Perhaps,
+    /// The bell had been rung before.
+    NotAtAll,
+}
+
 /// Sleeps while `bell` still is `seen`, at most for `timeout`. May return early, for no reason or for a signal.
-pub(crate) fn sleep(bell: &AtomicU32, seen: u32, timeout: Option<Duration>) {
+pub(crate) fn sleep(bell: &AtomicU32, seen: u32, timeout: Option<Duration>) -> Slept {
     let timeout = timeout.map(timespec);
     let timeout = timeout.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
     // SAFETY: the word and the timeout outlive the call; FUTEX_WAIT reads both and writes neither.
-    unsafe { libc::syscall(libc::SYS_futex, bell.as_ptr(), libc::FUTEX_WAIT, seen, timeout) };
+    let result = unsafe { libc::syscall(libc::SYS_futex, bell.as_ptr(), libc::FUTEX_WAIT, seen, timeout) };
+    if result < 0 && Errno::last() == Errno::EAGAIN { Slept::NotAtAll } else { Slept::Perhaps }
 }
 
 /// A time too long to be told is as good as for ever.

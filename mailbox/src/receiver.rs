@@ -31,6 +31,8 @@ pub struct Receiver {
     deaths_seen: u32,
     /// Receives and waits until the slots are searched again, because one was still being filled after the last search.
     search_in: Option<u32>,
+    /// The last package came when it was about to sleep: before the next sleep it looks a little longer.
+    pub(crate) eager: bool,
     /// Holds the owner's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
     _lock: Held,
 }
@@ -40,7 +42,8 @@ impl Receiver {
         let queue = Queue::new(usize::from(segment.shape.slots));
         let deaths_seen = participant.node().page().deaths.load(Ordering::Acquire);
         let max_age_ns = segment.shape.max_age.map_or(u64::MAX, stored_ns);
-        let mut receiver = Self { participant, segment, queue, max_age_ns, deaths_seen, search_in: None, _lock: lock };
+        let mut receiver =
+            Self { participant, segment, queue, max_age_ns, deaths_seen, search_in: None, eager: false, _lock: lock };
         receiver.search();
         receiver
     }

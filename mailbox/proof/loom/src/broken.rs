@@ -100,7 +100,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "who_is_displaced_is_counted_and_not_received",
         says: RACE,
     },
-    // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All four must
+    // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All of them must
     // go for a race on the body: the hint's Acquire or the ticket counter's, which are there for other reasons, hands
     // the body over as well as the word's.
     Broken {
@@ -118,6 +118,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             ),
             edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
             edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)"),
+            edit("queue", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
+            edit("slots", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
         ],
         caught_by: "a_body_is_handed_over_whole",
         says: WRONG,
@@ -763,7 +765,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         file: "waiting",
         what: "models::Receiver::wait does the same, change both",
         lines: &[
-            "pub(crate) fn wait(",
+            "fn settled(",
             "let seen = entry.bell().seen();",
             ".drowsy());",
             "let idle = !found()",
