@@ -109,8 +109,10 @@ impl Fuzzer {
 
     fn run(&self, name: &str, effort: &Effort) -> Result<(), Failure> {
         let told = |path: &Path, error| format!("{}: {error}", path.display());
-        // Nodes of a target that was stopped in the middle would stay.
-        let nodes = self.work.join("nodes");
+        // In memory, where nodes belong; by one name, since those of a target that was stopped in the middle stay.
+        let memory = Path::new("/dev/shm");
+        let around = if memory.is_dir() { memory } else { &self.work };
+        let nodes = around.join(format!("rohrpost-fuzz-{}", std::process::id()));
         let _ = fs::remove_dir_all(&nodes);
         let found = match effort {
             Effort::Planted | Effort::Short => nodes.join("found"),
