@@ -18,15 +18,18 @@ const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-leve
 /// Dependencies that nearly all inputs go through.
 const OPTIMISED: [&str; 8] =
     ["toml", "toml_parser", "winnow", "serde_core", "serde_json", "postcard", "postcard-schema", "tempfile"];
-/// No input takes longer; the slowest of the corpus takes some hundredths of a second.
-const INPUT_SECONDS_MAX: u32 = 10;
+/// No input takes longer, also on a busy machine; the slowest of the corpus takes some hundredths of a second.
+const INPUT_SECONDS_MAX: u32 = 30;
 /// Nothing here needs more; a claimed length that is believed does.
 const MEGABYTES_MAX: u32 = 1024;
 /// An input of this length holds a whole small configuration.
 const INPUT_BYTES_MAX: u32 = 4096;
 
-/// `cargo xtask fuzz [TARGET...] [--seconds N]`: long runs, each beginning where the last one ended.
+/// `cargo xtask fuzz [TARGET...] [--seconds N]`: long runs, each beginning where the last one ended. `--short`: as in CI.
 pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
+    if args == ["--short"] {
+        return short().map(|()| ExitCode::SUCCESS);
+    }
     let mut seconds = 60;
     let mut names = Vec::new();
     let mut args = args.iter();
@@ -52,8 +55,9 @@ pub(crate) fn short() -> Result<(), Failure> {
     }
     let fuzzer = Fuzzer::build()?;
     match fuzzer.run("planted", &Effort::Planted) {
+        Err(failure) if failure.contains("planted: the fuzzer has found it") => eprintln!("==> as it should be"),
+        Err(failure) => return Err(failure),
         Ok(()) => return Err("the fuzzer does not find what is planted for it".into()),
-        Err(failure) => eprintln!("==> as it should be: {failure}"),
     }
     fuzzer.run_all(&fuzzer.targets()?, &Effort::Short)
 }
@@ -105,8 +109,10 @@ impl Fuzzer {
 
     fn run(&self, name: &str, effort: &Effort) -> Result<(), Failure> {
         let told = |path: &Path, error| format!("{}: {error}", path.display());
-        // Nodes of a target that was stopped in the middle would stay.
-        let nodes = self.work.join("nodes");
+        // In memory, where nodes belong; by one name, since those of a target that was stopped in the middle stay.
+        let memory = Path::new("/dev/shm");
+        let around = if memory.is_dir() { memory } else { &self.work };
+        let nodes = around.join(format!("rohrpost-fuzz-{}", std::process::id()));
         let _ = fs::remove_dir_all(&nodes);
         let found = match effort {
             Effort::Planted | Effort::Short => nodes.join("found"),
@@ -131,6 +137,10 @@ impl Fuzzer {
         let kept = self.corpus.join(name);
         if kept.is_dir() {
             command.arg(kept);
+        }
+        let words = self.corpus.with_file_name("dictionaries").join(name);
+        if words.is_file() {
+            command.arg(format!("-dict={}", words.display()));
         }
         let log = self.work.join(format!("{name}.log"));
         let output = fs::File::create(&log).map_err(|error| told(&log, error))?;

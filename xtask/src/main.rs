@@ -21,8 +21,8 @@ cargo xtask test
     All tests: the workspace's, the GUI bridge's, and those that need Rerun's command line.
 cargo xtask ci
     Format, clippy for both builds, then all tests.
-cargo xtask fuzz [TARGET...] [--seconds N]
-    Fuzzes each target, or those named, for so long (60 s), from where the last run ended.
+cargo xtask fuzz [TARGET...] [--seconds N] | --short
+    Fuzzes each target, or those named, for so long (60 s), from where the last run ended; or as the tests do, a little.
 cargo xtask tsan
     Runs the mailbox's slot core, and broken variants of it, under ThreadSanitizer.
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]

@@ -58,6 +58,8 @@ fn told(ty: &OwnedNamedType, error: &WalkError) -> String {
 /// ```
 pub fn toml_text(value: &Value) -> String {
     match value {
+        // In TOML it has small letters.
+        Value::F(x) if x.is_nan() => "nan".into(),
         Value::F(x) => format!("{x:?}"),
         Value::Text(text) => toml::Value::String(text.clone()).to_string(),
         Value::Variant(..) => toml::Value::String(value_text(value)).to_string(),

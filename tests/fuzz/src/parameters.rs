@@ -69,7 +69,9 @@ fn taken(value: &Value) {
             continue;
         };
         let again = table["x"].clone().try_into::<Value>().unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(from_file(&ty, &again).as_ref(), Ok(&bytes), "{}: {}", ty.name, toml_text(&read));
+        let again = from_file(&ty, &again).map(|bytes| decode(&ty, &bytes));
+        // By text, since a NaN is not itself.
+        assert_eq!(format!("{again:?}"), format!("{:?}", Ok::<_, String>(Ok::<_, ()>(&read))), "{}", ty.name);
     }
 }
 

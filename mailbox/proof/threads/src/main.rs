@@ -42,7 +42,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// How many of what a run does; the environment variable makes it more or fewer, percent.
 fn scaled(usual: u64) -> u64 {
     let percent = std::env::var("ROHRPOST_RUN_PERCENT").ok().and_then(|text| text.parse().ok());
-    let usually = if cfg!(test) { 5 } else { 400 };
+    let usually = if cfg!(test) { 5 } else { 200 };
     (usual * percent.unwrap_or(usually) / 100).max(1)
 }
 
