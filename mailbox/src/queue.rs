@@ -105,6 +105,11 @@ impl Queue {
         (0..slots.count()).for_each(|slot| self.defer(slot));
     }
 
+    /// Looks before it takes the next: somebody died, perhaps before it alerted.
+    pub(crate) fn doubt(&mut self) {
+        self.level = NO_LEVEL;
+    }
+
     fn defer(&mut self, slot: usize) {
         self.deferred[slot / 64] |= 1 << (slot % 64);
     }

@@ -179,6 +179,7 @@ impl Receiver {
             counters.lost(crate::name::Priority(0), Loss::Unfinished, freed as u64);
         }
         self.queue.rescan(&slots);
+        self.queue.doubt();
     }
 
     /// Turns hints into what they speak of, so that those which speak of nothing keep nobody awake.

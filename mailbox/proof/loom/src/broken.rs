@@ -11,6 +11,7 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("what_comes_as_the_level_sinks_is_next", 2),
     ("no_alert_is_lost", 1),
     ("a_new_owner_says_its_own_level", 2),
+    ("who_dies_before_it_alerts_is_heard", 2),
     ("the_newest_is_found_in_its_place", 1),
     ("who_is_displaced_is_counted_and_not_received", 2),
     ("displacing_keeps_the_order", 2),
@@ -368,6 +369,13 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "a_successor_trusts_the_level",
         edits: &[edit("queue", "receives: 0, level: NO_LEVEL }", "receives: 0, level: 0 }")],
         caught_by: "a_new_owner_says_its_own_level",
+        says: WRONG,
+    },
+    // It has hinted, and nobody looks.
+    Broken {
+        name: "a_death_raises_no_doubt",
+        edits: &[edit("queue", "        self.level = NO_LEVEL;\n    }", "    }")],
+        caught_by: "who_dies_before_it_alerts_is_heard",
         says: WRONG,
     },
     // The state's newer package waits until all that was known has been received.
@@ -800,7 +808,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
     Mirrored {
         file: "receiver",
         what: "models::Receiver::search does the same, change both",
-        lines: &["fn search(", "slots.reclaim(", "self.queue.rescan(&slots);"],
+        lines: &["fn search(", "slots.reclaim(", "self.queue.rescan(&slots);", "self.queue.doubt();"],
     },
     Mirrored {
         file: "registry",

@@ -43,7 +43,7 @@ pub(crate) fn a_second_package_never_passes_the_first() {
     let (mailbox, queue) = one_received(&[(10, 9)]);
     let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
-    receiver.search();
+    receiver.queue.rescan(&mailbox.slots());
     let mut received = receiver.take_times(1);
     assert_eq!(sender.join().unwrap(), [1, 2]);
     received.extend(receiver.drain());
@@ -145,6 +145,18 @@ pub(crate) fn a_new_owner_says_its_own_level() {
     between.join().unwrap();
     let expected: &[u8] = if first == Some(9) { &[2, 3] } else { &[9, 3] };
     assert_eq!(owner.drain(), expected);
+}
+
+/// The urgent sender dies before it alerts. When its death is noticed its package is next.
+pub(crate) fn who_dies_before_it_alerts_is_heard() {
+    let (mailbox, queue) = one_received(&[(10, 1), (10, 2), (10, 3)]);
+    let mut receiver = Receiver { queue, ..mailbox.receiver() };
+    let dead = mailbox.dies_sending(1, Full::Displace, "publish: hint", &[(20, 9)]);
+    let first = receiver.take();
+    assert!(dead.join().unwrap());
+    receiver.search();
+    let expected: &[u8] = if first == Some(9) { &[2, 3] } else { &[9, 3] };
+    assert_eq!(receiver.drain(), expected);
 }
 
 /// A state that the receiver knows is sent anew: the newer one is received in the place of the older, not after all that is known.

@@ -281,6 +281,7 @@ impl Receiver<'_> {
         reached("search: before");
         let freed = slots.reclaim(|by| self.mailbox.is_dead(by), |victim| self.mailbox.count(victim));
         self.queue.rescan(&slots);
+        self.queue.doubt();
         freed
     }
 }

@@ -12,7 +12,7 @@ fn a_receiver_dies_receiving() {
         let found = adopt_and_drain(ground, u64::from(death.is_some()));
         let expected: &[_] = match death.map(|death| death.step.as_str()) {
             // Not taken yet.
-            Some("take: chosen") => &[(0, false), (1, false), (2, false)],
+            Some("level: lowered" | "take: chosen") => &[(0, false), (1, false), (2, false)],
             // In hand.
             Some("take: taken" | "release: before") => &[(0, true), (1, false), (2, false)],
             _ => &[(1, false), (2, false)],
