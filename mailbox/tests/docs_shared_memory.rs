@@ -1,4 +1,5 @@
-//! What `docs/src/shared-memory.md` says lies where it says: read from the files by number alone.
+//! What `docs/src/shared-memory.md` says lies where it says: read from the files by number alone. The numbers of what every package
+//! touches are read from the page itself.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -6,8 +7,25 @@ mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, label};
 use rohrpost_mailbox::{Class, Full, Interest, ModuleState, Name, Participant, Shape, TimeKeeper, TimeSource, Watches};
-use std::os::unix::fs::FileTypeExt;
+use std::os::unix::fs::{FileExt, FileTypeExt};
 use std::time::Duration;
+
+/// The page.
+const PAGE: &str = include_str!("../../docs/src/shared-memory.md");
+/// Where the parts of a mailbox and their fields are told.
+const PARTS: &str = "## A mailbox";
+const FIELDS: &str = "### Identity, owner, hot";
+const VERSION: u32 = 3;
+
+/// The offset that a section's table gives for a field: the first of the row's cells that begins with its name tells.
+fn at(section: &str, field: &str) -> usize {
+    let mut lines = PAGE.lines().skip_while(|line| *line != section).skip(1);
+    let rows = lines.by_ref().take_while(|line| !line.starts_with('#')).filter(|line| line.starts_with('|'));
+    let cells = rows.map(|row| row.trim_matches('|').split(" | ").map(str::trim).collect::<Vec<_>>());
+    let found: Vec<_> = cells.filter(|cells| cells[1..].iter().any(|cell| cell.starts_with(field))).collect();
+    let [row] = &found[..] else { panic!("{section}: {field} is in {} rows: {found:?}", found.len()) };
+    row[0].parse().unwrap_or_else(|_| panic!("{section}: {field}: {row:?}"))
+}
 
 struct Bytes(Vec<u8>);
 
@@ -38,18 +56,22 @@ fn a_mailbox_is_as_documented() {
         let package = receiver.try_receive().unwrap();
         let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
         assert!(there.0.starts_with(b"rohrpost") && there.0.len().is_multiple_of(4096));
-        let identity = [8, 12, 16, 20, 24, 28].map(|at| there.u32(at));
-        assert_eq!(identity, [2, MAILBOX.raw(), u32::from(slots), 100, 1, 3]);
-        assert_eq!((there.u64(32), there.u32(64), there.u32(68)), (9_000_000_000, 0, std::process::id()));
-        assert_eq!((there.u32(72), there.u32(76), there.u64(128)), (0, 2, 2), "adoptions, most waiting, ticket");
-        assert_eq!((there.u32(136), there.u32(140), there.u32(320)), (0, 0, 256 + u32::from(HIGH.0)));
-        assert_eq!(there.u64(328), 1, "received of the first row");
-        assert!(there.u64(320 + 304) >= there.u64(320 + 72), "all waits, and the longest");
-        assert_eq!(there.u64(320 + 312), 5, "bytes of the first row");
-        let words = 4096 + (usize::from(slots) * word_bytes).next_multiple_of(64);
+        let short = |field| there.u32(at(FIELDS, field));
+        let identity = ["version", "name", "slots", "largest body", "when full", "claims"].map(short);
+        assert_eq!(identity, [VERSION, MAILBOX.raw(), u32::from(slots), 100, 1, 3]);
+        assert_eq!(there.u64(at(FIELDS, "max-age")), 9_000_000_000);
+        let owner = ["participant", "pid", "adoptions", "most waiting"].map(short);
+        assert_eq!(owner, [0, std::process::id(), 0, 2]);
+        assert_eq!(there.u64(at(FIELDS, "ticket")), 2);
+        let row = at(PARTS, "counters");
+        assert_eq!((there.u32(row), there.u64(row + 8)), (256 + u32::from(HIGH.0), 1), "class, received");
+        assert!(there.u64(row + 304) >= there.u64(row + 72), "all waits, and the longest");
+        assert_eq!(there.u64(row + 312), 5, "bytes");
+        let first = at(PARTS, "words");
+        let words = first + (usize::from(slots) * word_bytes).next_multiple_of(64);
         let mut seen = Vec::new();
         for slot in 0..usize::from(slots) {
-            let (word, at) = (there.u64(4096 + slot * word_bytes), words + slot * 128);
+            let (word, at) = (there.u64(first + slot * word_bytes), words + slot * 128);
             if word != 0 {
                 let (priority, redelivered, ticket) = (word >> 54 & 0xff, word >> 53 & 1, word & ((1 << 53) - 1));
                 seen.push((word >> 62, priority, redelivered, ticket, there.0[at + 24..at + 29].to_vec()));
@@ -63,11 +85,90 @@ fn a_mailbox_is_as_documented() {
     }
 }
 
+/// What senders and the receiver tell each other with every package, as it stands in the file.
+#[derive(PartialEq, Eq, Debug)]
+struct Said {
+    hints: Vec<u64>,
+    level: u32,
+    alert: u32,
+    sleeping: u32,
+    retired: u32,
+}
+
+impl Said {
+    /// Of a mailbox's file, also of one that has no name any more.
+    fn read(file: &std::fs::File) -> Self {
+        let mut bytes = Bytes(vec![0; 4096]);
+        file.read_exact_at(&mut bytes.0, 0).unwrap();
+        let [hints, level, alert, sleeping, retired] =
+            ["ready hints", "level", "alert", "sleeping", "retired"].map(|field| at(FIELDS, field));
+        Self {
+            hints: (0..16).map(|number| bytes.u64(hints + 8 * number)).filter(|hints| *hints != 0).collect(),
+            level: bytes.u32(level),
+            alert: bytes.u32(alert),
+            sleeping: bytes.u32(sleeping),
+            retired: bytes.u32(retired),
+        }
+    }
+}
+
+/// Nothing is hinted, nobody sleeps.
+fn quiet(level: u8) -> Said {
+    Said { hints: Vec::new(), level: level.into(), alert: 0, sleeping: 0, retired: 0 }
+}
+
+#[test]
+fn senders_and_receiver_talk_where_it_is_documented() {
+    let ground = Ground::new();
+    let shape = Shape { slots: 1, full: Full::Latest, ..Shape::default() };
+    let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
+    let file = std::fs::File::open(ground.path().join(format!("{:08x}.mbx", MAILBOX.raw()))).unwrap();
+    let mut sender = ground.sender();
+    let mut send = |priority, id| sender.send(&label(priority, id), &[]).unwrap();
+    assert_eq!(Said::read(&file), quiet(0));
+    send(LOW, 1);
+    assert_eq!(Said::read(&file), Said { hints: vec![1], alert: 1, ..quiet(0) }, "above the level");
+    assert!(receiver.try_receive().is_some());
+    assert_eq!(Said::read(&file), quiet(LOW.0), "looked at, and the level told");
+    send(LOW, 1);
+    assert_eq!(Said::read(&file), Said { hints: vec![1], ..quiet(LOW.0) }, "not above the level");
+    send(HIGH, 1);
+    assert_eq!(Said::read(&file), Said { hints: vec![1], alert: 1, ..quiet(LOW.0) });
+    assert!(receiver.try_receive().is_some());
+    assert_eq!(Said::read(&file), quiet(HIGH.0), "raised");
+    send(LOW, 1);
+    send(HIGH, 1);
+    let moved = Said { hints: vec![1], alert: 1, ..quiet(HIGH.0) };
+    assert_eq!(Said::read(&file), moved, "at the level, in the place of a package of another priority");
+    assert!(receiver.try_receive().is_some());
+
+    std::thread::scope(|scope| {
+        let sleeper = scope.spawn(|| receiver.receive().head().priority);
+        common::until("it sleeps", || Said::read(&file) == Said { sleeping: 1, ..quiet(HIGH.0) });
+        send(LOW, 1);
+        assert_eq!(sleeper.join().unwrap(), LOW);
+    });
+    assert_eq!(Said::read(&file), quiet(LOW.0), "awake, and the level lowered");
+    receiver.close();
+    assert_eq!(Said::read(&file).retired, 1);
+}
+
+#[test]
+fn slots_have_their_hints_where_it_is_documented() {
+    let ground = Ground::new();
+    let _receiver = ground.join().receiver(MAILBOX, Shape { slots: 66, ..Shape::default() }).unwrap();
+    let mut sender = ground.sender();
+    (0..66).for_each(|id| sender.send(&label(LOW, id), &[]).unwrap());
+    let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
+    let hints = at(FIELDS, "ready hints");
+    assert_eq!([0, 1, 2].map(|number| there.u64(hints + 8 * number)), [u64::MAX, 0b11, 0]);
+}
+
 /// The histogram as another language would read it: file, row of the class, buckets.
 #[test]
 fn waiting_times_by_class_are_as_documented() {
-    const ROWS: usize = 320;
     const BYTES: usize = 320;
+    let rows = at(PARTS, "counters");
     let ground = Ground::new();
     let mut receiver = ground.join().receiver(MAILBOX, Shape::default()).unwrap();
     let mut sender = ground.sender();
@@ -80,7 +181,7 @@ fn waiting_times_by_class_are_as_documented() {
     let seen = ground.look();
     for (class, packages) in [(LOW, 3), (HIGH, 1)] {
         let row =
-            (0..10).map(|row| ROWS + row * BYTES).find(|row| there.u32(*row) == 256 + u32::from(class.0)).unwrap();
+            (0..10).map(|row| rows + row * BYTES).find(|row| there.u32(*row) == 256 + u32::from(class.0)).unwrap();
         let waits: Vec<u32> = (0..56).map(|bucket| there.u32(row + 80 + 4 * bucket)).collect();
         assert_eq!((there.u64(row + 8), waits.iter().sum::<u32>()), (packages, packages as u32));
         let ours = &seen.classes.iter().find(|ours| ours.class == Some(Class(class.0))).unwrap().latency;
@@ -102,9 +203,10 @@ fn a_word_tells_whom_its_package_replaces() {
     (0..3).for_each(|_| sender.send(&label(LOW, 0), &[]).unwrap());
     let there = file(&ground, &format!("{:08x}.mbx", MAILBOX.raw()));
     let word = there.u64(4096);
-    assert_eq!((there.u32(24), there.u64(128)), (2, 3), "policy, tickets");
+    assert_eq!((there.u32(at(FIELDS, "when full")), there.u64(at(FIELDS, "ticket"))), (2, 3), "policy, tickets");
     assert_eq!((word >> 62, word & ((1 << 53) - 1)), (2, 0), "ready, in the place of the first");
-    assert_eq!((there.u32(320), there.u64(320 + 64)), (256 + u32::from(LOW.0), 2), "replaced");
+    let row = at(PARTS, "counters");
+    assert_eq!((there.u32(row), there.u64(row + 64)), (256 + u32::from(LOW.0), 2), "replaced");
     assert!(receiver.try_receive().is_some());
 }
 
@@ -158,7 +260,7 @@ fn the_node_and_its_time_are_as_documented() {
     node.announce_death();
     let there = file(&ground, "node");
     assert!(there.0.starts_with(b"rohrpost") && there.0.len() == 16448);
-    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [2, 1, 1, me.incarnation()]);
+    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [VERSION, 1, 1, me.incarnation()]);
     let entry = [0, 4, 8, 12, 16, 20].map(|at| there.u32(64 + at));
     assert_eq!(entry, [me.incarnation(), std::process::id(), 2, 0x01c8_0000, 3, 7]);
     assert!(there.u64(64 + 24) > 0);
@@ -189,7 +291,7 @@ fn a_table_of_traffic_is_as_documented() {
 
     let there = file(&ground, "traffic.1");
     assert!(there.0.starts_with(b"rohrpost") && there.0.len() == 32832);
-    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [2, 1, me.incarnation(), 128]);
+    assert_eq!([8, 12, 16, 20].map(|at| there.u32(at)), [VERSION, 1, me.incarnation(), 128]);
     let row = 64;
     assert_eq!([8, 12, 16].map(|at| there.u32(row + at)), [MAILBOX.raw(), from.raw(), 0xfff0]);
     assert_eq!(there.u32(row + 4) % 2, 0, "nobody is inside");
