@@ -12,9 +12,10 @@
 //! docs/src/shared-memory.md has the same for other languages.
 
 use crate::counters::{Counters, ROWS};
+use crate::hot::{Hot, ReceiverSays};
 use crate::name::Name;
 use crate::package::{BODY_BYTES_MAX, HEAD_BYTES};
-use crate::slots::{Full, Hot, ReceiverSays, SLOTS_MAX};
+use crate::slots::{Full, SLOTS_MAX};
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 use std::time::Duration;

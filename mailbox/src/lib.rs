@@ -9,9 +9,49 @@
 //!  Participant ──receiver(name, shape)──▶ Receiver ◀───┘   read in place, freed on drop; sleeps on its participant's bell
 //! ```
 //!
-//! This crate knows no network, no configuration file and no message type. Reading order: `word` (the life of a slot),
-//! `slots` (the protocol, and what each death leaves), `queue`, `doorbell`, then `segment`, `sender`, `receiver`, `node`,
-//! `registry`, `inspect`, `traffic`.
+//! This crate knows no network, no configuration file and no message type.
+//!
+//! # A mailbox is one file, mapped by its receiver and by each sender
+//!
+//! ```text
+//!  byte                                                    who writes it
+//!     0  what it is: version, name, shape                  its maker, before it has its name
+//!    64  owner: participant, process, depth                the receiver
+//!   128  ticket counter: the order of publishing           senders, with each package
+//!   256  hints, one bit a slot: "look here"                senders set them, the receiver takes them
+//!   384  sleeping? · level · retired?                      the receiver, seldom; senders read it with each package
+//!   512  alert: "something above your level"               senders, seldom; the receiver reads it with each package
+//!   640  counters, a row a class                           the receiver; of losses, whoever causes or finds them
+//!  4096  words, one a slot: the only truth about it        one compare-and-swap at a time, see below
+//!     …  slots: time of publishing, head, body             who holds the slot
+//! ```
+//!
+//! What costs time is a cache line that goes from one processor to another. So each of these is in lines of its own, and in the
+//! steady state of a package three of them move: hint, word, body.
+//!
+//! # The life of a slot, and who may do what
+//!
+//! | its word says | body | who may change the word, and to what |
+//! | --- | --- | --- |
+//! | Free | nobody's | any sender *claims* it: Filling |
+//! | Filling, by whom | the filler writes | the filler *publishes* it: Ready, or *abandons* it: Free. The receiver *reclaims* it if the filler is dead: Free |
+//! | Ready, priority, ticket | nobody touches it | the receiver *takes* it: Taken. A more important sender *displaces* it: Filling. Its own sender *replaces* or *reuses* it in a `latest` mailbox: Free or Filling |
+//! | Taken | the receiver reads | the receiver *releases* it: Free. The next owner *adopts* it: Ready once more, marked; the second time it is *poison*: Free |
+//!
+//! Nobody waits for anybody: each operation is a number of steps bounded by the slot count, and whoever finds a word changed goes
+//! on with the next. A process may be killed between any two steps; `slots` begins with a table of what that leaves and who mends
+//! it, and the tests in `mailbox/proof` visit each step by its name.
+//!
+//! # Reading order
+//!
+//! 1. `word`, `slots`, `hot`: the protocol. `queue`: what the receiver knows, and when it must look. `latest`: what replaces what.
+//! 2. `bell`, `doorbell`, `waiting`, `watch`: sleeping and waking.
+//! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics, and what is asked of the processor.
+//! 4. `sender`, `receiver`: what users hold. `node`, `entry`, `participant`, `lock`, `registry`: who lives, and who owns what.
+//! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
+//!
+//! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes on with (H)
+//! and (I); `traffic` and `system_time` have letters of their own.
 //!
 //! ```
 //! use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Shape, Type};
@@ -37,6 +77,7 @@ mod doorbell;
 mod entry;
 mod files;
 mod flows;
+mod hot;
 mod inspect;
 mod latest;
 mod layout;

@@ -3,8 +3,9 @@
 //! Holds hints only, one entry a slot: the word is asked again, by compare-and-swap, when a package is taken. Everything
 //! is allocated at the start.
 
+use crate::hot::HINT_WORDS;
 use crate::name::Priority;
-use crate::slots::{HINT_WORDS, Slots, Taken};
+use crate::slots::{Slots, Taken};
 use crate::sync::Ordering;
 use crate::word::Word;
 

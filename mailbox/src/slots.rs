@@ -7,61 +7,34 @@
 //! | died | left behind | who mends it, and how |
 //! | --- | --- | --- |
 //! | sender, claimed, not published | Filling | receiver's `reclaim`: Free again; the package was never accepted |
-//! | sender, published, hint not set | Ready without hint | receiver's rescan: found and delivered |
+//! | sender, with its ticket | Filling, and a ticket that nobody has | the same; the count of accepted packages is one too high |
 //! | sender, displacing, reusing | Filling with its victim | `reclaim` counts that loss |
+//! | sender, displacing, victim counted | the same | `reclaim` counts that loss once more: one too many, never one too few |
 //! | sender, replacing | Filling with its victim, which may still be Ready | `reclaim` counts a loss, perhaps one too many |
+//! | sender, published, hint not set | Ready without hint | receiver's rescan, one word in turn, or all when the death is noticed: found and delivered |
+//! | sender, hinted, not alerted | Ready, and a receiver that works off less important packages | found when those it knows are received, or when the death is noticed (`Queue::doubt`): then it is next |
+//! | sender, all said, bell not rung | a receiver asleep | the next sender sees it asleep and rings; so does whoever notices the death |
+//! | receiver, hints in its private heap | Ready without hints | the next owner's rescan |
+//! | receiver, level said | a level that nobody works at | the next owner looks before it receives, and says its own |
+//! | receiver, asleep | `sleeping`, and senders that ring for nobody | the next owner's `adopt` |
 //! | receiver, package in hand | Taken | the next owner's `adopt`: Ready, redelivered; the second time dropped as poison |
+//! | new owner, adopting | some Taken, some Ready again | the owner after it: each word tells by itself what is due |
+//! | owner, giving up | `retired`, and packages | the next receiver of this name, who replaces it and counts them |
 //!
 //! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
 //! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G) and (J).
 
+use crate::hot::Hot;
 use crate::name::Priority;
 use crate::step::step;
-use crate::sync::{AtomicU32, AtomicU64, Ordering, fence, prefetch_to_read, prefetch_to_write, seq_cst_accesses};
+use crate::sync::{AtomicU64, Ordering, fence, prefetch_to_read, prefetch_to_write, seq_cst_accesses};
 use crate::word::{Claimant, FREE, State, Victim, Word};
 
 /// Most slots that a mailbox can have.
 pub const SLOTS_MAX: usize = 1024;
-/// Words of ready hints, one bit a slot.
-pub(crate) const HINT_WORDS: usize = SLOTS_MAX / 64;
 /// A sender looks through a full mailbox this often for somebody to displace before it calls it full: each further look
 /// is owed to another process that was quicker, and n looks at n slots would be n².
 const DISPLACE_LOOKS_MAX: usize = 4;
-
-/// Something in cache lines of its own: 128 bytes, since processors fetch lines in pairs.
-#[derive(Default)]
-#[repr(C, align(128))]
-pub(crate) struct Line<T>(pub(crate) T);
-
-/// What senders and receiver touch with every package, each part in lines of its own: what counts is how often a line goes from
-/// one processor to the other.
-#[derive(Default)]
-#[repr(C)]
-pub(crate) struct Hot {
-    /// Senders': the next ticket, that is, the order of publishing. Also the count of packages ever accepted here (one too many
-    /// for each sender that was killed between its ticket and its word).
-    pub(crate) ticket: Line<AtomicU64>,
-    /// Slots that may have become ready. Hints: each is set after its word changed, and may be late or stale.
-    pub(crate) ready: Line<[AtomicU64; HINT_WORDS]>,
-    /// Written by the receiver and seldom, read by senders with every package.
-    pub(crate) receiver: Line<ReceiverSays>,
-    /// Not 0: a sender has published something above the level. Written by senders seldom, read by the receiver with every
-    /// package.
-    pub(crate) alert: Line<AtomicU32>,
-}
-
-/// What the receiver tells senders.
-#[derive(Default)]
-#[repr(C)]
-pub(crate) struct ReceiverSays {
-    /// Not 0: it sleeps or is about to; ring its bell.
-    pub(crate) sleeping: AtomicU32,
-    /// It has looked at all hints, and receives packages of this priority without looking again: who sends a more important one
-    /// says so by `alert`.
-    pub(crate) level: AtomicU32,
-    /// Not 0: this mailbox has been given up; what is sent here is not received.
-    pub(crate) retired: AtomicU32,
-}
 
 /// What happens to a package that finds no free slot. The numbers stand in the segment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -200,11 +173,6 @@ impl<'a> Slots<'a> {
     /// SeqCst for (E).
     fn change(&self, slot: usize, from: Word, to: Word) -> bool {
         self.word(slot).compare_exchange(from.0, to.0, Ordering::SeqCst, Ordering::Relaxed).is_ok()
-    }
-
-    fn hint(&self, slot: usize) {
-        // ORDERING: Release; pairs with the receiver's swap, which then sees the word this hint speaks of. SeqCst for (E).
-        self.hot.ready.0[slot / 64].fetch_or(1 << (slot % 64), Ordering::SeqCst);
     }
 
     // ---- senders ----
@@ -346,11 +314,6 @@ impl<'a> Slots<'a> {
         step!("abandon: freed");
     }
 
-    /// Whether this mailbox has been given up.
-    pub(crate) fn is_retired(&self) -> bool {
-        self.hot.receiver.0.retired.load(Ordering::Relaxed) != 0
-    }
-
     /// Has the lines of a slot come here that its next filler writes first.
     pub(crate) fn expect_to_fill(&self, slot: usize) {
         let slot = slot % self.count;
@@ -381,59 +344,10 @@ impl<'a> Slots<'a> {
         step!("release: freed");
     }
 
-    /// Says that the receiver is about to sleep. Look at the hints after this, then sleep, then [`Slots::awake`].
-    pub(crate) fn drowsy(&self) {
-        // ORDERING: Release, at least; who sees this owner asleep sees whose bell to ring. Pairs with the load in `publish`.
-        self.hot.receiver.0.sleeping.store(1, Ordering::SeqCst);
-        // ORDERING (F): `sleeping` before the last look at the hints. Pairs with (E).
-        seq_cst_accesses();
-    }
-
-    /// Says that the receiver does not sleep. It alone says so: a sender that did would swallow the next one's wake-up.
-    pub(crate) fn awake(&self) {
-        self.hot.receiver.0.sleeping.store(0, Ordering::Relaxed);
-    }
-
     /// Has the lines of a package come here before they are looked at, all at once; and its word as it will be needed.
     pub(crate) fn expect_package(&self, slot: usize) {
         prefetch_to_write(self.word(slot));
         self.first_lines(slot).into_iter().for_each(prefetch_to_read);
-    }
-
-    /// Has the line of the hints come here to be written, as it will be: looked at first, it would come twice. Who looks again and
-    /// again keeps it, and nothing moves until a sender takes it.
-    pub(crate) fn expect_hints(&self) {
-        prefetch_to_write(&raw const self.hot.ready);
-    }
-
-    /// Whether a hint is set.
-    pub(crate) fn any_hint(&self) -> bool {
-        self.hot.ready.0[..self.count.div_ceil(64)].iter().any(|hints| hints.load(Ordering::SeqCst) != 0)
-    }
-
-    /// Whether something above the level was published.
-    pub(crate) fn is_alerted(&self) -> bool {
-        self.hot.alert.0.load(Ordering::Relaxed) != 0
-    }
-
-    /// Clears the alert. Look at the hints after this.
-    pub(crate) fn heed(&self) {
-        // ORDERING: Acquire; whatever this clears, its hint is seen. Pairs with `publish`.
-        self.hot.alert.0.swap(0, Ordering::AcqRel);
-    }
-
-    /// From now on whoever sends something above this alerts. Raised: who has read the old level alerts for nothing.
-    pub(crate) fn raise_level(&self, level: Priority) {
-        self.hot.receiver.0.level.store(level.0.into(), Ordering::Relaxed);
-    }
-
-    /// The same, when the level sinks: then look at the hints once more.
-    pub(crate) fn lower_level(&self, level: Priority) {
-        self.hot.receiver.0.level.store(level.0.into(), Ordering::SeqCst);
-        // ORDERING (J): the level before the look at the hints. Pairs with (E): who has read the higher level, and therefore did
-        // not alert, is seen by that look.
-        seq_cst_accesses();
-        step!("level: lowered");
     }
 
     /// Frees slots whose filler is dead, and tells `lost` their victims.
@@ -473,13 +387,6 @@ impl<'a> Slots<'a> {
             }
             step!("adopt: changed");
         }
-    }
-
-    /// Gives the mailbox up for good. Senders see it after publishing and send anew elsewhere.
-    pub(crate) fn retire(&self) {
-        self.hot.receiver.0.retired.store(1, Ordering::Relaxed);
-        // ORDERING (G): `retired` before the owner's last look at the words. Pairs with (E).
-        fence(Ordering::SeqCst);
     }
 
     /// Of a mailbox given up: tells `lost` the victims of those who still fill, since they could only count them here, where

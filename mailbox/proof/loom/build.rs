@@ -11,7 +11,7 @@ use broken::{BROKEN, Edit, MIRRORED, MODELS};
 
 const MAILBOX: &str = "../../src";
 /// What a variant consists of: the mailbox's, and ours.
-const PARTS: [&str; 6] = ["word", "slots", "queue", "bell", "rig", "models"];
+const PARTS: [&str; 7] = ["word", "hot", "slots", "queue", "bell", "rig", "models"];
 const OURS: [&str; 2] = ["rig", "models"];
 
 fn main() {

@@ -120,7 +120,7 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
             edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)"),
             edit("queue", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
-            edit("slots", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
+            edit("hot", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
         ],
         caught_by: "a_body_is_handed_over_whole",
         says: WRONG,
@@ -177,7 +177,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "hint_without_release",
         edits: &[edit(
-            "slots",
+            "hot",
             "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
             "fetch_or(1 << (slot % 64), Ordering::Relaxed)",
         )],
@@ -315,7 +315,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     },
     Broken {
         name: "heed_without_acquire",
-        edits: &[edit("slots", "alert.0.swap(0, Ordering::AcqRel)", "alert.0.swap(0, Ordering::Release)")],
+        edits: &[edit("hot", "alert.0.swap(0, Ordering::AcqRel)", "alert.0.swap(0, Ordering::Release)")],
         caught_by: "the_urgent_passes_what_is_known",
         says: WRONG,
     },
@@ -354,7 +354,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Neither sees the other: the sender reads the old level, the receiver the old hints.
     Broken {
         name: "no_fence_j",
-        edits: &[edit("slots", "is seen by that look.\n        seq_cst_accesses();\n", "is seen by that look.\n")],
+        edits: &[edit("hot", "is seen by that look.\n        seq_cst_accesses();\n", "is seen by that look.\n")],
         caught_by: "what_comes_as_the_level_sinks_is_next",
         says: WRONG,
     },
@@ -367,7 +367,10 @@ pub(crate) const BROKEN: &[Broken] = &[
     // The dead one's level stands: senders below it keep silent.
     Broken {
         name: "a_successor_trusts_the_level",
-        edits: &[edit("queue", "receives: 0, level: NO_LEVEL }", "receives: 0, level: 0 }")],
+        edits: &[
+            edit("queue", "receives: 0, level: NO_LEVEL }", "receives: 0, level: 0 }"),
+            edit("queue", "        self.level = NO_LEVEL;\n    }", "    }"),
+        ],
         caught_by: "a_new_owner_says_its_own_level",
         says: WRONG,
     },
@@ -551,7 +554,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "no_fence_f",
         edits: &[edit(
-            "slots",
+            "hot",
             "Pairs with (E).\n        seq_cst_accesses();\n    }\n\n    /// Says that the receiver does not sleep.",
             "Pairs with (E).\n    }\n\n    /// Says that the receiver does not sleep.",
         )],
@@ -665,7 +668,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "no_fence_g",
         edits: &[edit(
-            "slots",
+            "hot",
             "last look at the words. Pairs with (E).\n        fence(Ordering::SeqCst);\n",
             "last look at the words. Pairs with (E).\n",
         )],

@@ -6,7 +6,8 @@
 use crate::name::Priority;
 use crate::bell::Bell;
 use crate::queue::Queue;
-use crate::slots::{Bodies, Full, Hot, NoSlot, Posted, Published, Slots};
+use crate::hot::Hot;
+use crate::slots::{Bodies, Full, NoSlot, Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use crate::word::{Claimant, FREE, Victim, Word};

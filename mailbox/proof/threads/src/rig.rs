@@ -4,8 +4,9 @@
 //! no fences: what a body's hand-over rested on a fence for would be reported here, though it were right. None does.
 
 use super::bell::Bell;
+use super::hot::Hot;
 use super::queue::Queue;
-use super::slots::{Bodies, Full, Hot, NoSlot, Posted, Published, Slots};
+use super::slots::{Bodies, Full, NoSlot, Posted, Published, Slots};
 use super::word::{Claimant, FREE, State, Victim};
 use crate::name::Priority;
 use crate::step::{dice, reached, shake};
