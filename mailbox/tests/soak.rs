@@ -93,7 +93,7 @@ fn soak(ground: &Ground, shape: Shape, way: Way, time: Duration) -> u64 {
     until("all senders hold still", || {
         listener.drain();
         processes.iter().for_each(Actor::assert_alive);
-        (0..SENDERS).all(|seat| board.seat(seat).is_still())
+        (0..SENDERS).all(|seat| board.is_still(seat))
     });
     listener.drain();
     let info = ground.look();

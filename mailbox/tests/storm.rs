@@ -211,7 +211,7 @@ impl Storm {
     fn calm(&mut self) {
         self.deadline = Instant::now() + PATIENCE;
         self.board.hold(true);
-        self.wait("all senders hold still", |storm| (0..SENDERS).all(|seat| storm.board.seat(seat).is_still()));
+        self.wait("all senders hold still", |storm| (0..SENDERS).all(|seat| storm.board.is_still(seat)));
         self.wait("all is received", |storm| storm.look().iter().all(|info| info.depth == 0));
         self.check_accounts();
         self.board.hold(false);

@@ -17,6 +17,12 @@ pub(crate) fn call(place: &Place, arguments: &[&str]) {
     place.say(&[&["call", "--timeout", "60"], arguments].concat()).ok();
 }
 
+/// Whether a module's line is its own, and not one that a test asked a probe for: that it is on; and what the test program
+/// that a probe is says of itself, which launch passes on a moment after it was printed, so at any time.
+pub(crate) fn is_own(text: &str) -> bool {
+    ["is on", "running 1 test"].contains(&text)
+}
+
 fn texts(lines: &[Value]) -> Vec<&str> {
     lines.iter().map(|line| line["text"].as_str().unwrap()).collect()
 }
@@ -64,7 +70,7 @@ fn errors_have_an_allowance_of_their_own() {
         (sum(&all, "suppressed") > 90).then_some(all)
     });
     for (level, told) in [("info", "lines were suppressed"), ("error", "errors were suppressed")] {
-        let said = all.iter().filter(|line| line["level"] == level && line["text"] != "is on");
+        let said = all.iter().filter(|line| line["level"] == level);
         let flood = said.filter(|line| line["text"].as_str().unwrap().starts_with("flood ")).count();
         assert!((1..20).contains(&flood), "{flood} of level {level}: {all:#?}");
         assert!(texts(&all).iter().any(|text| text.contains(told)), "{all:#?}");
@@ -180,11 +186,15 @@ fn files_are_put_aside_and_programs_read_them() {
         assert!(text.len() <= 8 << 10, "{name} has {} bytes", text.len());
         for line in text.lines() {
             let line: Value = serde_json::from_str(line).unwrap();
+            let text = line["text"].as_str().unwrap();
+            if is_own(text) {
+                continue;
+            }
             for (key, value) in [("node", "main"), ("module", "probe.0"), ("class", "probe"), ("level", "warn")] {
                 assert_eq!(line[key], value, "{line}");
             }
             assert!(line["time_ns"].is_u64() && line["time"].as_str().unwrap().ends_with('Z'), "{line}");
-            numbers.push(line["text"].as_str().unwrap()["flood ".len()..].parse::<u32>().unwrap());
+            numbers.push(text["flood ".len()..].parse::<u32>().unwrap());
         }
     }
     let first = numbers[0];

@@ -1,7 +1,7 @@
 //! `rohrpost log` as a person uses it: levels, filters, following.
 
 use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
-use crate::output::call;
+use crate::output::{call, is_own};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 
@@ -14,9 +14,14 @@ fn log(place: &Place, arguments: &[&str]) -> crate::process::Said {
 /// What was said, without time and node, and without the modules' own words.
 fn shown(place: &Place, arguments: &[&str]) -> Vec<String> {
     let text = log(place, arguments).ok();
-    // The probe is a test binary, and says so.
-    let lines = text.lines().filter(|line| !line.ends_with("is on") && !line.ends_with("running 1 test"));
-    lines.map(|line| line.split_once("main/").unwrap().1.to_owned()).collect()
+    let said = text.lines().map(|line| line.split_once("main/").unwrap().1);
+    said.filter(|line| !is_own(line.split_once(": ").unwrap().1)).map(str::to_owned).collect()
+}
+
+/// Waits until so many probes' own last lines have come: later they would be among the last of all.
+fn wait_own(place: &Place, probes: usize) {
+    let came = || log(place, &["--text", "running 1 test"]).ok().lines().count();
+    wait("what probes say of themselves", || (came() == probes).then_some(()));
 }
 
 #[test]
@@ -83,6 +88,7 @@ fn filters_choose_by_module_class_level_text_and_time() {
     let place = Place::new();
     let modules = [OUTPUT, &probe("probe.0", "", ""), &probe("probe.1", "", ""), &probe("probe.2", "", "")];
     let (_launch, _robot) = place.launched(&modules);
+    wait_own(&place, 3);
     for (module, level, text) in [
         ("probe.0", "info", "a Wall ahead"),
         ("probe.1", "warn", "hit the wall"),
@@ -119,6 +125,7 @@ fn a_follower_survives_the_collector_and_says_so() {
     let place = Place::new();
     let output = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\nrestart = { backoff = \"50 ms\" }\n";
     let (mut launch, robot) = place.launched(&[output, &probe("probe.0", "", "")]);
+    wait_own(&place, 1);
     let say = |text: &str| call(&place, &["probe.0", "say", "info", text]);
     for number in 0..20 {
         say(&format!("earlier {number}"));

@@ -1,6 +1,7 @@
 //! What modules publish and say, as tools show it.
 
 use crate::harness::{OUTPUT, Place, probe, signal, wait};
+use crate::output::{call, is_own};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use std::time::Instant;
@@ -78,12 +79,12 @@ fn what_modules_say_is_kept_and_filtered() {
         ("probe.1", "info", "not sent: its level is warn"),
         ("probe.1", "error", "third"),
     ] {
-        place.say(&["call", module, "say", level, text]).ok();
+        call(&place, &[module, "say", level, text]);
     }
     let texts = |arguments: &[&str]| -> Vec<String> {
-        let shown = lines(&place.say(&[&["log", "--json"], arguments].concat()).ok());
-        let own = shown.iter().filter(|line| line["text"] != "is on");
-        own.map(|line| format!("{} {} {}", line["module"], line["level"], line["text"]).replace('"', "")).collect()
+        let shown = lines(&place.say(&[&["log", "--json", "--timeout", "60"], arguments].concat()).ok());
+        let asked = shown.iter().filter(|line| !is_own(line["text"].as_str().unwrap()));
+        asked.map(|line| format!("{} {} {}", line["module"], line["level"], line["text"]).replace('"', "")).collect()
     };
     wait("all lines", || texts(&[]).iter().any(|line| line.contains("third")).then_some(()));
     assert_eq!(texts(&[]), ["probe.0 info first", "probe.0 warn second", "probe.1 error third"]);
@@ -91,10 +92,10 @@ fn what_modules_say_is_kept_and_filtered() {
     assert_eq!(texts(&["--level", "error"]), ["probe.1 error third"]);
     assert_eq!(texts(&["--module", "probe.0"]), ["probe.0 info first", "probe.0 warn second"]);
     assert_eq!(texts(&["--module", "probe.0", "--level", "error"]), [""; 0]);
-    place.say(&["call", "probe.0", "output-level", "debug"]).ok();
-    place.say(&["call", "probe.0", "say", "debug", "fourth"]).ok();
+    call(&place, &["probe.0", "output-level", "debug"]);
+    call(&place, &["probe.0", "say", "debug", "fourth"]);
     wait("the debug line", || texts(&[]).contains(&"probe.0 debug fourth".into()).then_some(()));
-    let text = place.say(&["log", "--level", "error"]).ok();
+    let text = place.say(&["log", "--level", "error", "--timeout", "60"]).ok();
     let (time, rest) = text.split_once(' ').unwrap();
     assert_eq!((time.len(), rest), ("08:36:01.257".len(), "error main/probe.1: third\n"));
 }

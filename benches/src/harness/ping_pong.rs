@@ -1,12 +1,8 @@
 //! Ping-pong: one end sends and waits for the echo. Half of the round trip is what one way takes.
 
-use super::{Child, Failure, Gate, Placement, Scheduling, Shared, Zeroable, interrupted, settle};
+use super::{Child, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, interrupted, settle};
 use rohrpost_mailbox::monotonic_ns;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-
-/// Most samples of one turn.
-const SAMPLES_MAX: usize = 20_000;
 
 /// With so few a turn that is over goes on: where others keep the processors busy and nothing is real-time, a round trip can
 /// take milliseconds.
@@ -72,27 +68,17 @@ pub struct Cell {
 #[repr(C)]
 struct Turn {
     gate: Gate,
-    count: AtomicU64,
-    /// Round trips, ns.
-    round_trips: [AtomicU64; SAMPLES_MAX],
+    /// One way, µs.
+    samples: Samples,
 }
 
 // SAFETY: atomics only.
 unsafe impl Zeroable for Turn {}
 
 impl Turn {
+    /// Of round trips, ns.
     fn record(&self, round_trips: &[u64]) {
-        for (sample, value) in self.round_trips.iter().zip(round_trips) {
-            sample.store(*value, Ordering::Relaxed);
-        }
-        // ORDERING: publishes the samples; the parent reads them after the process has ended.
-        self.count.store(round_trips.len().min(SAMPLES_MAX) as u64, Ordering::Release);
-    }
-
-    /// One way, µs.
-    fn one_way_us(&self) -> Vec<f64> {
-        let count = self.count.load(Ordering::Acquire) as usize;
-        self.round_trips[..count].iter().map(|ns| ns.load(Ordering::Relaxed) as f64 / 2000.0).collect()
+        round_trips.iter().for_each(|ns| self.samples.push(*ns as f64 / 2000.0));
     }
 }
 
@@ -202,7 +188,7 @@ pub fn time_two_processes<L: Link>(
     let (first, second) = if echo.has_ended()? { (echo, measure) } else { (measure, echo) };
     first.finish(deadline)?;
     second.finish(deadline.min(Instant::now() + Duration::from_secs(3)))?;
-    Ok(turn.one_way_us())
+    Ok(turn.samples.all())
 }
 
 /// The meetings of the two ends while they open a link.
@@ -244,7 +230,7 @@ pub fn time_two_threads<L: Link + Send>(cell: &Cell, make: impl Fn() -> [L; 2]) 
         })
     })?;
     process.finish(Instant::now() + cell.cap + GRACE)?;
-    Ok(turn.one_way_us())
+    Ok(turn.samples.all())
 }
 
 #[cfg(test)]

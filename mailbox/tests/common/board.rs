@@ -29,7 +29,7 @@ pub(crate) struct Seat {
     busy: AtomicU32,
     /// It has done what it must at its start.
     ready: AtomicU32,
-    /// It holds still, as the board asks.
+    /// The number of the hold that it keeps, or kept last.
     still: AtomicU32,
     /// Operations that ended.
     operations: AtomicU64,
@@ -62,10 +62,6 @@ impl Seat {
         self.busy.load(SeqCst) != 0
     }
 
-    pub(crate) fn is_still(&self) -> bool {
-        self.still.load(SeqCst) != 0
-    }
-
     pub(crate) fn operations(&self) -> u64 {
         self.operations.load(SeqCst)
     }
@@ -84,6 +80,8 @@ struct Run {
 
 #[repr(C)]
 struct Front {
+    /// Odd: all senders are asked to hold still. Each time has a number of its own, so that who is slow to go on after one is not
+    /// taken for still in the next.
     hold: AtomicU32,
     end: AtomicU32,
     seats: [Seat; SEATS],
@@ -168,7 +166,14 @@ impl Board {
 
     /// Asks all senders to hold still, or to go on.
     pub(crate) fn hold(&self, hold: bool) {
-        self.front.hold.store(hold.into(), SeqCst);
+        let before = self.front.hold.fetch_add(1, SeqCst);
+        assert_eq!(before.is_multiple_of(2), hold, "asked twice");
+    }
+
+    /// Whether who sits there holds still, and stays so until it is asked to go on.
+    pub(crate) fn is_still(&self, seat: usize) -> bool {
+        let hold = self.front.hold.load(SeqCst);
+        hold % 2 == 1 && self.seat(seat).still.load(SeqCst) == hold
     }
 
     /// Asks all to end.
@@ -182,11 +187,14 @@ impl Board {
 
     /// A sender, between two operations: holds still if it should.
     pub(crate) fn hold_if_asked(&self, seat: &Seat) {
-        while self.front.hold.load(SeqCst) != 0 && !self.is_ended() {
-            seat.still.store(1, SeqCst);
+        loop {
+            let hold = self.front.hold.load(SeqCst);
+            if hold.is_multiple_of(2) || self.is_ended() {
+                break;
+            }
+            seat.still.store(hold, SeqCst);
             std::thread::sleep(std::time::Duration::from_micros(100));
         }
-        seat.still.store(0, SeqCst);
     }
 
     pub(crate) fn accepted(&self, mark: &Mark) {

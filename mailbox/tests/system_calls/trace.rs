@@ -1,13 +1,8 @@
-//! What the hot paths ask of the kernel, counted by tracing: nothing, but for one call to sleep and one to wake.
+//! A process is followed from one system call to the next. What it does it marks, so that each call belongs to an operation.
 
-#![cfg(all(target_os = "linux", target_env = "gnu"))]
-#![allow(clippy::unwrap_used, reason = "these are tests")]
-
-mod common;
-
-use common::crew::{Actor, alone, master};
-use common::hands::{OPERATIONS, do_all};
-use common::{Ground, tell};
+use crate::common::crew::{Actor, master};
+use crate::common::hands::{OPERATIONS, do_all};
+use crate::common::{Ground, tell};
 use nix::sys::ptrace;
 use nix::sys::signal::{Signal, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
@@ -36,9 +31,8 @@ fn mark(operation: usize) {
     assert_eq!(unsafe { libc::syscall(libc::SYS_getpgid, MARK + operation as u64) }, -1);
 }
 
-#[test]
-fn role() {
-    let Some((_, ground)) = common::role() else { return };
+/// Has every operation done by a traced process, and checks what it called.
+pub(crate) fn trace_all(ground: &Ground) {
     let start = || {
         ptrace::traceme().unwrap();
         raise(Signal::SIGSTOP).unwrap();
@@ -48,13 +42,8 @@ fn role() {
         operate();
         mark(at);
     };
-    master(|| do_all(&ground, start, around, |doer| check(&trace(doer))));
+    master(|| do_all(ground, start, around, |doer| check(&trace(doer))));
     tell("done");
-}
-
-#[test]
-fn hot_paths_ask_the_kernel_for_nothing_but_sleep_and_wake() {
-    alone(&Ground::in_memory(), "trace");
 }
 
 /// One time of an operation, and the system calls in it.
