@@ -79,7 +79,7 @@ impl Slots<'_> {
         prefetch_to_write(&raw const self.hot.ready);
     }
 
-    /// Whether a hint is set.
+    /// Whether a hint is set. SeqCst for (F): the look before a sleep.
     pub(crate) fn any_hint(&self) -> bool {
         self.hot.ready.0[..self.count().div_ceil(64)].iter().any(|hints| hints.load(Ordering::SeqCst) != 0)
     }
@@ -91,11 +91,13 @@ impl Slots<'_> {
 
     /// Clears the alert. Look at the hints after this.
     pub(crate) fn heed(&self) {
-        // ORDERING: Acquire; whatever this clears, its hint is seen. Pairs with `publish`.
+        // ORDERING: Acquire; whatever this clears, its hint is seen. Pairs with the swap in `publish`. Release, so that a swap after
+        // this one still hands on what came before.
         self.hot.alert.0.swap(0, Ordering::AcqRel);
     }
 
-    /// From now on whoever sends something above this alerts. Raised: who has read the old level alerts for nothing.
+    /// From now on whoever sends something above this alerts. Raised: who has read the old level alerts for nothing, and Relaxed will
+    /// do: the next lowering is ordered against all who read this.
     pub(crate) fn raise_level(&self, level: Priority) {
         self.hot.receiver.0.level.store(level.0.into(), Ordering::Relaxed);
     }

@@ -9,8 +9,8 @@ use crate::slots::{Slots, Taken};
 use crate::sync::Ordering;
 use crate::word::Word;
 
-/// Every so many receives one word in turn is looked at without a hint: a sender may have died between publishing and
-/// setting it.
+/// Every so many receives one word in turn is marked for the next look, hint or no hint: a sender may have died between publishing
+/// and setting it.
 const RESCAN_EVERY: u32 = 16;
 const ABSENT: u16 = u16::MAX;
 
@@ -23,8 +23,8 @@ pub(crate) struct Queue {
     heap: Vec<(Word, u16)>,
     /// Where in the heap a slot stands.
     place: Vec<u16>,
-    /// Slots seen with a ticket younger than the look: they stay for the next one, else a sender's second package could
-    /// pass its first.
+    /// Slots to be looked at next time without a hint: those seen with a ticket younger than the look, else a sender's second
+    /// package could pass its first; and those that are rescanned.
     deferred: [u64; HINT_WORDS],
     receives: u32,
     /// What senders were told: who sends something above this alerts.
@@ -66,6 +66,12 @@ impl Queue {
             }
             // Whoever fills the slot hints again; and what took its place may stand before all others.
             known = false;
+        }
+        // So much bad luck in a row: something that waits, then, though perhaps not the first.
+        while let Some((seen, slot)) = self.pop() {
+            if let Some(taken) = slots.take(slot, seen) {
+                return Some(taken);
+            }
         }
         None
     }
@@ -132,7 +138,8 @@ impl Queue {
 
     fn collect(&mut self, slots: &Slots<'_>, horizon: u64) {
         for (i, hints) in slots.hot.ready.0[..slots.count().div_ceil(64)].iter().enumerate() {
-            // Looked at before it is swapped, so that an idle line stays shared.
+            // Looked at before it is swapped, so that a hint word without hints is not written. SeqCst for (J): the look after the
+            // level sank.
             let fresh = if hints.load(Ordering::SeqCst) == 0 { 0 } else { hints.swap(0, Ordering::AcqRel) };
             let mut bits = fresh | std::mem::take(&mut self.deferred[i]);
             while bits != 0 {

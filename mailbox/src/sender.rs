@@ -273,6 +273,10 @@ impl Sender {
                 return Err(error);
             }
         };
+        if let Some(victim) = old.late_victim() {
+            // Its loss is in counters that were carried over before: here it is counted again, once too often at worst.
+            self.segment.page().counters.gave_way(victim);
+        }
         let result = self.claim(priority, None, len).inspect(|claim| {
             // SAFETY: both claims are ours, on different segments.
             let (from, to) = unsafe { (retired.body_mut(old.slot), self.segment.body_mut(claim.slot)) };

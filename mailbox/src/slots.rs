@@ -47,7 +47,8 @@ pub enum Full {
     /// replaced. One that has nothing to replace and finds no free slot displaces as above.
     ///
     /// Commands are never replaced, since each has an id of its own. A sender knows what it sent itself, through this
-    /// [`Sender`](crate::Sender): what it sent before it was started again is received as well, before the newer.
+    /// [`Sender`](crate::Sender): what it sent before it was started again is received as well, before the newer. Between
+    /// different states of one sender there is no order when one of them has replaced an older package.
     Latest = 2,
     /// It is refused (seed 002, 3.2).
     Reject = 1,
@@ -83,6 +84,8 @@ pub(crate) struct Claim {
     word: Word,
     /// The package that this one replaces.
     place: Option<Word>,
+    /// It displaced a package when the mailbox had been given up: perhaps after its owner looked for the last time.
+    late: bool,
 }
 
 impl Claim {
@@ -92,6 +95,11 @@ impl Claim {
             State::Filling { victim, .. } => victim,
             _ => None,
         }
+    }
+
+    /// The victim, if its loss may have been counted where nobody looks any more.
+    pub(crate) fn late_victim(&self) -> Option<Victim> {
+        self.victim().filter(|_| self.late)
     }
 }
 
@@ -165,12 +173,14 @@ impl<'a> Slots<'a> {
         &self.words[slot * self.stride]
     }
 
+    /// ORDERING: Acquire (B), for who takes what this sees, and for `Queue::look`: all that the package's sender hinted before is
+    /// seen after this.
     pub(crate) fn load(&self, slot: usize) -> Word {
         Word(self.word(slot).load(Ordering::Acquire))
     }
 
     /// ORDERING: Acquire and Release at once, (A) to (D): every change both takes over what the last one left and hands on.
-    /// SeqCst for (E).
+    /// SeqCst for (E), of the changes to Ready and by `displace`; one that fails has ordered nothing.
     fn change(&self, slot: usize, from: Word, to: Word) -> bool {
         self.word(slot).compare_exchange(from.0, to.0, Ordering::SeqCst, Ordering::Relaxed).is_ok()
     }
@@ -197,7 +207,7 @@ impl<'a> Slots<'a> {
             step!("claim: before");
             if Word(self.word(slot).load(Ordering::Relaxed)) == FREE && self.change(slot, FREE, word) {
                 step!("claim: claimed");
-                return Ok(Claim { slot, word, place: None });
+                return Ok(Claim { slot, word, place: None, late: false });
             }
         }
         match full {
@@ -223,7 +233,11 @@ impl<'a> Slots<'a> {
             step!("displace: chosen");
             if self.change(slot, last, word) {
                 step!("displace: claimed");
-                return Some(Claim { slot, word, place: None });
+                // ORDERING (E): the mark before the look. Pairs with (G): the owner, who settles after it gave the mailbox up, sees the
+                // victim, or this is seen here.
+                seq_cst_accesses();
+                let late = victim.is_some() && self.hot.receiver.0.retired.load(Ordering::SeqCst) != 0;
+                return Some(Claim { slot, word, place: None, late });
             }
         }
         None
@@ -236,7 +250,7 @@ impl<'a> Slots<'a> {
         step!("reuse: chosen");
         let reused = self.change(old.slot, old.word, word);
         step!("reuse: claimed");
-        reused.then_some(Claim { slot: old.slot, word, place: Some(old.word) })
+        reused.then_some(Claim { slot: old.slot, word, place: Some(old.word), late: false })
     }
 
     /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the order:
@@ -259,7 +273,7 @@ impl<'a> Slots<'a> {
         step!("replace: marked");
         if self.change(old.slot, old.word, FREE) {
             step!("replace: freed");
-            return Some(Claim { slot: claim.slot, word: marked, place: Some(old.word) });
+            return Some(Claim { slot: claim.slot, word: marked, place: Some(old.word), late: claim.late });
         }
         // It is being received, or was displaced.
         self.change(claim.slot, marked, claim.word);
@@ -295,12 +309,15 @@ impl<'a> Slots<'a> {
             step!("publish: taken back");
             return Published::Retired;
         }
-        // A retired mailbox whose word is no longer ours: somebody received it before it retired, so it was accepted.
+        // A retired mailbox whose word is no longer ours: it was received before the mailbox retired, or displaced by one who counts
+        // that; so it was accepted.
+
         // With another priority than what it replaces, and of the level, it may stand before what the receiver knows of the level.
         let moved = claim.place.is_some_and(|old| old.priority() != priority);
         if u32::from(priority.0) + u32::from(moved) > receiver.level.load(Ordering::SeqCst) {
-            // ORDERING: Release; pairs with the swap in `heed`, which then sees the hint.
-            self.hot.alert.0.store(1, Ordering::Release);
+            // ORDERING: Release; pairs with the swap in `heed`, which then sees the hint. No plain store: that of one sender would
+            // hide that of another, with the hint it was for.
+            self.hot.alert.0.swap(1, Ordering::Release);
             step!("publish: alert");
         }
         let wake = receiver.sleeping.load(Ordering::SeqCst) != 0;
@@ -321,8 +338,10 @@ impl<'a> Slots<'a> {
         self.first_lines(slot).into_iter().for_each(prefetch_to_write);
     }
 
+    /// The second is the first once more if the slot has no other.
     fn first_lines(&self, slot: usize) -> [*const u8; 2] {
-        [0, 64].map(|line| self.bodies.first.wrapping_add(slot * self.bodies.bytes + line))
+        let second = if self.bodies.bytes > 64 { 64 } else { 0 };
+        [0, second].map(|line| self.bodies.first.wrapping_add(slot * self.bodies.bytes + line))
     }
 
     // ---- the receiver ----
@@ -339,8 +358,8 @@ impl<'a> Slots<'a> {
     /// Frees a taken slot.
     pub(crate) fn release(&self, taken: Taken) {
         step!("release: before");
-        let freed = self.change(taken.slot, taken.word, FREE);
-        debug_assert!(freed, "only its receiver frees a taken slot");
+        // Only its receiver frees a taken slot, so this succeeds, whatever word a foreign program wrote there.
+        self.change(taken.slot, taken.word, FREE);
         step!("release: freed");
     }
 

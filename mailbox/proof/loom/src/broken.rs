@@ -12,6 +12,8 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("no_alert_is_lost", 1),
     ("a_new_owner_says_its_own_level", 2),
     ("who_dies_before_it_alerts_is_heard", 2),
+    ("two_alerts_are_two", 1),
+    ("a_state_raised_to_the_level_is_found", 1),
     ("the_newest_is_found_in_its_place", 1),
     ("who_is_displaced_is_counted_and_not_received", 2),
     ("displacing_keeps_the_order", 2),
@@ -34,6 +36,7 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_retired_mailbox_keeps_nothing_of_the_dead", 2),
     ("a_retired_mailbox_counts_the_displaced", 3),
     ("a_replaced_mailbox_hides_no_loss", 3),
+    ("a_replaced_mailbox_hides_no_late_loss", 2),
     ("a_sender_dies_with_a_claim", 2),
     ("a_sender_dies_with_a_ticket", 2),
     ("a_sender_dies_without_its_hint", 2),
@@ -130,8 +133,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "release_without_release",
         edits: &[edit(
             "slots",
-            "let freed = self.change(taken.slot, taken.word, FREE);",
-            "let freed = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, Ordering::Relaxed).is_ok();",
+            "        self.change(taken.slot, taken.word, FREE);\n",
+            "        let _ = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, Ordering::Relaxed);\n",
         )],
         caught_by: "a_body_is_handed_over_whole",
         says: RACE,
@@ -258,23 +261,23 @@ pub(crate) const BROKEN: &[Broken] = &[
             ),
             edit(
                 "slots",
-                "return Ok(Claim { slot, word, place: None });",
-                "return Ok(Claim { slot, word, place: None, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+                "return Ok(Claim { slot, word, place: None, late: false });",
+                "return Ok(Claim { slot, word, place: None, late: false, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "return Some(Claim { slot, word, place: None });",
-                "return Some(Claim { slot, word, place: None, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+                "return Some(Claim { slot, word, place: None, late });",
+                "return Some(Claim { slot, word, place: None, late, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "slot: old.slot, word, place: Some(old.word) })",
-                "slot: old.slot, word, place: Some(old.word), ticket: 0 })",
+                "slot: old.slot, word, place: Some(old.word), late: false })",
+                "slot: old.slot, word, place: Some(old.word), late: false, ticket: 0 })",
             ),
             edit(
                 "slots",
-                "word: marked, place: Some(old.word) })",
-                "word: marked, place: Some(old.word), ticket: 0 })",
+                "word: marked, place: Some(old.word), late: claim.late })",
+                "word: marked, place: Some(old.word), late: claim.late, ticket: 0 })",
             ),
             edit(
                 "slots",
@@ -295,7 +298,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // ---- the level, and the alert above it ----
     Broken {
         name: "nobody_alerts",
-        edits: &[edit("slots", "self.hot.alert.0.store(1, Ordering::Release);", "")],
+        edits: &[edit("slots", "self.hot.alert.0.swap(1, Ordering::Release);", "")],
         caught_by: "the_urgent_passes_what_is_known",
         says: WRONG,
     },
@@ -305,8 +308,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[
             edit(
                 "slots",
-                "self.hot.alert.0.store(1, Ordering::Release);",
-                "self.hot.alert.0.store(1, Ordering::Relaxed);",
+                "self.hot.alert.0.swap(1, Ordering::Release);",
+                "self.hot.alert.0.swap(1, Ordering::Relaxed);",
             ),
             edit("slots", FENCE_E, NO_FENCE_E),
         ],
@@ -372,6 +375,28 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("queue", "        self.level = NO_LEVEL;\n    }", "    }"),
         ],
         caught_by: "a_new_owner_says_its_own_level",
+        says: WRONG,
+    },
+    // One alert in place of the other, and the hint that it was for is not seen. Only a sender that overwrites what it has not read.
+    Broken {
+        name: "alerts_by_a_store",
+        edits: &[edit(
+            "slots",
+            "self.hot.alert.0.swap(1, Ordering::Release);",
+            "self.hot.alert.0.store(1, Ordering::Release);",
+        )],
+        caught_by: "two_alerts_are_two",
+        says: "passed",
+    },
+    // A state raised to the level, and older than what is known of the level.
+    Broken {
+        name: "what_moved_alerts_nobody",
+        edits: &[edit(
+            "slots",
+            "u32::from(priority.0) + u32::from(moved) > receiver",
+            "u32::from(priority.0) > receiver",
+        )],
+        caught_by: "a_state_raised_to_the_level_is_found",
         says: WRONG,
     },
     // It has hinted, and nobody looks.
@@ -686,6 +711,13 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "a_replaced_mailbox_hides_no_loss",
         says: "hidden",
     },
+    // Displaced after the owner's last look, and counted where nobody looks any more.
+    Broken {
+        name: "forgets_late_victims",
+        edits: &[edit("slots", "self.victim().filter(|_| self.late)", "None")],
+        caught_by: "a_replaced_mailbox_hides_no_late_loss",
+        says: "hidden",
+    },
     // Retired between claim and publishing.
     Broken {
         name: "retirement_seen_only_at_claim",
@@ -838,6 +870,33 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
             "if wake {",
             "self.wake();",
         ],
+    },
+    Mirrored {
+        file: "slots",
+        what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it weakened",
+        lines: &[
+            "compare_exchange(from.0, to.0, Ordering::SeqCst, Ordering::Relaxed)",
+            "self.hot.receiver.0.retired.load(Ordering::SeqCst)",
+            "seq_cst_accesses();",
+            "receiver.retired.load(Ordering::SeqCst)",
+            "receiver.level.load(Ordering::SeqCst)",
+            "receiver.sleeping.load(Ordering::SeqCst)",
+        ],
+    },
+    Mirrored {
+        file: "hot",
+        what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it weakened",
+        lines: &[
+            "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
+            "sleeping.store(1, Ordering::SeqCst)",
+            "hints.load(Ordering::SeqCst)",
+            "level.store(level.0.into(), Ordering::SeqCst)",
+        ],
+    },
+    Mirrored {
+        file: "queue",
+        what: "SeqCst stands for the fence that the models have before it (seq_cst_accesses), and no model would see it weakened",
+        lines: &["hints.load(Ordering::SeqCst)"],
     },
     Mirrored {
         file: "doorbell",

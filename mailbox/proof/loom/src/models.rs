@@ -159,6 +159,34 @@ pub(crate) fn who_dies_before_it_alerts_is_heard() {
     assert_eq!(receiver.drain(), expected);
 }
 
+/// Two of one priority above the level alert one after the other, and the receiver, which has seen one of them by chance, heeds once:
+/// both go before what it knows.
+pub(crate) fn two_alerts_are_two() {
+    let (mailbox, queue) = one_received(&[(20, 1), (20, 2), (20, 3)]);
+    let mut receiver = Receiver { queue, ..mailbox.receiver() };
+    let one = mailbox.send_from(1, Full::Displace, &[(30, 8)]);
+    let other = mailbox.send_from(2, Full::Displace, &[(30, 9)]);
+    receiver.queue.look(&mailbox.slots());
+    let before = receiver.take_times(2);
+    one.join().unwrap();
+    other.join().unwrap();
+    let mut rest = receiver.drain();
+    rest.retain(|body| *body <= 3 || !before.contains(body));
+    assert!(rest.is_sorted_by_key(|body| *body <= 3), "passed: {before:?}, then {rest:?}");
+}
+
+/// A state that waited below the level is sent anew as important as the level, in its old place: before all that is known of it.
+pub(crate) fn a_state_raised_to_the_level_is_found() {
+    let mailbox = Mailbox::new(5);
+    let mut state = mailbox.sender(1, Full::Latest);
+    assert_eq!(state.send(5, 1), Sent::Accepted);
+    assert_eq!(mailbox.sender(2, Full::Reject).send_all(&[(10, 7), (10, 8), (10, 9)]), [7, 8, 9]);
+    let mut receiver = mailbox.receiver();
+    assert_eq!(receiver.take(), Some(7));
+    assert_eq!(state.send(10, 2), Sent::Accepted);
+    assert_eq!(receiver.drain(), [2, 8, 9]);
+}
+
 /// A state that the receiver knows is sent anew: the newer one is received in the place of the older, not after all that is known.
 pub(crate) fn the_newest_is_found_in_its_place() {
     let mailbox = Mailbox::new(4);
@@ -487,6 +515,25 @@ pub(crate) fn a_replaced_mailbox_hides_no_loss() {
     seen.extend(mailbox.displaced());
     sender.join().unwrap();
     assert!(seen.contains(&10), "hidden");
+}
+
+/// As before, with a package that is published and displaced while the owner looks for the last time: its sender holds it for
+/// accepted, so it is found by the owner, or counted by who displaced it, where it goes on.
+pub(crate) fn a_replaced_mailbox_hides_no_late_loss() {
+    let mailbox = Mailbox::new(1);
+    let low = mailbox.send_from(1, Full::Displace, &[(10, 10)]);
+    let high = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let slots = mailbox.slots();
+    let mut owner = mailbox.receiver();
+    slots.retire();
+    owner.queue.rescan(&slots);
+    let mut seen = owner.drain();
+    slots.settle(|victim| seen.push(victim.priority.0));
+    seen.extend(mailbox.displaced());
+    let accepted = low.join().unwrap();
+    high.join().unwrap();
+    seen.extend(mailbox.counted_elsewhere());
+    assert!(accepted.iter().all(|body| seen.contains(body)), "hidden");
 }
 
 // ---- deaths ----

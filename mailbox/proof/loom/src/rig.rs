@@ -27,6 +27,8 @@ pub(super) struct Mailbox {
     pub(super) dead: AtomicU32,
     /// Counted as having lost their place. Not loom's, so that counting adds no order to the model.
     victims: Mutex<Vec<Victim>>,
+    /// Counted where their displacers went on.
+    late: Mutex<Vec<Victim>>,
 }
 
 /// A participant's bell. It may receive from several mailboxes.
@@ -61,6 +63,7 @@ impl Mailbox {
             other: AtomicU32::new(0),
             dead: AtomicU32::new(0),
             victims: Mutex::default(),
+            late: Mutex::default(),
         })
     }
 
@@ -111,6 +114,11 @@ impl Mailbox {
 
     pub(super) fn count(&self, victim: Victim) {
         self.victims.lock().unwrap().push(victim);
+    }
+
+    /// Priorities of those that senders counted in the mailbox that took the place of this one.
+    pub(super) fn counted_elsewhere(&self) -> Vec<u8> {
+        self.late.lock().unwrap().iter().map(|victim| victim.priority.0).collect()
     }
 
     /// Priorities of those that gave way to more important ones.
@@ -197,6 +205,7 @@ impl Sender<'_> {
             Published::Retired => {
                 // SAFETY: the claim is ours again; the real sender copies the body to the mailbox that took the place.
                 assert_eq!(cell.with(|cell| unsafe { *cell }), body);
+                self.mailbox.late.lock().unwrap().extend(claim.late_victim());
                 slots.abandon(claim);
                 Sent::Retired
             }
