@@ -1,8 +1,8 @@
 //! Sleeping and waking: what the kernel is asked for a participant's bell.
 //!
 //! ```text
-//! receiver: sleeping = 1 │ fence │ look at the hints │ sleep while bell == seen │ sleeping = 0
-//! sender:   publish, hint │ fence │ sleeping? ──▶ bell += 1, wake
+//! receiver: seen = bell │ sleeping = 1 │ (F) │ look at the hints │ sleep while bell == seen │ sleeping = 0
+//! sender:   publish, hint │ (E) │ sleeping? ──▶ bell += 1, wake
 //! ```
 //! The receiver reads the bell before it says that it sleeps; so a ring after its last look changes the word it would
 //! sleep on. One bell serves all mailboxes of a participant, so waiting on several is waiting on one.

@@ -166,7 +166,10 @@ fn files_that_are_no_mailboxes_are_told_from_those_that_are() {
     };
     let garbage: Vec<u8> = (0..20_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     let foreign = "its file is no mailbox, or damaged; end its owner, and remove the file with `rohrpost clean`";
-    let version = "it was made by another version (layout 99, this program 2); build both from the same version";
+    let version = format!(
+        "it was made by another version (layout 99, this program {}); build both from the same version",
+        rohrpost_mailbox::LAYOUT_VERSION
+    );
     for (what, bytes) in [
         ("empty", vec![]),
         ("a few bytes", whole[..100].to_vec()),
@@ -184,7 +187,7 @@ fn files_that_are_no_mailboxes_are_told_from_those_that_are() {
         let me = ground.join();
         fs::write(file_of(&ground, MAILBOX), bytes).unwrap();
         let error = me.sender(MAILBOX).err().unwrap();
-        let why = if what == "another version" { version } else { foreign };
+        let why = if what == "another version" { &version } else { foreign };
         assert_eq!(error.to_string(), format!("mailbox 1.200.1.0: {why}"), "{what}");
         assert!(ground.node().look_at(MAILBOX).is_none(), "{what}");
         let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();

@@ -1,7 +1,7 @@
 //! Fuzz targets: each takes any bytes, hands them to what reads bytes of others, and panics if a promise is not kept.
 //!
 //! ```text
-//! corpus/NAME/*  ──┬── tests/corpus.rs    each file once, in every `cargo test`
+//! corpus/NAME/*  ──┬── tests/corpus.rs    each file once, in every `cargo xtask test`
 //!                  └── libFuzzer          changes them, guided by what code they reach: `cargo xtask fuzz`
 //! ```
 //!
