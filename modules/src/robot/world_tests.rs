@@ -30,7 +30,7 @@ fn bad_maps_say_where() {
         ("rohrpost-map 1\ncell_m -1\nmap\n", header(2, "a positive number of metres", "-1")),
         ("rohrpost-map 1\ncell_m nan\nmap\n", header(2, "a positive number of metres", "nan")),
         ("rohrpost-map 1\nsize 3\n", header(2, "`cell_m` and metres, or `map`", "size 3")),
-        ("rohrpost-map 1\ncell_m 1\nmap\n", MapError::Ended { line: 0, missing: "all of its rows" }),
+        ("rohrpost-map 1\ncell_m 1\nmap\n", MapError::Ended { line: 3, missing: "all of its rows" }),
         ("rohrpost-map 1\ncell_m 1\nmap\n###\n#>\n", MapError::RowLength { line: 5, found: 2, expected: 3 }),
         ("rohrpost-map 1\ncell_m 1\nmap\n#x#\n", MapError::Square { line: 4, column: 2, found: 'x' }),
         ("rohrpost-map 1\ncell_m 1\nmap\n#>#\n#<#\n", MapError::SecondStart { line: 5 }),
