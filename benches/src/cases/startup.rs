@@ -13,7 +13,7 @@ use super::{Case, Done, as_failure};
 use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
-use nix::mqueue::{MQ_OFlag, MqdT, mq_close, mq_open, mq_send, mq_timedreceive, mq_unlink};
+use nix::mqueue::{MQ_OFlag, MqAttr, MqdT, mq_close, mq_open, mq_send, mq_timedreceive, mq_unlink};
 use nix::sys::stat::Mode;
 use nix::sys::time::TimeSpec;
 use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Shape, Type, monotonic_ns, realtime_ns};
@@ -259,7 +259,9 @@ impl Drop for Queues {
 
 fn make_queue(name: &str) -> nix::Result<MqdT> {
     let flags = MQ_OFlag::O_RDWR | MQ_OFlag::O_CREAT | MQ_OFlag::O_EXCL;
-    mq_open(name, flags, Mode::S_IRUSR | Mode::S_IWUSR, None)
+    // The kernel's defaults, said aloud: without attributes nix leaves out two arguments that making a queue reads.
+    let attributes = MqAttr::new(0, 10, 8192, 0);
+    mq_open(name, flags, Mode::S_IRUSR | Mode::S_IWUSR, Some(&attributes))
 }
 
 /// The next message, which must be the body, and when it was there.
