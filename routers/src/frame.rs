@@ -1,0 +1,328 @@
+//! The bytes of a datagram between routers: checked once, then no accessor can fail. The page `docs/src/wire.md` is exact.
+//!
+//! ```text
+//!  0     2    3    4       5     6     7  8        16            24         32
+//! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬──────────────────────────────────┐
+//! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ as its kind says                 │
+//! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴──────────────────────────────────┘
+//!  packages: (package head 16, body) over and over        fragment: first u64, index u16, count u16, offset u32, package head, bytes
+//!  alive: incarnation u64 and next sequence u64 of the peer as we heard it, datagrams of it that we missed u64
+//!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
+//! ```
+//!
+//! All fields of ours are little-endian; the head of a package is in the order that its own options tell.
+
+use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
+
+/// Bytes before what depends on the kind.
+pub const HEAD_BYTES: usize = 32;
+/// The version of this format; the first four bytes and a refusal mean the same in all of them.
+pub const VERSION: u8 = 1;
+/// Bytes of a fragment's own head, the package's head included.
+pub const FRAGMENT_HEAD_BYTES: usize = 32;
+/// Bytes of what an alive datagram says.
+pub const ALIVE_BYTES: usize = 24;
+/// Bytes of what a refusal says.
+pub const REFUSAL_BYTES: usize = 16;
+
+const MAGIC: [u8; 2] = *b"Rp";
+
+/// A node by its place in the configuration, from 0.
+pub type NodeIndex = u8;
+
+/// What a datagram is.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(u8)]
+pub enum Kind {
+    /// Whole packages, one after the other.
+    Packages = 1,
+    /// A part of a package.
+    Fragment = 2,
+    /// Nothing to carry, but still there.
+    Alive = 3,
+    /// "I take nothing from you."
+    Refusal = 4,
+    /// Time: the master says what time it is.
+    Sync = 16,
+    /// Time: when the last such frame left.
+    FollowUp = 17,
+    /// Time: a slave asks how long the way is.
+    Request = 18,
+    /// Time: the master's answer.
+    Reply = 19,
+}
+
+impl Kind {
+    const ALL: [Self; 8] = [
+        Self::Packages,
+        Self::Fragment,
+        Self::Alive,
+        Self::Refusal,
+        Self::Sync,
+        Self::FollowUp,
+        Self::Request,
+        Self::Reply,
+    ];
+}
+
+/// What every datagram begins with.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct FrameHead {
+    /// What it is.
+    pub kind: Kind,
+    /// System of both ends.
+    pub system: u8,
+    /// Node that sent it.
+    pub from: NodeIndex,
+    /// Node it is for.
+    pub to: NodeIndex,
+    /// Of the sender's configuration.
+    pub digest: u64,
+    /// Tells this life of the sending router from its others; never 0.
+    pub incarnation: u64,
+    /// Counts the datagrams of this life from this sender to this receiver, from 0. Time frames have a count of their own.
+    pub sequence: u64,
+}
+
+/// Why bytes are no frame of ours.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum BadFrame {
+    /// Something else, or cut short.
+    #[error("no datagram of a Rohrpost router")]
+    Foreign,
+    /// Another version of the format.
+    #[error("wire format {theirs}, ours is {VERSION}; run the same version of Rohrpost on all nodes", theirs = .0)]
+    Version(u8),
+    /// Of this format, but wrong in itself.
+    #[error("damaged: {0}")]
+    Damaged(&'static str),
+}
+
+impl FrameHead {
+    /// The 32 bytes.
+    pub fn to_bytes(&self) -> [u8; HEAD_BYTES] {
+        let mut bytes = [0; HEAD_BYTES];
+        bytes[0..2].copy_from_slice(&MAGIC);
+        bytes[2..7].copy_from_slice(&[VERSION, self.kind as u8, self.system, self.from, self.to]);
+        bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
+        bytes[16..24].copy_from_slice(&self.incarnation.to_le_bytes());
+        bytes[24..32].copy_from_slice(&self.sequence.to_le_bytes());
+        bytes
+    }
+
+    /// Reads the head; what follows is returned as it is, see [`Frame::parse`].
+    ///
+    /// # Errors
+    /// [`BadFrame`]
+    pub fn parse(datagram: &[u8]) -> Result<(Self, &[u8]), BadFrame> {
+        match datagram {
+            [a, b, version, ..] if [*a, *b] == MAGIC && *version != VERSION => return Err(BadFrame::Version(*version)),
+            [a, b, ..] if [*a, *b] == MAGIC => {}
+            _ => return Err(BadFrame::Foreign),
+        }
+        let Some((b, rest)) = datagram.split_first_chunk::<HEAD_BYTES>() else { return Err(BadFrame::Foreign) };
+        let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
+        if b[7] != 0 {
+            return Err(BadFrame::Damaged("byte 7 is not 0"));
+        }
+        let head = Self {
+            kind,
+            system: b[4],
+            from: b[5],
+            to: b[6],
+            digest: long(b, 8),
+            incarnation: long(b, 16),
+            sequence: long(b, 24),
+        };
+        if head.incarnation == 0 {
+            return Err(BadFrame::Damaged("incarnation 0"));
+        }
+        Ok((head, rest))
+    }
+}
+
+/// What a datagram of packages brought, whole.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Frame<'a> {
+    /// Whole packages.
+    Packages(Packages<'a>),
+    /// A part of one.
+    Fragment(Fragment<'a>),
+    /// Still there.
+    Alive(Alive),
+    /// It takes nothing from us.
+    Refusal(Refusal),
+    /// Of the time protocol; `time` reads on.
+    Time(&'a [u8]),
+}
+
+impl<'a> Frame<'a> {
+    /// Checks all that a datagram says of itself.
+    ///
+    /// # Errors
+    /// [`BadFrame`]
+    pub fn parse(datagram: &'a [u8]) -> Result<(FrameHead, Self), BadFrame> {
+        let (head, rest) = FrameHead::parse(datagram)?;
+        let frame = match head.kind {
+            Kind::Packages => Self::Packages(Packages::check(rest)?),
+            Kind::Fragment => Self::Fragment(Fragment::parse(rest)?),
+            Kind::Alive => Self::Alive(Alive::parse(rest)?),
+            Kind::Refusal => Self::Refusal(Refusal::parse(rest)?),
+            Kind::Sync | Kind::FollowUp | Kind::Request | Kind::Reply => Self::Time(rest),
+        };
+        Ok((head, frame))
+    }
+}
+
+/// Packages of a datagram; an iterator over them. It was checked as a whole: at least one, none cut short, nothing behind.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Packages<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Packages<'a> {
+    fn check(bytes: &'a [u8]) -> Result<Self, BadFrame> {
+        let mut rest = bytes;
+        while let Some((_, _, behind)) = split_package(rest) {
+            rest = behind;
+        }
+        if bytes.is_empty() || !rest.is_empty() {
+            return Err(BadFrame::Damaged("a package is cut short"));
+        }
+        Ok(Self { rest: bytes })
+    }
+}
+
+impl<'a> Iterator for Packages<'a> {
+    type Item = (Head, &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (head, body, rest) = split_package(self.rest)?;
+        self.rest = rest;
+        Some((head, body))
+    }
+}
+
+fn split_package(bytes: &[u8]) -> Option<(Head, &[u8], &[u8])> {
+    let head = Head::from_bytes(bytes).ok()?;
+    let (body, rest) = bytes.get(PACKAGE_HEAD_BYTES..)?.split_at_checked(head.len.into())?;
+    Some((head, body, rest))
+}
+
+/// A part of a package that does not fit in a datagram.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Fragment<'a> {
+    /// Sequence of the datagram with its first part: which package it is, and its place in the order.
+    pub first: u64,
+    /// Which part, from 0.
+    pub index: u16,
+    /// Of how many.
+    pub count: u16,
+    /// Where in the body these bytes begin.
+    pub offset: u32,
+    /// The package's head; its `len` is that of the whole body.
+    pub head: Head,
+    /// The part.
+    pub bytes: &'a [u8],
+}
+
+impl<'a> Fragment<'a> {
+    /// Its head, to go before the bytes.
+    pub fn head_bytes(&self) -> [u8; FRAGMENT_HEAD_BYTES] {
+        let mut bytes = [0; FRAGMENT_HEAD_BYTES];
+        bytes[0..8].copy_from_slice(&self.first.to_le_bytes());
+        bytes[8..10].copy_from_slice(&self.index.to_le_bytes());
+        bytes[10..12].copy_from_slice(&self.count.to_le_bytes());
+        bytes[12..16].copy_from_slice(&self.offset.to_le_bytes());
+        bytes[16..32].copy_from_slice(&self.head.to_bytes());
+        bytes
+    }
+
+    fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
+        let Some((b, bytes)) = rest.split_first_chunk::<FRAGMENT_HEAD_BYTES>() else {
+            return Err(BadFrame::Damaged("a fragment is cut short"));
+        };
+        let half = |at: usize| u16::from_le_bytes([b[at], b[at + 1]]);
+        let offset = u32::from_le_bytes([b[12], b[13], b[14], b[15]]);
+        let Ok(head) = Head::from_bytes(&b[16..]) else { return Err(BadFrame::Damaged("a fragment is cut short")) };
+        let part = Self { first: long(b, 0), index: half(8), count: half(10), offset, head, bytes };
+        let end = u64::from(part.offset) + bytes.len() as u64;
+        let is_last = part.index.checked_add(1) == Some(part.count);
+        let fits = part.index < part.count && part.count > 1 && !bytes.is_empty() && end <= part.head.len.into();
+        let reaches = (end == part.head.len.into()) == is_last && (part.offset == 0) == (part.index == 0);
+        if fits && reaches { Ok(part) } else { Err(BadFrame::Damaged("a fragment lies outside its package")) }
+    }
+}
+
+/// "Still there", and what was heard of the receiver: so one-way links are noticed, and losses at the end of a burst.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Alive {
+    /// The life of the receiver that is heard; 0: none.
+    pub heard_incarnation: u64,
+    /// The sequence that is expected next of it.
+    pub heard_next: u64,
+    /// Datagrams of that life that never came.
+    pub heard_lost: u64,
+}
+
+impl Alive {
+    /// The 24 bytes behind the head.
+    pub fn to_bytes(&self) -> [u8; ALIVE_BYTES] {
+        let mut bytes = [0; ALIVE_BYTES];
+        bytes[0..8].copy_from_slice(&self.heard_incarnation.to_le_bytes());
+        bytes[8..16].copy_from_slice(&self.heard_next.to_le_bytes());
+        bytes[16..24].copy_from_slice(&self.heard_lost.to_le_bytes());
+        bytes
+    }
+
+    fn parse(rest: &[u8]) -> Result<Self, BadFrame> {
+        let b: &[u8; ALIVE_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("an alive frame has 24 bytes"))?;
+        Ok(Self { heard_incarnation: long(b, 0), heard_next: long(b, 8), heard_lost: long(b, 16) })
+    }
+}
+
+/// Why a peer takes nothing from us.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(u8)]
+pub enum Reason {
+    /// Another version of the wire format; the refusal's own version byte is theirs.
+    Version = 1,
+    /// Another configuration.
+    Digest = 2,
+    /// Its configuration has no such node, or that node has another address.
+    Stranger = 3,
+}
+
+/// "I take nothing from you, since …"
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Refusal {
+    /// Why.
+    pub reason: Reason,
+    /// Digest of who refuses.
+    pub digest: u64,
+}
+
+impl Refusal {
+    /// The 16 bytes behind the head.
+    pub fn to_bytes(&self) -> [u8; REFUSAL_BYTES] {
+        let mut bytes = [0; REFUSAL_BYTES];
+        bytes[0] = self.reason as u8;
+        bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
+        bytes
+    }
+
+    fn parse(rest: &[u8]) -> Result<Self, BadFrame> {
+        let b: &[u8; REFUSAL_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("a refusal has 16 bytes"))?;
+        let reasons = [Reason::Version, Reason::Digest, Reason::Stranger];
+        let reason = reasons.into_iter().find(|reason| *reason as u8 == b[0]);
+        let reason = reason.filter(|_| b[1..8] == [0; 7]).ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
+        Ok(Self { reason, digest: long(b, 8) })
+    }
+}
+
+/// Eight bytes at a place that the caller's array has.
+fn long<const N: usize>(bytes: &[u8; N], at: usize) -> u64 {
+    let mut eight = [0; 8];
+    eight.copy_from_slice(&bytes[at..at + 8]);
+    u64::from_le_bytes(eight)
+}

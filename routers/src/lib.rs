@@ -1,0 +1,24 @@
+//! Carries packages between the nodes of a system, and keeps one time for all of them (seed 002, 2.2.3, 3.2 and 4).
+//!
+//! ```text
+//!  modules ──▶ mailbox of the router ──▶ Outbound: 32 levels, quotas, pacing ══ UDP ══▶ Inbound: gaps, copies, reassembly ──▶ mailboxes
+//!                                          │ undeliverable: an error back to its sender                │ no such mailbox, full: the same
+//!  Clock ◀══ synchronisation, calibration ══▶ Clock of the master                        writes the node's page of system time
+//! ```
+//!
+//! All protocol logic is without sockets, threads and clocks: time comes as an argument, datagrams as bytes. The same code runs under
+//! real sockets (`shell`) and in a simulation of whole networks (`sim`).
+
+#![forbid(unsafe_code)]
+
+pub mod fragment;
+pub mod frame;
+pub mod impair;
+pub mod inbound;
+pub mod lab;
+pub mod outbound;
+pub mod queue;
+pub mod shell;
+pub mod sim;
+pub mod stats;
+pub mod time;
