@@ -127,6 +127,15 @@ impl Place {
     }
 }
 
+/// Where a sender may lead.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reach {
+    /// To a mailbox of this node only.
+    Here,
+    /// Also to the router's, for mailboxes of other nodes.
+    Routes,
+}
+
 /// One participant's way into one mailbox; if that is on another node, into the mailbox of this node's router.
 pub struct Sender {
     participant: Arc<Participant>,
@@ -136,6 +145,7 @@ pub struct Sender {
     segment: Segment,
     /// The registry's epoch in which the mailbox was found, or found to be elsewhere.
     epoch: u32,
+    reach: Reach,
     place: Place,
     /// Counts what it sends.
     flows: Writer,
@@ -154,21 +164,37 @@ impl Participant {
     /// [`SendError::NoMailbox`], [`SendError::NoRouter`], [`SendError::InUse`] when all its claims are spoken for, or
     /// [`SendError::Bad`].
     pub fn sender(self: &Arc<Self>, name: Name) -> Result<Sender, SendError> {
+        self.sender_within(name, Reach::Routes)
+    }
+
+    /// Opens a mailbox of this node for sending, whatever routes there are: for who brings packages from other nodes, which must
+    /// not go back there.
+    ///
+    /// # Errors
+    /// As for [`Participant::sender`], but for [`SendError::NoRouter`].
+    pub fn sender_here(self: &Arc<Self>, name: Name) -> Result<Sender, SendError> {
+        self.sender_within(name, Reach::Here)
+    }
+
+    fn sender_within(self: &Arc<Self>, name: Name, reach: Reach) -> Result<Sender, SendError> {
         // Read before it is looked for: what comes in between makes this number an old one.
         let epoch = self.node().registry_epoch();
-        let segment = open(self, name)?;
+        let segment = open(self, name, reach)?;
         count_in(&mut self.sending(), name, &segment)?;
         let place = Place::of(self.claimant());
         let posts = Posts::new(&segment.shape);
         let flows = self.traffic().writer();
-        Ok(Sender { participant: self.clone(), to: name, segment, epoch, place, posts, flows })
+        Ok(Sender { participant: self.clone(), to: name, segment, epoch, reach, place, posts, flows })
     }
 }
 
 /// The mailbox itself, or else that of the router which leads to it.
-fn open(participant: &Participant, name: Name) -> Result<Segment, SendError> {
+fn open(participant: &Participant, name: Name, reach: Reach) -> Result<Segment, SendError> {
     if let Some(here) = open_here(participant, name)? {
         return Ok(here);
+    }
+    if reach == Reach::Here {
+        return Err(SendError::NoMailbox(name));
     }
     let route = routes::find(participant.node().path(), name).map_err(|text| SendError::Bad(name, text))?;
     let router = route.ok_or(SendError::NoMailbox(name))?;
@@ -261,7 +287,7 @@ impl Sender {
                     return Err(SendError::Full(self.segment.name));
                 }
                 Err(NoSlot::Retired) => {
-                    let successor = open(&self.participant, self.name())?;
+                    let successor = open(&self.participant, self.to, self.reach)?;
                     self.enter(successor)?;
                 }
             }
@@ -330,7 +356,7 @@ impl Sender {
 
     /// Copies a claim of a retired mailbox into one of its successor.
     fn move_on(&mut self, old: Claim, priority: Priority, len: usize) -> Result<Claim, SendError> {
-        let successor = open(&self.participant, self.name());
+        let successor = open(&self.participant, self.to, self.reach);
         let retired = match successor.and_then(|successor| self.enter(successor)) {
             Ok(retired) => retired,
             Err(error) => {

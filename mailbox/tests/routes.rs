@@ -163,6 +163,20 @@ fn one_participant_sends_to_as_many_far_mailboxes_as_the_router_has_claims() {
 }
 
 #[test]
+fn what_comes_from_another_node_is_not_sent_back_there() {
+    let ground = routed();
+    let mut transit = transit(&ground);
+    let me = ground.join();
+    assert!(matches!(me.sender_here(FAR), Err(SendError::NoMailbox(FAR))));
+    let here = ground.join().receiver(FAR, shape(4)).unwrap();
+    let mut sender = me.sender_here(FAR).unwrap();
+    send(&mut sender, 1);
+    here.close();
+    assert!(matches!(sender.send(&label(LOW, 2), &[]), Err(SendError::NoMailbox(FAR))), "also when it went");
+    assert!(transit.try_receive().is_none());
+}
+
+#[test]
 fn damaged_routes_are_told_and_not_followed() {
     let ground = routed();
     let _transit = transit(&ground);
