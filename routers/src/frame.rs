@@ -276,6 +276,11 @@ impl<'a> Fragment<'a> {
         if self.is_last() { self.offset as usize / usize::from(self.index).max(1) } else { self.bytes.len() }
     }
 
+    /// Of the body's first bytes those that are here.
+    pub(crate) fn beginning(&self) -> &'a [u8] {
+        if self.index == 0 { self.bytes } else { &[] }
+    }
+
     fn is_last(&self) -> bool {
         usize::from(self.index) + 1 == usize::from(self.count)
     }
