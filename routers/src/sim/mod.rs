@@ -18,6 +18,7 @@ pub mod link;
 mod modules;
 pub mod packages;
 pub mod plan;
+pub mod run;
 pub mod station;
 pub mod trace;
 pub mod world;

@@ -1,6 +1,6 @@
 //! The layer that carries packages: `Outbound` and `Inbound`, called as the threads of the shell call them, and watched.
 
-use super::book::{Account, Book, Promise, Role};
+use super::book::{Promise, Role};
 use super::calls::Answer;
 use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
 use super::plan::{Plan, SYSTEM};
