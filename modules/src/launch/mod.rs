@@ -415,7 +415,9 @@ fn passes(error: &NodeError) -> bool {
 
 fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeeper, NodeError> {
     let (source, pace) = match installation.time {
-        ConfiguredTime::Local => (TimeSource::Local, 1.0),
+        // The router writes the master's time into the page as soon as it knows it. Launch begins it, so that nobody is without
+        // one, launch itself included; no module but the router starts before the router is ready.
+        ConfiguredTime::Local | ConfiguredTime::Master { .. } => (TimeSource::Local, 1.0),
         ConfiguredTime::Simulation { speed } => (TimeSource::Simulation, speed),
         ConfiguredTime::Log => (TimeSource::Log, 1.0),
     };
