@@ -29,12 +29,17 @@
 //!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
+mod broken;
 mod clock;
 mod election;
 mod history;
 mod line;
 pub mod message;
+#[cfg(test)]
+mod tests;
 
+#[cfg(any(test, feature = "broken-variants"))]
+pub use broken::Broken;
 pub use clock::{Clock, Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
 pub use line::UNSYNCHRONISED_NS;
 
