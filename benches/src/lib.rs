@@ -17,6 +17,8 @@ pub mod counting;
 pub mod environment;
 pub mod floors;
 pub mod harness;
+#[cfg(feature = "lan")]
+pub mod lan;
 pub mod one_way;
 pub mod ours;
 #[cfg(feature = "peers")]

@@ -1,6 +1,7 @@
-//! `cargo run --release -p rohrpost-bench -- local`
+//! `cargo run --release -p rohrpost-bench -- local`, or `lan`.
 
 use clap::{Parser, Subcommand};
+use rohrpost_bench::cases::Case;
 use rohrpost_bench::counting::CountingHeap;
 use rohrpost_bench::{Failure, Settings, cases, report};
 use std::io::{self, Write};
@@ -21,11 +22,14 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Mailboxes between processes of one computer.
-    Local(Local),
+    Local(Run),
+    /// Packages between nodes, over routers: two network namespaces of this computer.
+    #[cfg(feature = "lan")]
+    Lan(Run),
 }
 
 #[derive(clap::Args)]
-struct Local {
+struct Run {
     /// One JSON object a line.
     #[arg(long)]
     json: bool,
@@ -53,8 +57,12 @@ fn main() -> ExitCode {
             |()| ExitCode::SUCCESS,
         );
     }
-    let Command::Local(arguments) = Arguments::parse().command;
-    match local(&arguments) {
+    let done = match Arguments::parse().command {
+        Command::Local(run) => measure(&run, &cases::all()),
+        #[cfg(feature = "lan")]
+        Command::Lan(run) => measure(&run, &cases::lan::all()),
+    };
+    match done {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
@@ -65,10 +73,10 @@ fn main() -> ExitCode {
 }
 
 /// False when a contender failed.
-fn local(arguments: &Local) -> Result<bool, Failure> {
+fn measure(arguments: &Run, cases: &[Box<dyn Case>]) -> Result<bool, Failure> {
     let rounds = if arguments.quick { arguments.rounds.min(1) } else { arguments.rounds };
     let settings =
         Settings { rounds, only: arguments.only.clone(), quick: arguments.quick, rohrpost: arguments.rohrpost.clone() };
     let say = |text: String| writeln!(io::stdout(), "{text}").is_ok();
-    Ok(report::run(&settings, &cases::all(), arguments.json, say)?.is_sound())
+    Ok(report::run(&settings, cases, arguments.json, say)?.is_sound())
 }

@@ -1,5 +1,6 @@
 //! How much is measured.
 
+use crate::harness::Failure;
 use std::path::PathBuf;
 
 /// How much a run measures. All cases obey it.
@@ -30,5 +31,18 @@ impl Settings {
     /// How many of something a turn does: `full`, or far fewer in a quick run.
     pub fn count(&self, full: usize) -> usize {
         if self.quick { full.min(300) } else { full }
+    }
+
+    /// The `rohrpost` command: the one that was named, or the one beside this program.
+    ///
+    /// # Errors
+    /// [`Failure::Skipped`] when there is none.
+    pub fn command(&self) -> Result<PathBuf, Failure> {
+        let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+        let path = self.rohrpost.clone().unwrap_or(own.with_file_name("rohrpost"));
+        if path.is_file() {
+            return Ok(path);
+        }
+        Err(Failure::Skipped(format!("no {}; build it, or name it with --rohrpost", path.display())))
     }
 }

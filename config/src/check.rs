@@ -118,7 +118,9 @@ fn flow(installation: &Installation, flow: &Flow, lines: &[Lines], reader: &Read
 /// Each mailbox has more slots than its participants may hold unfinished: else senders that were stopped close it.
 fn claims(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
     for (module, lines) in installation.modules.iter().zip(lines) {
-        let callers = Senders::of(installation, module, |other| calls(other, module));
+        let mut callers = Senders::of(installation, module, |other| calls(other, module));
+        // Tools on other nodes call every module, through the router.
+        callers.router |= installation.nodes.len() > 1 && module.is_in_file();
         let called = Senders::of(installation, module, |other| calls(module, other));
         for ((key, spec), line) in module.mailboxes.each().into_iter().zip(lines.mailboxes) {
             let (senders, tools) = if key == "commands" { (&callers, TOOLS) } else { (&called, 0) };

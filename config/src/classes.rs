@@ -6,6 +6,9 @@ use rohrpost_mailbox::{Class, Name, local};
 /// Class of programs run by hand; every installation has it.
 pub const TOOL: &str = "tool";
 
+/// Class of the routers, which are there by themselves when there are several nodes.
+pub const ROUTER: &str = "router";
+
 /// One class of an installation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClassEntry {

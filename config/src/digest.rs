@@ -13,13 +13,21 @@ use std::hash::Hasher;
 pub struct Digest {
     /// Equal wherever packages are exchanged: the classes, by id and name.
     pub common: u64,
-    /// Equal inside a system: its nodes, their tool instances, and which module is where.
+    /// Equal inside a system: its nodes, their tool instances, which module is where, and what routers agree on: port, MTU, masters
+    /// of time and how often they synchronise.
     pub system: u64,
 }
 
 impl std::fmt::Display for Digest {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:016x}-{:016x}", self.common, self.system)
+    }
+}
+
+impl Digest {
+    /// Both parts in one: what the datagrams of routers carry.
+    pub fn lan(&self) -> u64 {
+        hash(&format!("rohrpost lan 1\n{self}\n"))
     }
 }
 
@@ -41,13 +49,23 @@ impl Installation {
     fn system_text(&self) -> String {
         let mut lines = Vec::new();
         for node in &self.nodes {
-            let address = node.address.as_deref().unwrap_or("-");
+            let address = node.address.map_or("-".into(), |address| address.to_string());
             lines.push(format!("node {} {address:?} {} {}", node.name, node.tools.start(), node.tools.end()));
         }
         for module in &self.modules {
             let mut names: Vec<String> = module.names().skip(1).map(|name| name.to_string()).collect();
             names.sort();
             lines.push(format!("module {} on {} faces {}", module.name, module.node, names.join(" ")));
+        }
+        // The order of the nodes is their index on the wire.
+        if let Some(network) = &self.network {
+            let order: Vec<&str> = self.nodes.iter().map(|node| node.name.as_str()).collect();
+            lines.push(format!(
+                "network {} order {} time {}",
+                network.lan_text(),
+                order.join(" "),
+                self.time.lan_text()
+            ));
         }
         lines.sort();
         format!("rohrpost system 1\nsystem {} {:?}\n{}\n", self.system.id, self.system.name, lines.join("\n"))

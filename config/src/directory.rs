@@ -1,6 +1,6 @@
 //! Who owns which module name: collected in a first pass, so that what a module refers to may stand below it.
 
-use crate::classes::{ClassTable, TOOL, class_of};
+use crate::classes::{ClassTable, ROUTER, TOOL, class_of};
 use crate::reader::{Section, nearest};
 use rohrpost_mailbox::Name;
 use std::collections::BTreeMap;
@@ -9,7 +9,9 @@ use std::collections::BTreeMap;
 pub(crate) struct Directory<'d> {
     pub(crate) classes: &'d ClassTable,
     /// By the text in the file. A name that is wrong in itself stays known: its own message is enough.
-    owners: BTreeMap<&'d str, Name>,
+    owners: BTreeMap<String, Name>,
+    /// Whether each node has a router, which no `[[module]]` describes.
+    has_routers: bool,
 }
 
 /// A text that names no module.
@@ -28,8 +30,10 @@ impl Unknown {
 }
 
 impl<'d> Directory<'d> {
-    pub(crate) fn read(modules: &[Section<'d>], classes: &'d ClassTable) -> Self {
-        let mut directory = Self { classes, owners: BTreeMap::new() };
+    /// `routers` are there by themselves.
+    pub(crate) fn read(modules: &[Section<'d>], classes: &'d ClassTable, routers: &[Name]) -> Self {
+        let owners = routers.iter().map(|name| (classes.format(*name), *name)).collect();
+        let mut directory = Self { classes, owners, has_routers: !routers.is_empty() };
         let mut lines: BTreeMap<&str, usize> = BTreeMap::new();
         for module in modules {
             let name = module.required("name", "name = \"laser.0\"");
@@ -64,14 +68,23 @@ impl<'d> Directory<'d> {
                 ),
             );
         }
-        self.owners.insert(text, name.unwrap_or_default());
+        if self.has_routers && class_of(text) == ROUTER {
+            module.reader.report(
+                line,
+                format!(
+                    "module `{text}`: class `router` is for the routers, which are there by themselves when there are several \
+                     nodes; give the module a class of its own"
+                ),
+            );
+        }
+        self.owners.insert(text.into(), name.unwrap_or_default());
     }
 
     /// The module or face that a text names.
     pub(crate) fn find(&self, text: &str) -> Result<Name, Unknown> {
         self.owners.get(text).copied().ok_or_else(|| {
             // By class alone: `laser.0` and `mapper.0` are alike only in what every name has.
-            let owners = || self.owners.keys().copied();
+            let owners = || self.owners.keys().map(String::as_str);
             let class = nearest(class_of(text), owners().map(class_of));
             let like = owners().filter(|owner| Some(class_of(owner)) == class);
             // Among several of that class, the one with the instance meant.

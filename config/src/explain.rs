@@ -4,6 +4,7 @@ use crate::Full;
 use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
+use crate::network::{LEVEL_NOT_REAL_TIME, Network, TRANSIT};
 use crate::node::Node;
 use crate::output::LineFormat;
 use crate::saved::SavedValue;
@@ -11,6 +12,7 @@ use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
 use std::fmt::Write;
+use std::time::Duration;
 
 const COLUMNS: usize = 100;
 /// Where the right-hand sides under a module begin.
@@ -82,6 +84,7 @@ impl Page<'_> {
         self.entry("system", &format!("{} `{}`: the first byte of its mailbox names", system.id, system.name));
         let time = match time {
             TimeSource::Local => "the computer's clock".into(),
+            TimeSource::Master { masters, interval } => self.masters(masters, *interval),
             TimeSource::Simulation { speed } if *speed == 1.0 => "the simulation, as fast as real time".into(),
             TimeSource::Simulation { speed } => format!("the simulation, {speed} times as fast as real time"),
             TimeSource::Log => "the log that is replayed".into(),
@@ -91,22 +94,65 @@ impl Page<'_> {
             let words = format!("values saved in {} go before settings", file.display());
             self.entry("parameters", &words);
         }
+        self.network();
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
+    }
+
+    /// Whose clock counts.
+    fn masters(&self, masters: &[u8], interval: Duration) -> String {
+        let mut names = masters.iter().filter_map(|index| self.installation.nodes.get(usize::from(*index)));
+        let first = names.next().map_or("", |node| &node.name);
+        let next: Vec<&str> = names.map(|node| node.name.as_str()).collect();
+        let next = match &next[..] {
+            [] => "no other node may follow it".into(),
+            names => format!("if it is silent, that of {}", names.join(", then ")),
+        };
+        format!("the clock of node {first}, the master; {next}; told every {}", duration_text(interval))
+    }
+
+    fn network(&mut self) {
+        let Some(network) = self.installation.network else { return };
+        self.entry(
+            "network",
+            &format!(
+                "UDP ports {} (packages) and {} (time); IP packets of at most {} B, so datagrams of {} B; each router sends at most {} a \
+                 second, and keeps {} of each sender waiting",
+                network.port,
+                network.time_port(),
+                network.mtu,
+                network.datagram_bytes_max,
+                size_text(network.rate_bytes_s),
+                size_text(network.quota_bytes as u64)
+            ),
+        );
+        self.entry("security", Network::UNPROTECTED);
     }
 
     fn classes(&mut self) {
         let classes = &self.installation.classes;
         let width = classes.iter().map(|entry| entry.name.len()).max().unwrap_or(0).max(5);
+        // Where there is no network, nothing waits for it.
+        let network = self.installation.network;
+        let level = |priority| match network.map(|network| network.level(priority)) {
+            None => String::new(),
+            Some(LEVEL_NOT_REAL_TIME) => "  last ".into(),
+            Some(level) => format!("  {level:>5}"),
+        };
+        let level_head = if network.is_some() { "  level" } else { "" };
         self.line("");
         self.line("Classes. The id is the priority of all that a class sends; higher goes first, everywhere.");
         self.line("");
-        self.line(format!("  {:>3}  {:width$}  {:13}  does", "id", "class", "runs as"));
+        self.line(format!("  {:>3}{level_head}  {:width$}  {:13}  does", "id", "class", "runs as"));
         for entry in classes.iter() {
             let scheduling = self.installation.scheduling(entry.class);
-            self.line(format!("  {:>3}  {:width$}  {scheduling:13}  {}", entry.class.0, entry.name, entry.text));
+            let (id, level) = (entry.class.0, level(entry.class.priority()));
+            self.line(format!("  {id:>3}{level}  {:width$}  {scheduling:13}  {}", entry.name, entry.text));
         }
         self.line("");
         self.line("SCHED_FIFO: real time, a higher number runs first. nice: not real time, a higher number gives way.");
+        if network.is_some() {
+            self.line("level: its place among the packages that wait in a router, 0 goes first; last: not real time.");
+        }
         self.line("Modules are started in the order below, and stopped in reverse.");
     }
 
@@ -117,7 +163,7 @@ impl Page<'_> {
         self.line(format!("Node `{}`: {}, {} of mailboxes", node.name, count(modules.len(), "module"), about(memory)));
         self.line("");
         if let Some(address) = &node.address {
-            self.entry("address", address);
+            self.entry("address", &address.to_string());
         }
         self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
         let (hand, launch) = (node.tools_by_hand(), node.launch_instance());
@@ -156,6 +202,9 @@ impl Page<'_> {
         }
         for (key, spec) in module.mailboxes.each() {
             self.entry(key, &mailbox(spec));
+        }
+        if !module.is_in_file() {
+            self.entry("transit", &mailbox(&TRANSIT));
         }
     }
 
@@ -230,6 +279,7 @@ impl Page<'_> {
 
 fn runs(module: &Module) -> String {
     let what = match &module.program {
+        _ if !module.is_in_file() => return "the router of this node, there by itself".into(),
         Program::Builtin(name) => format!("builtin `{name}`"),
         Program::Command(words) => format!("program `{}`", words.join(" ")),
     };

@@ -7,6 +7,7 @@ use crate::errors::{Errors, Problem};
 use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::module::{Context, Module};
+use crate::network::{self, Network};
 use crate::node::{Node, System};
 use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
@@ -36,8 +37,10 @@ pub struct Installation {
     pub classes: ClassTable,
     /// The nodes, in the order of the file; at least one.
     pub nodes: Vec<Node>,
-    /// The modules, in the order of the file, which is the order of their start.
+    /// The modules, in the order of their start: the routers, if there are several nodes, then those of the file.
     pub modules: Vec<Module>,
+    /// How nodes reach each other; none if there is one only.
+    pub network: Option<Network>,
     /// Where system time comes from.
     pub time: TimeSource,
     /// What the output service keeps.
@@ -89,7 +92,7 @@ impl Installation {
         self.modules.iter().find(|module| module.names().any(|own| own == name.module()))
     }
 
-    /// The modules of a node, in the order of the file.
+    /// The modules of a node, in the order of their start.
     pub fn modules_on(&self, node: &str) -> impl Iterator<Item = &Module> {
         self.modules.iter().filter(move |module| module.node == node)
     }
@@ -139,16 +142,20 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     );
     let scheduling = SchedulingRule::read(file.section("scheduling", "[scheduling]"));
     let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
-    let time = TimeSource::read(file.section("time", "[time]"));
+    let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes));
+    let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes);
+    network::judge(&file, &nodes, &classes);
 
     let sections = sections(&file, "module");
     if sections.is_empty() {
         file.report("no module; add one: `[[module]]` with `name` and `builtin` or `program`");
     }
-    let directory = Directory::read(&sections, &classes);
+    let routers = network::routers(&nodes, &classes, system.id);
+    let router_names: Vec<Name> = routers.iter().map(|(router, _)| router.name).collect();
+    let directory = Directory::read(&sections, &classes, &router_names);
     let context = Context { directory: &directory, nodes: &nodes };
     let read = sections.into_iter().enumerate().filter_map(|(index, section)| context.read(section, index));
-    let (modules, lines): (Vec<Module>, Vec<_>) = read.unzip();
+    let (modules, lines): (Vec<Module>, Vec<_>) = routers.into_iter().chain(read).unzip();
 
     let output = Output::read(file.section("output", "[output]"), &directory, &folder);
     let gui = Gui::read(file.section("gui", "[gui]"), &directory);
@@ -168,6 +175,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         classes,
         nodes,
         modules,
+        network,
         time,
         output,
         gui,

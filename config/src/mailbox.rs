@@ -60,6 +60,11 @@ pub(crate) struct SpecLines {
 /// Lines of the three, for checks across modules.
 pub(crate) type MailboxLines = [SpecLines; 3];
 
+/// The lines of mailboxes of which the file says nothing: those of their module.
+pub(crate) fn lines_at(line: usize) -> MailboxLines {
+    [SpecLines { slots: line, size: line }; 3]
+}
+
 impl Mailboxes {
     /// The three, with the names that the file gives them.
     pub fn each(&self) -> [(&'static str, &MailboxSpec); 3] {
@@ -68,7 +73,7 @@ impl Mailboxes {
 
     pub(crate) fn read(section: Option<Section<'_>>, module: &str, module_line: usize) -> (Self, MailboxLines) {
         let mut mailboxes = Self::default();
-        let mut lines = [SpecLines { slots: module_line, size: module_line }; 3];
+        let mut lines = lines_at(module_line);
         let Some(section) = section else { return (mailboxes, lines) };
         let specs = [&mut mailboxes.commands, &mut mailboxes.replies, &mut mailboxes.data];
         for ((key, spec), line) in ["commands", "replies", "data"].into_iter().zip(specs).zip(&mut lines) {

@@ -3,6 +3,7 @@
 use crate::calls::Calls;
 use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes};
+use crate::network::TRANSIT;
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
 use crate::units::duration_text;
@@ -16,7 +17,7 @@ pub const BUILTINS: [&str; 5] = ["sim", "carmen", "mapper", "pilot", "output"];
 /// What runs as a module.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Program {
-    /// One of [`BUILTINS`].
+    /// One of [`BUILTINS`], or the router of a node.
     Builtin(String),
     /// A program and its arguments.
     Command(Vec<String>),
@@ -103,8 +104,8 @@ pub struct Module {
     pub mailboxes: Mailboxes,
     /// Line of its `[[module]]` in the file.
     pub line: usize,
-    /// Which `[[module]]` of the file it is, counted from 0.
-    pub(crate) index: usize,
+    /// Which `[[module]]` of the file it is, counted from 0; none for what is there by itself.
+    pub(crate) index: Option<usize>,
 }
 
 impl Module {
@@ -113,10 +114,16 @@ impl Module {
         std::iter::once(self.name).chain(self.faces.iter().copied())
     }
 
+    /// Whether it is one `[[module]]` of the file. Routers are not: they are there by themselves when there are several nodes.
+    pub fn is_in_file(&self) -> bool {
+        self.index.is_some()
+    }
+
     /// Bytes of its mailboxes; each face has a command mailbox like the module's.
     pub fn memory(&self) -> u64 {
         let [commands, replies, data] = self.mailboxes.each().map(|(_, spec)| spec.memory());
-        commands * (1 + self.faces.len() as u64) + replies + data
+        let transit = if self.is_in_file() { 0 } else { TRANSIT.memory() };
+        commands * (1 + self.faces.len() as u64) + replies + data + transit
     }
 }
 
@@ -171,7 +178,7 @@ impl Context<'_> {
             spin,
             mailboxes,
             line,
-            index,
+            index: Some(index),
         };
         Some((module, Lines { mailboxes: mailbox_lines, calls: calls.lines }))
     }

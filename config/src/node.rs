@@ -2,6 +2,7 @@
 
 use crate::classes::is_word;
 use crate::reader::{Item, Section};
+use std::net::IpAddr;
 use std::ops::RangeInclusive;
 
 /// One robot or station.
@@ -18,8 +19,8 @@ pub struct System {
 pub struct Node {
     /// Its name: `main` of `[nodes.main]`.
     pub name: String,
-    /// Where other nodes reach it; routers use it.
-    pub address: Option<String>,
+    /// Where other nodes reach it; there if there are several.
+    pub address: Option<IpAddr>,
     /// Permission bits of its shared-memory directory.
     pub mode: u32,
     /// Instances of class `tool` on this node, at least two: the first is launch's, programs run by hand take the others.
@@ -75,7 +76,18 @@ impl Node {
             item.report(format!("`{name}` is no node name; use lower-case letters, digits and `-`, a letter first"));
         }
         let section = item.section(&format!("node `{name}`"))?;
-        let address = section.get("address").and_then(|item| item.text("192.168.0.1")).map(Into::into);
+        let address = match section.get("address") {
+            Some(item) => read_address(&item, earlier),
+            None if alone => None,
+            None => {
+                section.report(format!(
+                    "`address` is missing: with several nodes the others must know where this one is; write for example \
+                     `address = \"10.77.0.{}\"`",
+                    earlier.len() + 1
+                ));
+                None
+            }
+        };
         let mode = section.get("mode").and_then(|item| read_mode(&item)).unwrap_or(0o700);
         let tools = match section.get("tools") {
             Some(item) => read_tools(&item, earlier),
@@ -102,6 +114,42 @@ fn read_mode(item: &Item<'_>) -> Option<u32> {
         ));
     }
     mode
+}
+
+/// An address that the others reach: of one computer alone, of the same kind as theirs.
+fn read_address(item: &Item<'_>, earlier: &[Node]) -> Option<IpAddr> {
+    let text = item.text("192.168.0.1")?;
+    let Ok(address) = text.parse::<IpAddr>() else {
+        item.report(format!(
+            "`address` \"{text}\" is no IP address; write numbers, such as `address = \"192.168.0.1\"` or \"fd00::1\": a robot must not \
+             wait for a name server"
+        ));
+        return None;
+    };
+    let why = match address {
+        _ if address.is_unspecified() || address.is_multicast() => Some("is not that of one computer"),
+        IpAddr::V4(v4) if v4.is_broadcast() => Some("is not that of one computer"),
+        IpAddr::V6(v6) if v6.is_unicast_link_local() => {
+            Some("needs an interface beside it; give the node one from fd00::/8")
+        }
+        IpAddr::V6(v6) if v6.to_ipv4_mapped().is_some() => Some("is an IPv4 address in disguise; write that one"),
+        _ => None,
+    };
+    if let Some(why) = why {
+        item.report(format!("`address` \"{text}\" {why}"));
+    }
+    if let Some(other) = earlier.iter().find(|node| node.address == Some(address)) {
+        item.report(format!("`address` \"{text}\" is that of node `{}`; each node has its own", other.name));
+    }
+    let differs = |node: &&Node| node.address.is_some_and(|other| other.is_ipv4() != address.is_ipv4());
+    if let Some(other) = earlier.iter().find(differs) {
+        let (own, theirs) = if address.is_ipv4() { ("IPv4", "IPv6") } else { ("IPv6", "IPv4") };
+        item.report(format!(
+            "`address` \"{text}\" is {own} and that of node `{}` {theirs}, which cannot reach each other; take one kind for all",
+            other.name
+        ));
+    }
+    Some(address)
 }
 
 fn read_tools(item: &Item<'_>, earlier: &[Node]) -> Option<RangeInclusive<u8>> {

@@ -189,15 +189,15 @@ impl<'d> Item<'d> {
         })
     }
 
-    /// One of a few words.
     /// Whether it is this word.
     pub(crate) fn is(&self, word: &str) -> bool {
         self.value.get_ref().as_str() == Some(word)
     }
 
-    pub(crate) fn choice<T: Copy>(&self, words: &[(&str, T)]) -> Option<T> {
+    /// One of a few words.
+    pub(crate) fn choice<T: Clone>(&self, words: &[(&str, T)]) -> Option<T> {
         let text = self.value.get_ref().as_str();
-        let found = words.iter().find(|(word, _)| Some(*word) == text).map(|(_, meaning)| *meaning);
+        let found = words.iter().find(|(word, _)| Some(*word) == text).map(|(_, meaning)| meaning.clone());
         found.or_else(|| {
             let words: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
             self.wrong(&match &words[..] {

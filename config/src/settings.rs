@@ -70,7 +70,7 @@ impl Installation {
 }
 
 fn entry<'d, 't>(document: &'d DeTable<'t>, module: &Module) -> Option<&'d Spanned<DeValue<'t>>> {
-    document.get("module").and_then(|modules| modules.get_ref().get(module.index))
+    document.get("module").and_then(|modules| modules.get_ref().get(module.index?))
 }
 
 /// The table of a module's settings; an empty one in the place of the module, if it has none.

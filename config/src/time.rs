@@ -1,13 +1,26 @@
 //! Where system time comes from.
 
-use crate::reader::Section;
+use crate::node::Node;
+use crate::reader::{Item, Section, nearest};
+use std::time::Duration;
+
+const INTERVAL: Duration = Duration::from_secs(1);
+const INTERVAL_MIN: Duration = Duration::from_millis(10);
+const INTERVAL_MAX: Duration = Duration::from_secs(60);
 
 /// The source of system time, section `[time]`.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub enum TimeSource {
-    /// The computer's own clock, or the master's where routers bear time.
+    /// The computer's own clock.
     #[default]
     Local,
+    /// The clock of one node, which the routers bring to all: the only source that several nodes can share.
+    Master {
+        /// Nodes that may be master, by their place in the file; the first that runs is. At least one.
+        masters: Vec<u8>,
+        /// Time from one synchronisation to the next.
+        interval: Duration,
+    },
     /// The simulation; `speed` 2.0 lets time pass twice as fast.
     Simulation {
         /// Simulated seconds a second.
@@ -18,19 +31,101 @@ pub enum TimeSource {
 }
 
 impl TimeSource {
-    pub(crate) fn read(section: Option<Section<'_>>) -> Self {
-        let Some(section) = section else { return Self::default() };
-        let words = [("local", Self::Local), ("simulation", Self::Simulation { speed: 1.0 }), ("log", Self::Log)];
-        let mut source = section.get("source").and_then(|item| item.choice(&words)).unwrap_or_default();
+    /// `file` is asked for the line of what is missing.
+    pub(crate) fn read(section: Option<Section<'_>>, file: &Section<'_>, nodes: &[Node]) -> Self {
+        let several = nodes.len() > 1;
+        let Some(section) = section else {
+            if several {
+                file.report(
+                    "section `[time]` is missing; with several nodes one of them is the master of time: add `[time]` with \
+                     `source = \"master\"`",
+                );
+            }
+            return Self::default();
+        };
+        let master = Self::Master { masters: (0..).take(nodes.len()).collect(), interval: INTERVAL };
+        let words = [
+            ("local", Self::Local),
+            ("master", master),
+            ("simulation", Self::Simulation { speed: 1.0 }),
+            ("log", Self::Log),
+        ];
+        let item = section.get("source");
+        let mut source = item.as_ref().and_then(|item| item.choice(&words)).unwrap_or_default();
+        let is_master = matches!(source, Self::Master { .. });
+        match &item {
+            Some(item) if is_master && nodes.len() == 1 => {
+                item.report("`source` is \"master\", and there is one node; write \"local\", or add the other nodes");
+            }
+            Some(item) if several && !is_master => item.report(
+                "`source`: with several nodes one of them is the master of time, and no other source reaches all of them; write \
+                 `source = \"master\"`",
+            ),
+            None if several => section.report("`source` is missing; with several nodes write `source = \"master\"`"),
+            _ => {}
+        }
         if let Some(item) = section.get("speed") {
             match &mut source {
                 Self::Simulation { speed } => *speed = item.number(0.01..=1000.0, "1.0").unwrap_or(1.0),
-                Self::Local | Self::Log => {
-                    item.report("`speed` goes only with `source = \"simulation\"`; drop it, or change the source");
-                }
+                _ => item.report("`speed` goes only with `source = \"simulation\"`; drop it, or change the source"),
+            }
+        }
+        let (own_masters, own_interval) = (section.get("masters"), section.get("interval"));
+        if let Self::Master { masters, interval } = &mut source {
+            *masters = own_masters.map_or(masters.clone(), |item| read_masters(&item, nodes));
+            *interval = own_interval.and_then(|item| read_interval(&item)).unwrap_or(INTERVAL);
+        } else {
+            for item in own_masters.into_iter().chain(own_interval) {
+                item.report(format!(
+                    "`{}` goes only with `source = \"master\"`; drop it, or change the source",
+                    item.key
+                ));
             }
         }
         section.finish();
         source
     }
+
+    /// What must be equal at both ends of the wire.
+    pub(crate) fn lan_text(&self) -> String {
+        match self {
+            Self::Master { masters, interval } => format!("masters {masters:?} every {} ns", interval.as_nanos()),
+            Self::Local | Self::Simulation { .. } | Self::Log => "-".into(),
+        }
+    }
+}
+
+fn read_masters(list: &Item<'_>, nodes: &[Node]) -> Vec<u8> {
+    let names = || nodes.iter().map(|node| node.name.as_str());
+    let mut masters: Vec<u8> = Vec::new();
+    for (text, line) in list.texts("base") {
+        let index = names().zip(0..).find(|(name, _)| *name == text).map(|(_, index)| index);
+        let wrong = match (index, nearest(text, names())) {
+            (Some(index), _) if !masters.contains(&index) => {
+                masters.push(index);
+                continue;
+            }
+            (Some(_), _) => format!("names `{text}` twice; drop one"),
+            (None, Some(known)) => format!("there is no node `{text}`; did you mean `{known}`?"),
+            (None, None) => {
+                format!("there is no node `{text}`; the nodes are {}", names().collect::<Vec<_>>().join(", "))
+            }
+        };
+        list.reader.report(line, format!("[time]: `masters`: {wrong}"));
+    }
+    if masters.is_empty() && list.value.get_ref().as_array().is_some_and(|list| list.is_empty()) {
+        list.report(
+            "`masters` is empty; name the nodes that may be master, the first choice first, or drop it: then all may",
+        );
+    }
+    masters
+}
+
+fn read_interval(item: &Item<'_>) -> Option<Duration> {
+    let interval = item.duration("1 s")?;
+    if (INTERVAL_MIN..=INTERVAL_MAX).contains(&interval) {
+        return Some(interval);
+    }
+    item.report("`interval` is from \"10 ms\" to \"60 s\"; write for example `interval = \"1 s\"`");
+    None
 }

@@ -47,7 +47,7 @@
 //! 1. `word`, `slots`, `hot`: the protocol. `queue`: what the receiver knows, and when it must look. `latest`: what replaces what.
 //! 2. `bell`, `doorbell`, `waiting`, `watch`: sleeping and waking.
 //! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics, and what is asked of the processor.
-//! 4. `sender`, `receiver`: what users hold. `node`, `entry`, `participant`, `lock`, `registry`: who lives, and who owns what.
+//! 4. `sender`, `receiver`: what users hold; `routes`: what is on other nodes. `node`, `entry`, `participant`, `lock`, `registry`: who lives, and who owns what.
 //! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes on with (H)
@@ -90,6 +90,7 @@ mod participant;
 mod queue;
 mod receiver;
 mod registry;
+mod routes;
 mod segment;
 mod sender;
 mod slots;
@@ -116,6 +117,7 @@ pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;
 pub use receiver::{Package, Receiver};
 pub use registry::CreateError;
+pub use routes::ROUTES_MAX;
 pub use sender::{Label, Loan, SendError, Sender};
 pub use slots::{Full, SLOTS_MAX};
 pub use system_time::{SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource};

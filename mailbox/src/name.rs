@@ -49,6 +49,8 @@ pub mod local {
     pub const REPLIES: u8 = 1;
     /// Takes data that the module subscribed to; ids above are the module's own.
     pub const DATA: u8 = 2;
+    /// Of a router: takes packages for other nodes, whose heads keep the name they are for.
+    pub const TRANSIT: u8 = 3;
 }
 
 /// System id of a package to all systems.

@@ -6,6 +6,7 @@
 //!     config         where the configuration is that launch runs (launch writes it, not this crate)
 //!     time           system time (see `system_time`)
 //!     traffic.3      what participant 3 sends (see `traffic`)
+//!     routes         which names are on other nodes, and whose mailbox leads there (see `routes`)
 //!     bell.3         a pipe that wakes participant 3, while it watches descriptors (see `doorbell`)
 //!     01c80000.mbx   a mailbox: its name in hexadecimal (see `layout`)
 //!     01c80000.about what its owner says of it (see `about`)

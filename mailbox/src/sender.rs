@@ -6,6 +6,7 @@ use crate::latest::Posts;
 use crate::name::{Name, Priority};
 use crate::package::{Head, Options, Type};
 use crate::participant::Participant;
+use crate::routes;
 use crate::segment::{BadSegment, Segment};
 use crate::slots::{Claim, NoSlot, Published};
 use crate::step::step;
@@ -22,6 +23,14 @@ pub enum SendError {
     /// Nobody on this node has made such a mailbox, and no router takes it further.
     #[error("mailbox {0}: not on this node, and no router leads to it; is its module launched?")]
     NoMailbox(Name),
+    /// It is on another node, but the router that takes packages there has no mailbox here.
+    #[error("mailbox {name} is on another node, and the router that leads there, {router}, does not run; start it")]
+    NoRouter {
+        /// Where it should go.
+        name: Name,
+        /// The router's mailbox for such packages.
+        router: Name,
+    },
     /// All slots are in use by packages as important or more.
     #[error("mailbox {0} is full; its receiver is slow or stopped, or it has too few slots")]
     Full(Name),
@@ -118,10 +127,25 @@ impl Place {
     }
 }
 
-/// One participant's way into one mailbox.
+/// Where a sender may lead.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reach {
+    /// To a mailbox of this node only.
+    Here,
+    /// Also to the router's, for mailboxes of other nodes.
+    Routes,
+}
+
+/// One participant's way into one mailbox; if that is on another node, into the mailbox of this node's router.
 pub struct Sender {
     participant: Arc<Participant>,
+    /// Mailbox that the packages are for.
+    to: Name,
+    /// Its memory, or that of the router's mailbox.
     segment: Segment,
+    /// The registry's epoch in which the mailbox was found, or found to be elsewhere.
+    epoch: u32,
+    reach: Reach,
     place: Place,
     /// Counts what it sends.
     flows: Writer,
@@ -130,38 +154,81 @@ pub struct Sender {
 }
 
 impl Participant {
-    /// Opens a mailbox of this node for sending. One map; afterwards sending needs no system call unless the receiver
-    /// sleeps, no heap and no lock.
+    /// Opens a mailbox for sending: one of this node; else, if the node's routes lead to it ([`Node::set_routes`]), the mailbox of
+    /// the router that takes packages there, which then keep this name as their receiver. One map; afterwards sending needs no
+    /// system call unless the receiver sleeps, no heap and no lock.
+    ///
+    /// [`Node::set_routes`]: crate::Node::set_routes
     ///
     /// # Errors
-    /// [`SendError::NoMailbox`], [`SendError::InUse`] when all its claims are spoken for, or [`SendError::Bad`].
+    /// [`SendError::NoMailbox`], [`SendError::NoRouter`], [`SendError::InUse`] when all its claims are spoken for, or
+    /// [`SendError::Bad`].
     pub fn sender(self: &Arc<Self>, name: Name) -> Result<Sender, SendError> {
-        let segment = open(self, name)?;
-        let mut sending = self.sending();
-        if sending.iter().filter(|n| **n == name).count() >= usize::from(segment.shape.claims) {
-            return Err(SendError::InUse(name));
-        }
-        sending.push(name);
-        drop(sending);
+        self.sender_within(name, Reach::Routes)
+    }
+
+    /// Opens a mailbox of this node for sending, whatever routes there are: for who brings packages from other nodes, which must
+    /// not go back there.
+    ///
+    /// # Errors
+    /// As for [`Participant::sender`], but for [`SendError::NoRouter`].
+    pub fn sender_here(self: &Arc<Self>, name: Name) -> Result<Sender, SendError> {
+        self.sender_within(name, Reach::Here)
+    }
+
+    fn sender_within(self: &Arc<Self>, name: Name, reach: Reach) -> Result<Sender, SendError> {
+        // Read before it is looked for: what comes in between makes this number an old one.
+        let epoch = self.node().registry_epoch();
+        let segment = open(self, name, reach)?;
+        count_in(&mut self.sending(), name, &segment)?;
         let place = Place::of(self.claimant());
         let posts = Posts::new(&segment.shape);
         let flows = self.traffic().writer();
-        Ok(Sender { participant: self.clone(), segment, place, posts, flows })
+        Ok(Sender { participant: self.clone(), to: name, segment, epoch, reach, place, posts, flows })
     }
 }
 
-fn open(participant: &Participant, name: Name) -> Result<Segment, SendError> {
+/// The mailbox itself, or else that of the router which leads to it.
+fn open(participant: &Participant, name: Name, reach: Reach) -> Result<Segment, SendError> {
+    if let Some(here) = open_here(participant, name)? {
+        return Ok(here);
+    }
+    if reach == Reach::Here {
+        return Err(SendError::NoMailbox(name));
+    }
+    let route = routes::find(participant.node().path(), name).map_err(|text| SendError::Bad(name, text))?;
+    let router = route.ok_or(SendError::NoMailbox(name))?;
+    open_here(participant, router)?.ok_or(SendError::NoRouter { name, router })
+}
+
+/// A mailbox of this node, if there is one of this name.
+fn open_here(participant: &Participant, name: Name) -> Result<Option<Segment>, SendError> {
     match Segment::open(participant.node().path(), name) {
-        Ok(segment) => Ok(segment),
-        Err(BadSegment::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => Err(SendError::NoMailbox(name)),
+        Ok(segment) => Ok(Some(segment)),
+        Err(BadSegment::Io(error)) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(SendError::Bad(name, error.to_string())),
     }
 }
 
+/// Notes that this participant sends to one more mailbox, if there may be one more. One sender holds one claim at most.
+fn count_in(sending: &mut Vec<Name>, to: Name, segment: &Segment) -> Result<(), SendError> {
+    if sending.iter().filter(|n| **n == segment.name).count() >= usize::from(segment.shape.claims) {
+        return Err(SendError::InUse(to));
+    }
+    sending.push(segment.name);
+    Ok(())
+}
+
+fn count_out(sending: &mut Vec<Name>, segment: &Segment) {
+    if let Some(at) = sending.iter().position(|name| *name == segment.name) {
+        sending.swap_remove(at);
+    }
+}
+
 impl Sender {
-    /// The mailbox it leads to.
+    /// The mailbox that packages are for, also if a router takes them there.
     pub fn name(&self) -> Name {
-        self.segment.name
+        self.to
     }
 
     /// Largest body it takes.
@@ -199,11 +266,14 @@ impl Sender {
 
     /// A slot for a body of `len` bytes. One too large is refused before it pushes anybody out.
     fn claim(&mut self, priority: Priority, label: Option<&Label>, len: usize) -> Result<Claim, SendError> {
+        if self.is_routed() && self.participant.node().registry_epoch() != self.epoch {
+            self.look_here()?;
+        }
         for _ in 0..REOPEN_MAX {
             let me = self.participant.claimant();
             let (max, retired) = (self.body_bytes_max(), self.segment.slots().is_retired());
             if len > max && !retired {
-                return Err(SendError::TooLarge { name: self.name(), len, max });
+                return Err(SendError::TooLarge { name: self.segment.name, len, max });
             }
             let old = label.and_then(|label| self.posts.of(label));
             let slots = self.segment.slots();
@@ -214,21 +284,42 @@ impl Sender {
                 }
                 Err(NoSlot::Full) => {
                     self.segment.page().counters.lost(priority, Loss::Refused, 1);
-                    return Err(SendError::Full(self.name()));
+                    return Err(SendError::Full(self.segment.name));
                 }
                 Err(NoSlot::Retired) => {
-                    let successor = open(&self.participant, self.name())?;
-                    self.enter(successor);
+                    let successor = open(&self.participant, self.to, self.reach)?;
+                    self.enter(successor)?;
                 }
             }
         }
         Err(SendError::NoMailbox(self.name()))
     }
 
+    /// Whether a router takes the packages further.
+    fn is_routed(&self) -> bool {
+        self.segment.name != self.to
+    }
+
+    /// Looks whether the mailbox is on this node by now: what is here goes before any route.
+    #[cold]
+    fn look_here(&mut self) -> Result<(), SendError> {
+        let epoch = self.participant.node().registry_epoch();
+        if let Some(here) = open_here(&self.participant, self.to)? {
+            self.enter(here)?;
+        }
+        self.epoch = epoch;
+        Ok(())
+    }
+
     /// From now on sends there; the old segment is returned.
-    fn enter(&mut self, successor: Segment) -> Segment {
+    fn enter(&mut self, successor: Segment) -> Result<Segment, SendError> {
+        if successor.name != self.segment.name {
+            let mut sending = self.participant.sending();
+            count_in(&mut sending, self.to, &successor)?;
+            count_out(&mut sending, &self.segment);
+        }
         self.posts = Posts::new(&successor.shape);
-        std::mem::replace(&mut self.segment, successor)
+        Ok(std::mem::replace(&mut self.segment, successor))
     }
 
     /// Publishes a filled claim; on a retired mailbox moves it to the one that took its place.
@@ -265,9 +356,9 @@ impl Sender {
 
     /// Copies a claim of a retired mailbox into one of its successor.
     fn move_on(&mut self, old: Claim, priority: Priority, len: usize) -> Result<Claim, SendError> {
-        let successor = open(&self.participant, self.name());
-        let retired = match successor {
-            Ok(successor) => self.enter(successor),
+        let successor = open(&self.participant, self.to, self.reach);
+        let retired = match successor.and_then(|successor| self.enter(successor)) {
+            Ok(retired) => retired,
             Err(error) => {
                 self.segment.slots().abandon(old);
                 return Err(error);
@@ -311,10 +402,7 @@ impl Sender {
 impl Drop for Sender {
     fn drop(&mut self) {
         self.flows.leave(self.participant.traffic());
-        let mut sending = self.participant.sending();
-        if let Some(at) = sending.iter().position(|name| *name == self.segment.name) {
-            sending.swap_remove(at);
-        }
+        count_out(&mut self.participant.sending(), &self.segment);
     }
 }
 
@@ -347,7 +435,7 @@ impl Loan<'_> {
     pub fn send(mut self, label: &Label, len: usize) -> Result<(), SendError> {
         let max = self.sender.body_bytes_max();
         if len > max {
-            let error = SendError::TooLarge { name: self.sender.name(), len, max };
+            let error = SendError::TooLarge { name: self.sender.segment.name, len, max };
             return Err(self.sender.refused(label, error));
         }
         match self.claim.take() {

@@ -6,7 +6,9 @@
 mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, label};
-use rohrpost_mailbox::{Class, Full, Interest, ModuleState, Name, Participant, Shape, TimeKeeper, TimeSource, Watches};
+use rohrpost_mailbox::{
+    Class, Full, Interest, ModuleState, Name, Participant, ROUTES_MAX, Shape, TimeKeeper, TimeSource, Watches, local,
+};
 use std::os::unix::fs::{FileExt, FileTypeExt};
 use std::time::Duration;
 
@@ -310,4 +312,21 @@ fn a_table_of_traffic_is_as_documented() {
     assert_eq!([24, 32, 80].map(|at| there.u64(row + at)), [1, 3, 11]);
     drop((sender, publications, me));
     assert!(!ground.path().join("traffic.1").exists());
+}
+
+#[test]
+fn routes_are_as_documented() {
+    let ground = Ground::new();
+    let name = |local| Name::new(1, 200, 0, local);
+    let router = Name::new(1, 250, 2, local::TRANSIT);
+    ground
+        .node()
+        .set_routes(router, &[(name(0), name(255)), (Name::new(1, 201, 0, 0), Name::new(1, 201, 0, 9))])
+        .unwrap();
+    let there = file(&ground, "routes");
+    assert!(there.0.starts_with(b"rohrpost") && there.0.len() == 24 + 2 * 8);
+    let fields = ["version", "via", "count"].map(|field| there.u32(at("## `routes`", field)));
+    assert_eq!(fields, [VERSION, 0x01fa_0203, 2]);
+    assert_eq!([20, 24, 28, 32, 36].map(|at| there.u32(at)), [0, 0x01c8_0000, 0x01c8_00ff, 0x01c9_0000, 0x01c9_0009]);
+    assert!(PAGE.contains("`router.I`, local id 3") && PAGE.contains("at most 65 536") && ROUTES_MAX == 65_536);
 }

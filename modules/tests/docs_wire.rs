@@ -123,6 +123,15 @@ fn faults_have_the_documented_numbers() {
         Fault::Busy,
         Fault::NothingYet,
         Fault::TooLarge(0),
+        Fault::NoMailbox,
+        Fault::MailboxFull,
+        Fault::CommandTooLarge(0),
+        Fault::NoRoute,
+        Fault::NodeSilent { node: text() },
+        Fault::NodeDeaf { node: text() },
+        Fault::NodeRefuses { node: text(), why: text() },
+        Fault::RouterFull,
+        Fault::Delayed,
     ];
     assert_eq!(rows, faults.len());
     for (number, fault) in faults.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! What a shell offers at a press of the tab key, by the scripts that `rohrpost completions` prints.
 
-use crate::harness::{OUTPUT, Place, probe, skipped};
+use crate::harness::{NETWORK, OUTPUT, Place, probe, skipped};
 use std::process::Command;
 
 /// What bash offers for the last of these words.
@@ -85,7 +85,9 @@ fn without_a_node_the_named_configuration_is_asked() {
     let place = Place::new();
     place.config_of(
         "arm",
-        "[nodes.base]\ntools = [0, 1]\n[nodes.desk]\ntools = [2, 3]\n",
+        &format!(
+            "[nodes.base]\naddress = \"127.0.0.1\"\ntools = [0, 1]\n[nodes.desk]\naddress = \"127.0.0.2\"\ntools = [2, 3]\n{NETWORK}"
+        ),
         &["[[module]]\nname = \"probe.7\"\nnode = \"desk\"\nprogram = \"nowhere\"\n"],
     );
     assert_eq!(offered(&place, &["rohrpost", "call", ""]), [""; 0], "nothing runs, and nothing is said of it");

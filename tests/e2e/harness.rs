@@ -28,6 +28,7 @@ const HEAD: &str = r#"
 name = "robot"
 id = 1
 [classes]
+router = { id = 250 }
 probe = { id = 96 }
 output = { id = 32, text = "Collects what modules say" }
 tool = { id = 16 }
@@ -59,6 +60,9 @@ pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
         "[[module]]\nname = \"{name}\"\nprogram = {program}\nsettings = {{ record = \"record\", {settings} }}\n{keys}\n"
     )
 }
+
+/// What a configuration of several nodes has beside them.
+pub(crate) const NETWORK: &str = "[network]\nsecurity = \"none\"\n[time]\nsource = \"master\"\n";
 
 pub(crate) const OUTPUT: &str = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\n";
 

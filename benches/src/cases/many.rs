@@ -45,7 +45,7 @@ impl What {
 
     fn turn(self, settings: &Settings, samples: &Samples) -> Done<()> {
         // Before the node is made: what a turn cannot do without is not there.
-        let rohrpost = if self == Self::List { Some(rohrpost(settings)?) } else { None };
+        let rohrpost = if self == Self::List { Some(settings.command()?) } else { None };
         let mut many = Many::new(settings.count(MAILBOXES))?;
         settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
         let all_ns = match self {
@@ -84,16 +84,6 @@ impl Case for What {
         let target = Some(Target::AtMost(1.0));
         Ok(compare(settings, &subject, &[ours, limit], &[Versus { name, p50: target, p99: target }]))
     }
-}
-
-/// The command: the one that was named, or the one beside this program.
-fn rohrpost(settings: &Settings) -> Done<PathBuf> {
-    let beside = std::env::current_exe()?.with_file_name("rohrpost");
-    let path = settings.rohrpost.clone().unwrap_or(beside);
-    if path.is_file() {
-        return Ok(path);
-    }
-    Err(Box::new(Failure::Skipped(format!("no {}; build it, or name it with --rohrpost", path.display()))))
 }
 
 const INSTALLATION: &str = "bench";

@@ -2,6 +2,8 @@
 
 mod cost;
 mod flood;
+#[cfg(feature = "lan")]
+pub mod lan;
 mod latency;
 mod many;
 mod memory;

@@ -100,6 +100,14 @@ impl Child {
         self.report.read().unwrap_or_else(|| Err(Failure::Failed("its process was killed".into())))
     }
 
+    /// Sends it a signal, unless it has ended.
+    pub fn signal(&mut self, signal: Signal) {
+        if self.has_ended() == Ok(false) {
+            // Not waited for yet, so its process id is nobody else's.
+            let _ = kill(self.pid, signal);
+        }
+    }
+
     /// Whether it has ended, by itself or not.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use super::crew::{Actor, is_asleep};
 use super::{Ground, HIGH, LOW, MAILBOX, OTHER, PATIENCE, label, shape, until};
 use nix::unistd::Pid;
 use rohrpost_mailbox::{
-    Full, Interest, Name, Priority, Receiver, SendError, Sender, Shape, Waiting, Watches, monotonic_ns, wait_any,
+    Full, Interest, Name, Priority, Receiver, SendError, Sender, Shape, Waiting, Watches, local, monotonic_ns, wait_any,
 };
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
@@ -14,6 +14,9 @@ use std::time::{Duration, Instant};
 
 const SLEEPER: Name = Name::new(1, 202, 1, 0);
 const POLLER: Name = Name::new(1, 203, 1, 0);
+/// A mailbox of another node, and that of the router which leads there.
+const FAR: Name = Name::new(1, 204, 1, 0);
+const TRANSIT: Name = Name::new(1, 250, 0, local::TRANSIT);
 /// What the answerer is asked for: a package at once, or when who asks sleeps.
 const AT_ONCE: u32 = 1;
 const WHEN_ASLEEP: u32 = 2;
@@ -58,6 +61,15 @@ pub(crate) const OPERATIONS: &[Operation] = &[
     }),
     operation("send and replace one's own older", OFTEN, |hands| hands.states(&[1]), |hands| hands.state(1)),
     operation("send into one's own older slot", OFTEN, |hands| hands.states(&[1, 2]), |hands| hands.state(2)),
+    operation("send to another node and take it as its router", OFTEN, nothing, |hands| {
+        hands.far_sender.send(&label(LOW, 1), &[b"a", b" body"]).unwrap();
+        assert_eq!(hands.transit.try_receive().unwrap().head().to, FAR);
+    }),
+    operation("loan, fill and send to another node", OFTEN, Hands::empty, |hands| {
+        let mut loan = hands.far_sender.loan(LOW).unwrap();
+        loan.body()[..40].fill(7);
+        loan.send(&label(LOW, 1), 40).unwrap();
+    }),
     operation("try_receive with a package there", OFTEN, Hands::send, Hands::take),
     operation("try_receive with none there", OFTEN, nothing, |hands| assert!(hands.receiver.try_receive().is_none())),
     operation("receive with a package there", OFTEN, Hands::send, |hands| drop(hands.receiver.receive())),
@@ -196,6 +208,9 @@ struct Hands {
     /// A mailbox of two slots, of which only the newest of each state counts.
     newest: Receiver,
     newest_sender: Sender,
+    /// What a router takes to another node.
+    transit: Receiver,
+    far_sender: Sender,
     watches: Watches,
     _far: UnixStream,
 }
@@ -208,9 +223,26 @@ impl Hands {
         let mut watches = Watches::new(&me).unwrap();
         let (far, near) = UnixStream::pair().unwrap();
         watches.add(&near, Interest::Read).unwrap();
-        let [sender, newest_sender] = [MAILBOX, OTHER].map(|name| me.sender(name).unwrap());
+        let transit = me.receiver(TRANSIT, shape(8)).unwrap();
+        me.node().set_routes(TRANSIT, &[(FAR, FAR)]).unwrap();
+        let [sender, newest_sender, far_sender] = [MAILBOX, OTHER, FAR].map(|name| me.sender(name).unwrap());
         let to = [SLEEPER, POLLER].map(|name| me.sender(name).unwrap());
-        Self { board, asked, pids, to, sent: [0; 2], receiver, sender, newest, newest_sender, watches, _far: far }
+        let sent = [0; 2];
+        Self {
+            board,
+            asked,
+            pids,
+            to,
+            sent,
+            receiver,
+            sender,
+            newest,
+            newest_sender,
+            transit,
+            far_sender,
+            watches,
+            _far: far,
+        }
     }
 
     fn send(&mut self) {
@@ -228,6 +260,7 @@ impl Hands {
     fn empty(&mut self) {
         while self.receiver.try_receive().is_some() {}
         while self.newest.try_receive().is_some() {}
+        while self.transit.try_receive().is_some() {}
     }
 
     /// All slots in use by packages of this priority.

@@ -45,6 +45,81 @@ pub enum Fault {
     /// The result does not fit in the caller's reply mailbox, or in a package.
     #[error("the result of {0} bytes does not fit in a package")]
     TooLarge(u32),
+    /// A router: the module's node has no such mailbox. This try was not run; nor were those below.
+    #[error("its node has no such mailbox: does it run there? (`rohrpost start`, on that node, starts it)")]
+    NoMailbox,
+    /// A router: the module's mailbox had no room.
+    #[error("its mailbox was full; it is slow or stopped, or has too few slots")]
+    MailboxFull,
+    /// A router: the module's mailbox takes no such body; the largest that it takes, bytes.
+    #[error("its mailbox takes bodies of at most {0} bytes; raise its `size` in the configuration")]
+    CommandTooLarge(u32),
+    /// A router: the name is on no node that it knows.
+    #[error(
+        "no router knows a way there; are all nodes launched with the same configuration, one that has this module?"
+    )]
+    NoRoute,
+    /// A router: nothing has come from the module's node for a while.
+    #[error(
+        "node {node} is silent; is it on, does its router run, and is it reached at its address? (`rohrpost net`, on both)"
+    )]
+    NodeSilent {
+        /// The node.
+        node: String,
+    },
+    /// A router: the module's node is heard, but says that it does not hear this one.
+    #[error(
+        "node {node} is heard, but does not hear this one; is a firewall in between, or a cable half broken? (`rohrpost \
+         net`, on both)"
+    )]
+    NodeDeaf {
+        /// The node.
+        node: String,
+    },
+    /// A router: the module's node takes nothing from the caller's.
+    #[error("node {node} takes nothing from this one: {why}")]
+    NodeRefuses {
+        /// The node.
+        node: String,
+        /// What differs, and what would be right.
+        why: String,
+    },
+    /// A router: too much waits already to leave the caller's node.
+    #[error(
+        "the router had no room for it: this module sends more than `quota` of [network] lets wait, or the network is \
+         slower than what is sent (`rohrpost net`)"
+    )]
+    RouterFull,
+    /// A router: the package has been under way for too long, and was dropped.
+    #[error("it waited too long for the network; more important packages used up its rate (`rohrpost net`)")]
+    Delayed,
+}
+
+impl Fault {
+    /// Whether it speaks of one try of a command alone: another try of the same may be run, or have been.
+    pub const fn is_of_this_try(&self) -> bool {
+        match self {
+            Self::Busy
+            | Self::NoMailbox
+            | Self::MailboxFull
+            | Self::CommandTooLarge(_)
+            | Self::NoRoute
+            | Self::NodeSilent { .. }
+            | Self::NodeDeaf { .. }
+            | Self::NodeRefuses { .. }
+            | Self::RouterFull
+            | Self::Delayed => true,
+            Self::ModuleOff
+            | Self::ModuleError(_)
+            | Self::Interrupted
+            | Self::InterfaceDiffers { .. }
+            | Self::Unknown(_)
+            | Self::Arguments(_)
+            | Self::Expired
+            | Self::NothingYet
+            | Self::TooLarge(_) => false,
+        }
+    }
 }
 
 /// Why a call has no result. `E` is the function's own error.

@@ -15,8 +15,9 @@ const REPEATS: u32 = 3;
 pub const CALLS_MAX: usize = 64;
 /// Envelopes tell no longer time; a longer timeout is cut to it, so that a command's age always is the truth.
 const TIMEOUT_MAX: Duration = Duration::from_micros(u32::MAX as u64);
-/// Ways into other mailboxes that are kept open; the first goes when there are more. A node has no more participants.
-const SENDERS_MAX: usize = 256;
+/// Ways into other mailboxes that are kept open; the first goes when there are more. If all of them are on other nodes, they
+/// are claims in the mailbox of the router, where one participant may have 255.
+const SENDERS_MAX: usize = 240;
 /// Answers taken in one go: a flood of them must not keep whoever waits from seeing its time go by.
 const BURST: usize = 64;
 
@@ -279,7 +280,7 @@ impl Link {
             };
             let call = self.calls.iter_mut().find(its).filter(|_| envelope.incarnation == incarnation);
             // One try that was refused says nothing of the others that are under way.
-            let refused = |call: &Call| call.repeated && head.options.has(Options::ERROR) && is_busy(result);
+            let refused = |call: &Call| call.repeated && head.options.has(Options::ERROR) && is_of_one_try(result);
             if let Some(call) = call.filter(|call| !refused(call)) {
                 call.answer = Some(*head);
                 call.body.clear();
@@ -303,8 +304,8 @@ impl Link {
     }
 }
 
-fn is_busy(fault: &[u8]) -> bool {
-    matches!(postcard::from_bytes(fault), Ok(Fault::Busy))
+fn is_of_one_try(fault: &[u8]) -> bool {
+    postcard::from_bytes(fault).is_ok_and(|fault: Fault| fault.is_of_this_try())
 }
 
 /// A call that was begun: [`Pending::wait`] for its result. Dropped, it is given up (the server may run it all the same).

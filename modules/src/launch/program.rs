@@ -22,6 +22,7 @@ impl Program {
     pub(super) fn new(module: &Module, installation: &Installation, executable: &Path) -> Self {
         let beside = executable.parent().unwrap_or(Path::new("."));
         let (path, arguments) = match &module.program {
+            Configured::Builtin(name) if !module.is_in_file() => (executable.to_owned(), vec![name.clone()]),
             Configured::Builtin(name) => (executable.to_owned(), vec!["run".to_owned(), name.clone()]),
             Configured::Command(words) => {
                 let program = words.first().map_or("", String::as_str);

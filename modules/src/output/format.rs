@@ -90,7 +90,7 @@ impl<'a> Format<'a> {
 
     fn source(&self) -> Option<&'static str> {
         match self.installation.time {
-            TimeSource::Local => None,
+            TimeSource::Local | TimeSource::Master { .. } => None,
             TimeSource::Simulation { .. } => Some("simulation"),
             TimeSource::Log => Some("log"),
         }

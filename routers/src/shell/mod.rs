@@ -1,1 +1,8 @@
-//! Threads and sockets around the cores.
+//! The router at work: threads, sockets, mailboxes.
+
+mod failure;
+mod socket;
+mod ways;
+
+pub use failure::{Failure, Failures};
+pub use socket::SocketError;

@@ -2,7 +2,8 @@
 
 use rohrpost::Name;
 use rohrpost::config::{
-    Errors, Installation, MailboxSpec, MissingProgram, Module, Program, RestartPolicy, Scheduling, Start, TimeSource,
+    Errors, Installation, MailboxSpec, MissingProgram, Module, Network, Program, RestartPolicy, Scheduling, Start,
+    TimeSource,
 };
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -49,7 +50,8 @@ pub(super) fn installation(installation: &Installation, only: Option<&str>, miss
         "installation": {
             "name": name,
             "system": { "id": system.id, "name": system.name },
-            "time": time(installation.time),
+            "time": time(installation),
+            "network": installation.network.map(network),
             "digest": installation.digest().to_string(),
             "parameters": installation.parameters,
             "classes": class_entries.collect::<Vec<_>>(),
@@ -116,9 +118,22 @@ fn scheduling(scheduling: Scheduling) -> Value {
     }
 }
 
-fn time(source: TimeSource) -> Value {
-    match source {
+fn network(network: Network) -> Value {
+    json!({
+        "security": "none", "port": network.port, "time_port": network.time_port(), "mtu": network.mtu,
+        "datagram_bytes_max": network.datagram_bytes_max, "rate_bytes_s": network.rate_bytes_s,
+        "quota_bytes": network.quota_bytes, "bulk_below": network.bulk_below,
+    })
+}
+
+fn time(installation: &Installation) -> Value {
+    match &installation.time {
         TimeSource::Local => json!({ "source": "local" }),
+        TimeSource::Master { masters, interval } => {
+            let nodes = masters.iter().filter_map(|index| installation.nodes.get(usize::from(*index)));
+            let masters: Vec<&str> = nodes.map(|node| node.name.as_str()).collect();
+            json!({ "source": "master", "masters": masters, "interval_ms": ms(*interval) })
+        }
         TimeSource::Simulation { speed } => json!({ "source": "simulation", "speed": speed }),
         TimeSource::Log => json!({ "source": "log" }),
     }

@@ -50,7 +50,7 @@ fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Argume
         start_from(folder, item);
     }
     let modules = document.get_mut("module").and_then(Item::as_array_of_tables_mut).ok_or("no [[module]]")?;
-    for (entry, module) in modules.iter_mut().zip(&installation.modules) {
+    for (entry, module) in modules.iter_mut().zip(installation.modules.iter().filter(|module| module.is_in_file())) {
         rewrite(entry, &module.program, folder, arguments)?;
     }
     let gui = |entry: &toml_edit::Table| entry.get("name").and_then(Item::as_str).is_some_and(is_gui);

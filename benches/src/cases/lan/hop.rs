@@ -1,0 +1,79 @@
+//! How long a package takes from a module on one node to a module on another, one at a time; everybody sleeps who waits.
+
+use super::{Ground, WHOLE};
+use crate::cases::Case;
+use crate::harness::{Cell, Failure, Placement, Scheduling, time_two_processes};
+use crate::lan::chain::{time_chain, time_mailbox_chain};
+use crate::lan::ends::Module;
+use crate::lan::nodes::{Network, UNPACED};
+use crate::lan::udp::Datagrams;
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use std::time::Duration;
+
+/// Round trips of a turn, and those before them that do not count.
+const MESSAGES: usize = 10_000;
+const MESSAGES_PACED: usize = 1_000;
+const WARM_UP: usize = 1_000;
+/// All sleep, so the kernel's fair server stays out.
+const CAP: Duration = Duration::from_secs(2);
+/// A package each so often, as robots send.
+const PACE: Duration = Duration::from_micros(500);
+/// What a network of today has.
+const ETHERNET: usize = 1_500;
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let whole = |bytes| Hop { name: "hop", bytes, mtu: WHOLE, pace: None, judged: true };
+    let mut cases = [64, 1024, 16_384, 62_000].map(whole).to_vec();
+    cases.push(Hop { name: "hop, paced", pace: Some(PACE), judged: false, ..whole(64) });
+    cases.push(Hop { name: "hop, in fragments", mtu: ETHERNET, judged: false, ..whole(16_384) });
+    cases.into_iter().map(|case| Box::new(case) as Box<dyn Case>).collect()
+}
+
+#[derive(Clone)]
+struct Hop {
+    name: &'static str,
+    bytes: usize,
+    mtu: usize,
+    pace: Option<Duration>,
+    /// Whether the targets hold.
+    judged: bool,
+}
+
+impl Case for Hop {
+    fn name(&self) -> String {
+        self.name.into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let ground = Ground::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB" })?;
+        let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { MESSAGES });
+        let cell = Cell {
+            bytes: self.bytes,
+            messages,
+            warm_up: WARM_UP.min(messages / 10),
+            placement: Placement::TwoCores,
+            scheduling: Scheduling::Fifo,
+            pace: self.pace,
+            cap: CAP,
+        };
+        let contenders = [
+            Contender::sampled("rohrpost", || {
+                let (nodes, turn) = ground.turn()?;
+                time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, self.bytes, meetings))
+            }),
+            Contender::sampled("chain", || time_chain(&ground.wire, &cell)),
+            Contender::sampled("chain of mailboxes", || time_mailbox_chain(&ground.wire, &cell)),
+            Contender::sampled("udp", || time_two_processes(&cell, |end, _| Datagrams::open(&ground.wire, end))),
+        ];
+        let target = |bound| self.judged.then_some(Target::AtMost(bound));
+        let versus = [
+            Versus { name: "chain", p50: target(1.15), p99: target(1.3) },
+            Versus { name: "chain of mailboxes", p50: None, p99: None },
+            Versus { name: "udp", p50: None, p99: None },
+        ];
+        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
+        Ok(compare(settings, &subject, &contenders, &versus))
+    }
+}

@@ -1,0 +1,128 @@
+//! How many packages go from node to node in a second, beside raw datagrams, and what is lost of them.
+//!
+//! `rate`: the largest datagram is chosen so that one package fits and no second one. `packing`: as many as fit. Ours has
+//! a window of packages on their way, as senders that want an answer have one: more would only be lost in its own node's router.
+
+use super::{Ground, WHOLE};
+use crate::cases::Case;
+use crate::harness::{End, Failure};
+use crate::lan::ends::{Sink, Source};
+use crate::lan::flow::{Flow, Flown, SILENCE, flow};
+use crate::lan::nodes::{self, Network, UNPACED};
+use crate::lan::udp::Datagrams;
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::{Summary, median};
+use rohrpost_mailbox::HEAD_BYTES;
+use std::cell::RefCell;
+use std::time::Duration;
+
+/// Long enough for some ten thousand packages, short enough that the kernel's fair server stays out.
+const TURN: Duration = Duration::from_millis(500);
+/// Below the slots of a router's mailbox.
+const WINDOW: u64 = 48;
+/// IPv4 and UDP, and the head of a router's frame, before the packages.
+const BEFORE_PACKAGES: usize = 28 + 32;
+/// Least that a network's largest packet may be.
+const MTU_MIN: usize = 576;
+/// Of messages a second that seed 001 (CBWare, 2006, table 1) reached on a network of 1 Gbit/s, at most 3 MB/s.
+const CBWARE: [(usize, f64); 4] = [(2112, 1200.0), (5860, 475.0), (15_236, 195.0), (36_084, 84.0)];
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let rate = |bytes| Rate { name: "rate", bytes, packs: false, bound: 0.9 };
+    let packing = Rate { name: "packing", bytes: 64, packs: true, bound: 3.0 };
+    let rates = [64, 2112, 5860, 15_236, 36_084, 62_000].map(rate);
+    rates.into_iter().chain([packing]).map(|case| Box::new(case) as Box<dyn Case>).collect()
+}
+
+struct Rate {
+    name: &'static str,
+    bytes: usize,
+    /// Whether many packages may share a datagram.
+    packs: bool,
+    /// Of the raw datagrams' rate.
+    bound: f64,
+}
+
+impl Case for Rate {
+    fn name(&self) -> String {
+        self.name.into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
+        let mtu = if self.packs { WHOLE } else { one };
+        let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" })?;
+        let losses = Losses::default();
+        let raw = Flow { bytes: self.bytes, messages: messages(settings), window: None, cap: TURN };
+        let ours = Flow { window: Some(WINDOW), ..raw };
+        let mut contenders = vec![
+            losses.rated("rohrpost", || {
+                let (nodes, turn) = ground.turn()?;
+                let [from, to] = [End::Ping, End::Pong].map(|end| nodes::bench(end, turn));
+                flow(&ours, || Source::open(nodes, from, to), || Sink::open(nodes, to, self.bytes))
+            }),
+            losses.rated("udp", || {
+                let open = |end| Datagrams::open(&ground.wire, end);
+                flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(SILENCE))
+            }),
+        ];
+        if let Some((_, rate)) = CBWARE.into_iter().find(|(bytes, _)| *bytes == self.bytes) {
+            contenders.push(Contender { name: CBWARE_NAME, turn: Box::new(move || Ok(Summary::single(rate))) });
+        }
+        let versus: Vec<Versus> = contenders[1..]
+            .iter()
+            .map(|other| Versus {
+                name: other.name,
+                p50: (other.name == "udp").then_some(Target::AtLeast(self.bound)),
+                p99: None,
+            })
+            .collect();
+        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "packages/s" };
+        let mut rows = compare(settings, &subject, &contenders, &versus);
+        rows.extend(losses.rows(&subject));
+        Ok(rows)
+    }
+}
+
+const CBWARE_NAME: &str = "CBWare, its table";
+
+fn messages(settings: &Settings) -> u64 {
+    if settings.quick { settings.count(usize::MAX) as u64 } else { u64::MAX }
+}
+
+/// What each contender lost in each turn, of 100.
+#[derive(Default)]
+struct Losses(RefCell<Vec<(&'static str, f64)>>);
+
+impl Losses {
+    fn rated<'a>(&'a self, name: &'static str, turn: impl Fn() -> Result<Flown, Failure> + 'a) -> Contender<'a> {
+        let turn = move || {
+            let flown = turn()?;
+            self.0.borrow_mut().push((name, flown.lost_percent()));
+            Ok(Summary::single(flown.rate()))
+        };
+        Contender { name, turn: Box::new(turn) }
+    }
+
+    /// One for each who had a turn: the median over rounds, and the worst.
+    fn rows(&self, subject: &Subject) -> Vec<Row> {
+        let losses = self.0.borrow();
+        let of = |who| losses.iter().filter(move |(name, _)| *name == who).map(|(_, percent)| *percent);
+        let row = |who| {
+            let summary = Summary { max: of(who).reduce(f64::max), ..Summary::single(median(of(who))?) };
+            Some(Row {
+                case: format!("{}, lost", subject.case),
+                bytes: subject.bytes,
+                who,
+                unit: "%",
+                result: Ok(summary),
+                versus: None,
+                ratio_p50: None,
+                ratio_p99: None,
+            })
+        };
+        ["rohrpost", "udp"].into_iter().filter_map(row).collect()
+    }
+}

@@ -1,0 +1,188 @@
+//! Something urgent each millisecond, there and back over two routers, while a lower class sends as much as it can.
+//!
+//! ```text
+//!  processor 0                                            processor 1
+//!  flooder, default scheduler ─┐                       ┌─▶ swamp: takes what comes
+//!                              ├▶ router ════▶ router ─┤
+//!  urgent, FIFO 50, each ms ───┘      ◀═══════         └─▶ echo, FIFO 50
+//! ```
+//! The routers send as fast as they do by default, which is less than the flooder gives: its packages wait in the queue and most
+//! are lost there, least important first. Of the urgent ones none may be.
+
+use super::Ground;
+use crate::cases::Case;
+use crate::harness::{
+    Cell, Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
+};
+use crate::lan::ends::{Module, Sink, Source};
+use crate::lan::flow::{Inlet, Outlet};
+use crate::lan::nodes::{self, Network, Nodes};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use std::cell::RefCell;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+const BYTES: usize = 64;
+const FLOOD_BYTES: usize = 1_024;
+const MESSAGES: usize = 1_000;
+const WARM_UP: usize = 50;
+const PACE: Duration = Duration::from_millis(1);
+const CAP: Duration = Duration::from_secs(3);
+/// What an urgent package takes at most; one that takes longer is lost.
+const LOST_AFTER: Duration = Duration::from_secs(1);
+const ENDS_WITHIN: Duration = Duration::from_secs(5);
+/// As a user gets it.
+const USUAL: Network = Network { mtu: 1_500, rate: "100 MiB", quota: "256 KiB" };
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    vec![Box::new(Urgent)]
+}
+
+struct Urgent;
+
+impl Case for Urgent {
+    fn name(&self) -> String {
+        "urgent".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let ground = Ground::new(settings, &USUAL)?;
+        let messages = settings.count(MESSAGES);
+        let cell = Cell {
+            bytes: BYTES,
+            messages,
+            warm_up: WARM_UP.min(messages / 10),
+            placement: Placement::TwoCores,
+            scheduling: Scheduling::Fifo,
+            pace: Some(PACE),
+            cap: CAP,
+        };
+        let floods = RefCell::new(Vec::new());
+        let contenders = [
+            Contender::sampled("rohrpost", || {
+                let (nodes, turn) = ground.turn()?;
+                let flood = Flood::start(nodes, turn)?;
+                let samples = urgent(nodes, turn, &cell);
+                let flooded = flood.end();
+                let samples = samples?;
+                floods.borrow_mut().push(flooded?);
+                Ok(samples)
+            }),
+            Contender::sampled("no flood", || {
+                let (nodes, turn) = ground.turn()?;
+                urgent(nodes, turn, &cell)
+            }),
+        ];
+        let versus = [Versus { name: "no flood", p50: Some(Target::AtMost(1.5)), p99: None }];
+        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
+        let mut rows = compare(settings, &subject, &contenders, &versus);
+        rows.extend(flood_rows(&self.name(), &floods.borrow()));
+        Ok(rows)
+    }
+}
+
+/// Half of each round trip, µs. A package that is lost fails it.
+fn urgent(nodes: &Nodes, turn: u8, cell: &Cell) -> Result<Vec<f64>, Failure> {
+    time_two_processes(cell, |end, meetings| {
+        let module = Module::open(nodes, end, turn, BYTES, meetings)?;
+        // The far end waits for the first one while the near one still sleeps.
+        Ok(if end == End::Ping { module.with_patience(LOST_AFTER) } else { module })
+    })
+}
+
+/// Packages a second that the flooder sent, and that came.
+#[derive(Clone, Copy)]
+struct Flooded {
+    sent: f64,
+    received: f64,
+}
+
+#[repr(C)]
+struct Counts {
+    /// There is a mailbox to flood.
+    swamp: Gate,
+    /// It is being flooded.
+    flooding: Gate,
+    over: AtomicU64,
+    sent: AtomicU64,
+    received: AtomicU64,
+}
+
+// SAFETY: atomics only.
+unsafe impl Zeroable for Counts {}
+
+/// A flooder and who takes what it sends, until it is ended or dropped.
+struct Flood {
+    counts: Shared<Counts>,
+    children: [Child; 2],
+    began: Instant,
+}
+
+impl Flood {
+    fn start(nodes: &Nodes, turn: u8) -> Result<Self, Failure> {
+        let counts = Shared::<Counts>::new()?;
+        let [from, to] = [End::Ping, End::Pong].map(|end| nodes::flood(end, turn));
+        let swamp = Child::start(|| {
+            let mut sink = Sink::open(nodes, to, FLOOD_BYTES)?;
+            settle(End::Pong, Placement::TwoCores, Scheduling::Normal)?;
+            counts.swamp.meet(2)?;
+            let mut message = vec![0; FLOOD_BYTES];
+            while counts.over.load(Ordering::Acquire) == 0 {
+                if sink.receive(&mut message)? {
+                    counts.received.fetch_add(1, Ordering::AcqRel);
+                }
+            }
+            Ok(())
+        })?;
+        let flooder = Child::start(|| {
+            counts.swamp.meet(2)?;
+            let mut source = Source::open(nodes, from, to)?;
+            settle(End::Ping, Placement::TwoCores, Scheduling::Normal)?;
+            counts.flooding.meet(2)?;
+            let message = vec![7; FLOOD_BYTES];
+            while counts.over.load(Ordering::Acquire) == 0 {
+                source.send(&message)?;
+                counts.sent.fetch_add(1, Ordering::AcqRel);
+            }
+            Ok(())
+        })?;
+        counts.flooding.meet(2)?;
+        Ok(Self { counts, children: [flooder, swamp], began: Instant::now() })
+    }
+
+    /// Ends both, and tells how much it was.
+    fn end(self) -> Result<Flooded, Failure> {
+        let seconds = self.began.elapsed().as_secs_f64();
+        self.counts.over.store(1, Ordering::Release);
+        let deadline = Instant::now() + ENDS_WITHIN;
+        self.children.into_iter().try_for_each(|child| child.finish(deadline))?;
+        let rate = |count: &AtomicU64| count.load(Ordering::Acquire) as f64 / seconds;
+        let flooded = Flooded { sent: rate(&self.counts.sent), received: rate(&self.counts.received) };
+        if flooded.received == 0.0 {
+            return Err(Failure::Failed("nothing of the flood came".into()));
+        }
+        Ok(flooded)
+    }
+}
+
+fn flood_rows(case: &str, floods: &[Flooded]) -> Vec<Row> {
+    let row = |who, rate: fn(&Flooded) -> f64| {
+        let median = crate::statistics::median(floods.iter().map(rate))?;
+        Some(Row {
+            case: case.into(),
+            bytes: Some(FLOOD_BYTES),
+            who,
+            unit: "packages/s",
+            result: Ok(crate::statistics::Summary::single(median)),
+            versus: None,
+            ratio_p50: None,
+            ratio_p99: None,
+        })
+    };
+    [row("flood, sent", |flood| flood.sent), row("flood, arrived", |flood| flood.received)]
+        .into_iter()
+        .flatten()
+        .collect()
+}

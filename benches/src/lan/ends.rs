@@ -1,0 +1,139 @@
+//! Two modules on two nodes, by nothing but the public interface of mailboxes.
+
+use super::flow::{Inlet, Outlet, SILENCE};
+use super::nodes::{self, Nodes};
+use crate::Failure;
+use crate::harness::{End, Link, Meetings};
+use rohrpost_mailbox::{
+    Full, Label, Name, Node, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
+};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Slots of a mailbox that a whole window may come into at once.
+const SLOTS: u16 = 256;
+
+/// One end of a ping-pong.
+pub struct Module {
+    receiver: Receiver,
+    sender: Sender,
+    label: Label,
+    /// Longest wait for a package; none: for ever, which costs no timer.
+    patience: Option<Duration>,
+}
+
+impl Module {
+    /// Opens an end, in the process that will use it.
+    ///
+    /// # Errors
+    /// When the mailboxes cannot be made, or there is no way to the other node.
+    pub fn open(nodes: &Nodes, end: End, turn: u8, bytes: usize, meetings: &mut Meetings) -> Result<Self, Failure> {
+        let other = nodes::bench(if end == End::Ping { End::Pong } else { End::Ping }, turn);
+        let own = nodes::bench(end, turn);
+        let participant = join(nodes, end, own)?;
+        let shape = Shape { body_bytes_max: body(bytes)?, ..Shape::default() };
+        let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
+        meetings.meet()?;
+        let sender = participant.sender(other).map_err(|error| Failure::of("way to the other node", error))?;
+        let label = Label { from: own, kind: Type::data(0), priority: Priority(own.class().0), ..Label::default() };
+        Ok(Self { receiver, sender, label, patience: None })
+    }
+
+    /// From now on holds a package for lost that does not come in time.
+    #[must_use]
+    pub fn with_patience(self, patience: Duration) -> Self {
+        Self { patience: Some(patience), ..self }
+    }
+}
+
+impl Link for Module {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.sender.send(&self.label, &[message]).map_err(|error| Failure::of("send", error))
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        let deadline = self.patience.map(|patience| Instant::now() + patience);
+        let package = self.receiver.receive_timeout(Waiting { spin: Duration::ZERO, deadline });
+        let package = package.ok_or_else(|| Failure::Failed("a package is lost".into()))?;
+        copy(package.body(), message)
+    }
+}
+
+/// Where a stream of packages goes in.
+pub struct Source {
+    sender: Sender,
+    label: Label,
+}
+
+impl Source {
+    /// A sender on the near node, of the priority of its class.
+    ///
+    /// # Errors
+    /// When there is no way to the other node.
+    pub fn open(nodes: &Nodes, own: Name, to: Name) -> Result<Self, Failure> {
+        let participant = join(nodes, End::Ping, own)?;
+        let sender = participant.sender(to).map_err(|error| Failure::of("way to the other node", error))?;
+        let label = Label { from: own, kind: Type::data(0), priority: Priority(own.class().0), ..Label::default() };
+        Ok(Self { sender, label })
+    }
+}
+
+impl Inlet for Source {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        match self.sender.send(&self.label, &[message]) {
+            // The receiver counts what is missing.
+            Ok(()) | Err(SendError::Full(_)) => Ok(()),
+            Err(error) => Err(Failure::of("send", error)),
+        }
+    }
+}
+
+/// Where it comes out.
+pub struct Sink {
+    receiver: Receiver,
+}
+
+impl Sink {
+    /// A mailbox on the far node.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn open(nodes: &Nodes, own: Name, bytes: usize) -> Result<Self, Failure> {
+        let participant = join(nodes, End::Pong, own)?;
+        let shape = Shape { slots: SLOTS, body_bytes_max: body(bytes)?, full: Full::Reject, ..Shape::default() };
+        let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
+        Ok(Self { receiver })
+    }
+}
+
+impl Outlet for Sink {
+    fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
+        // With something there it looks at no clock.
+        let waiting = match self.receiver.try_receive() {
+            Some(package) => return copy(package.body(), message).map(|()| true),
+            None => Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + SILENCE) },
+        };
+        match self.receiver.receive_timeout(waiting) {
+            Some(package) => copy(package.body(), message).map(|()| true),
+            None => Ok(false),
+        }
+    }
+}
+
+fn join(nodes: &Nodes, end: End, own: Name) -> Result<Arc<Participant>, Failure> {
+    let node = Node::open(&nodes.directory(end)).map_err(|error| Failure::of("node", error))?;
+    let module = Name::new(own.system(), own.class().0, own.instance(), 0);
+    Participant::join(&node, module).map_err(|error| Failure::of("node", error))
+}
+
+fn body(bytes: usize) -> Result<u16, Failure> {
+    u16::try_from(bytes).map_err(|error| Failure::of("size", error))
+}
+
+fn copy(body: &[u8], message: &mut [u8]) -> Result<(), Failure> {
+    if body.len() != message.len() {
+        return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), message.len())));
+    }
+    message.copy_from_slice(body);
+    Ok(())
+}

@@ -1,0 +1,18 @@
+//! Two nodes on a network of their own, and what can be compared there: ours, and what the kernel gives at best.
+//!
+//! ```text
+//!  processor 0, namespace `near`                      processor 1, namespace `far`
+//!  ping ─▶ mailbox ─▶ router ══╗                ╔══▶ router ─▶ mailbox ─▶ pong       ours
+//!  ping ─▶ futex   ─▶ relay  ══╬══ veth, bridge ╬══▶ relay  ─▶ futex   ─▶ pong       `chain`: what a router costs at least
+//!  ping ═══════════════════════╝                ╚══════════════════════▶ pong       `udp`: the network alone
+//! ```
+//! Every process is one of its own, and both relays of a node are, as the two threads of a router.
+
+pub mod chain;
+pub mod ends;
+pub mod flow;
+pub mod nodes;
+pub mod udp;
+pub mod wire;
+
+pub use wire::Wire;

@@ -1,0 +1,90 @@
+//! Datagrams from socket to socket, as the kernel carries them: one system call to send, one to receive.
+
+use super::Wire;
+use super::flow::{Inlet, Outlet};
+use crate::harness::{End, Failure, Link};
+use nix::sys::socket::{setsockopt, sockopt};
+use std::io;
+use std::net::UdpSocket;
+use std::time::Duration;
+
+/// Of the raw floor; its relays take the next ones.
+const PORT: u16 = 20_117;
+/// What may wait in the kernel for who receives, as much as a router has.
+const RECEIVE_BYTES: usize = 8 << 20;
+
+/// A socket that sends to one other, and hears from it alone.
+pub struct Datagrams(UdpSocket);
+
+impl Datagrams {
+    /// Enters the end's place on the network and opens its socket there.
+    ///
+    /// # Errors
+    /// When that is refused.
+    pub fn open(wire: &Wire, end: End) -> Result<Self, Failure> {
+        Self::between(wire, end, [PORT, PORT])
+    }
+
+    /// With these ports, the near one first.
+    pub(super) fn between(wire: &Wire, end: End, ports: [u16; 2]) -> Result<Self, Failure> {
+        wire.enter(end)?;
+        let (own, other) = if end == End::Ping { (0, 1) } else { (1, 0) };
+        let other_end = if end == End::Ping { End::Pong } else { End::Ping };
+        let opened = || -> io::Result<UdpSocket> {
+            let socket = UdpSocket::bind((wire.address(end), ports[own]))?;
+            // Only root may have more than the system's limit; who is refused keeps what that gives.
+            if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
+                setsockopt(&socket, sockopt::RcvBuf, &RECEIVE_BYTES)?;
+            }
+            socket.connect((wire.address(other_end), ports[other]))?;
+            Ok(socket)
+        };
+        opened().map(Self).map_err(|error| Failure::of("udp socket", error))
+    }
+
+    /// From now on waits no longer for a datagram.
+    ///
+    /// # Errors
+    /// When the kernel refuses it.
+    pub fn with_patience(self, patience: Duration) -> Result<Self, Failure> {
+        self.0.set_read_timeout(Some(patience)).map_err(|error| Failure::of("udp socket", error))?;
+        Ok(self)
+    }
+
+    /// Receives a datagram of exactly this length; false when none came in time.
+    fn take(&self, message: &mut [u8]) -> Result<bool, Failure> {
+        loop {
+            match self.0.recv(message) {
+                Ok(bytes) if bytes == message.len() => return Ok(true),
+                Ok(bytes) => return Err(Failure::Failed(format!("{bytes} bytes came, not {}", message.len()))),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(false),
+                // The far socket was not there yet when something was sent; this one only tells.
+                Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {}
+                Err(error) => return Err(Failure::of("recv", error)),
+            }
+        }
+    }
+}
+
+impl Link for Datagrams {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.0.send(message).map(drop).map_err(|error| Failure::of("send", error))
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        while !self.take(message)? {}
+        Ok(())
+    }
+}
+
+impl Inlet for Datagrams {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        Link::send(self, message)
+    }
+}
+
+impl Outlet for Datagrams {
+    fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
+        self.take(message)
+    }
+}

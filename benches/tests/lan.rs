@@ -1,0 +1,77 @@
+//! The cases over a network, run small: every contender delivers what it should, and nothing is left behind.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod support;
+
+use nix::sys::signal::Signal;
+use serde_json::{Map, Value};
+use std::collections::BTreeSet;
+use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+
+const CBWARE: &str = "CBWare, its table";
+
+const HOP: &[&str] = &["chain", "chain of mailboxes", "udp"];
+
+/// The cases: a size, and who is in it besides ours.
+const CASES: [(&str, u64, &[&str]); 14] = [
+    ("hop", 64, HOP),
+    ("hop", 1024, HOP),
+    ("hop", 16_384, HOP),
+    ("hop", 62_000, HOP),
+    ("hop, paced", 64, HOP),
+    ("hop, in fragments", 16_384, HOP),
+    ("rate", 64, &["udp"]),
+    ("rate", 2112, &["udp", CBWARE]),
+    ("rate", 5860, &["udp", CBWARE]),
+    ("rate", 15_236, &["udp", CBWARE]),
+    ("rate", 36_084, &["udp", CBWARE]),
+    ("rate", 62_000, &["udp"]),
+    ("packing", 64, &["udp"]),
+    ("urgent", 64, &["no flood"]),
+];
+
+/// What this computer has of network devices, and of namespaces with a name.
+fn network() -> BTreeSet<String> {
+    let names = |path| std::fs::read_dir(path).into_iter().flatten().flatten();
+    let names = names("/sys/class/net").chain(names("/run/netns"));
+    names.filter_map(|entry| entry.file_name().into_string().ok()).collect()
+}
+
+#[test]
+fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
+    let before = network();
+    let (output, prefix) = run("lan", &["--quick", "--json"]);
+    let rows = rows(&output);
+    for (case, bytes, others) in CASES {
+        let rows: Vec<&Map<String, Value>> =
+            rows.iter().filter(|row| row["case"] == case && row["bytes"] == bytes).collect();
+        for other in others {
+            assert_eq!(rows.iter().filter(|row| row["who"] == *other).count(), 1, "{case} {bytes} {other}");
+            assert_eq!(rows.iter().filter(|row| row["vs"] == *other).count(), 1, "{case} {bytes} beside {other}");
+        }
+    }
+    // A network between two nodes of one computer that are not busy loses nothing.
+    for row in rows.iter().filter(|row| row["unit"] == "%") {
+        assert_eq!(row["p50"], 0.0, "{row:?}");
+    }
+    assert_eq!(left_behind(&prefix), [""; 0]);
+    assert_eq!(network(), before);
+}
+
+#[test]
+fn whoever_interrupts_it_finds_no_process_and_no_network_left() {
+    let before = network();
+    let mut child = bench("lan", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
+    let prefix = prefix(&child);
+    let mut pids = Vec::new();
+    wait_for("a turn", || {
+        pids = children(&child);
+        pids.len() > 2
+    });
+    signal(&child, Signal::SIGINT);
+    assert!(!child.wait().unwrap().success());
+    assert_eq!(left_behind(&prefix), [""; 0]);
+    wait_for("the processes to end", || are_gone(&pids));
+    assert_eq!(network(), before);
+}

@@ -1,0 +1,120 @@
+//! Runs of the bench, and what must hold for each line it prints.
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::{Map, Value};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Longer than anything here takes on a busy computer.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A run of this subcommand.
+pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_rohrpost-bench"));
+    command.arg(subcommand).args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// The rows of a run, each checked, after an end without failure: a message that is damaged, missing or out of order would be one.
+pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
+    let mut lines: Vec<Map<String, Value>> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let (head, tail) = (lines.remove(0), lines.pop().unwrap());
+    assert_eq!((&head["case"], &tail["case"]), (&"environment".into(), &"environment-after".into()));
+    assert!(head["refused"].is_array() && head["kernel"].is_string());
+    lines.iter().for_each(check_row);
+    lines
+}
+
+/// What it printed, and the names that it may use in shared memory.
+pub(crate) fn run(subcommand: &str, arguments: &[&str]) -> (Output, String) {
+    let child = bench(subcommand, arguments).spawn().unwrap();
+    let prefix = prefix(&child);
+    (child.wait_with_output().unwrap(), prefix)
+}
+
+/// How all names in shared memory begin that this run may use.
+pub(crate) fn prefix(child: &Child) -> String {
+    format!("rohrpost-bench-{}-", child.id())
+}
+
+/// What of it is there still.
+pub(crate) fn left_behind(prefix: &str) -> Vec<String> {
+    let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
+    entries.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| name.starts_with(prefix)).collect()
+}
+
+/// Waits until it is so; fails when that takes too long.
+pub(crate) fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
+    let deadline = Instant::now() + PATIENCE;
+    while !is_so() {
+        assert!(Instant::now() < deadline, "waited too long for {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+const KEYS: [&str; 13] = [
+    "case",
+    "bytes",
+    "unit",
+    "p50",
+    "p99",
+    "p999",
+    "max",
+    "vs",
+    "ratio_p50",
+    "ratio_p99",
+    "target_p50",
+    "target_p99",
+    "met",
+];
+
+/// Keys are there; figures are times or rates that can be; ratios are there where both have figures.
+pub(crate) fn check_row(row: &Map<String, Value>) {
+    let missing: Vec<&&str> = KEYS.iter().filter(|key| !row.contains_key(**key)).collect();
+    assert!(missing.is_empty(), "{row:?} lacks {missing:?}");
+    let number = |key: &str| row[key].as_f64();
+    for key in ["p50", "p99", "p999", "max", "ratio_p50", "ratio_p99"] {
+        // Nothing is a good count, of system calls or losses say; no time and no rate is nothing.
+        let may_be_0 = row["unit"] == "a send" || row["unit"] == "%";
+        let can_be = |value: f64| value.is_finite() && (value > 0.0 || value == 0.0 && may_be_0);
+        assert!(number(key).is_none_or(can_be), "{key} of {row:?}");
+    }
+    // The limits of POSIX queues may be too small for whoever is not root, a container may forbid tracing or namespaces, and the
+    // command may not have been built.
+    let excuses =
+        ["a POSIX queue of", "no process may be traced here", "no namespaces here", "name it with --rohrpost"];
+    let is_skipped = row["note"].as_str().is_some_and(|note| excuses.iter().any(|excuse| note.contains(excuse)));
+    assert_eq!(number("p50").is_none(), is_skipped, "{row:?}");
+    let figures: Vec<f64> = ["p50", "p99", "p999", "max"].into_iter().filter_map(number).collect();
+    if row["unit"] == "us" {
+        assert!(figures.is_sorted(), "{row:?}");
+    }
+    if row["vs"] != "posix-mq" && !is_skipped {
+        assert_eq!(row["vs"].is_string(), number("ratio_p50").is_some(), "{row:?}");
+    }
+    let has_target = number("target_p50").or(number("target_p99")).is_some();
+    assert!(row["met"].is_null() || has_target, "{row:?}");
+}
+
+/// Process ids of its children.
+pub(crate) fn children(parent: &Child) -> Vec<String> {
+    let list = format!("/proc/{0}/task/{0}/children", parent.id());
+    std::fs::read_to_string(list).unwrap_or_default().split_whitespace().map(String::from).collect()
+}
+
+/// Whether none of these is a process of the bench's any more.
+pub(crate) fn are_gone(pids: &[String]) -> bool {
+    !pids.iter().any(|pid| {
+        let name = std::fs::read_to_string(Path::new("/proc").join(pid).join("comm")).unwrap_or_default();
+        name.starts_with("rohrpost")
+    })
+}
+
+/// Sends it a signal.
+pub(crate) fn signal(child: &Child, signal: Signal) {
+    kill(Pid::from_raw(i32::try_from(child.id()).unwrap()), signal).unwrap();
+}

@@ -1,0 +1,210 @@
+//! The network between the nodes of a system, section `[network]`: how routers send, and which name lies on which node.
+//!
+//! It is there exactly when there are several nodes. Then each node has a router, a module that no `[[module]]` describes: `router.0`
+//! on the first node of the file, `router.1` on the second, and so on.
+
+use crate::classes::{ClassTable, ROUTER};
+use crate::installation::Installation;
+use crate::mailbox::{MailboxSpec, Mailboxes, lines_at};
+use crate::module::{Lines, Module, Program, Restart, RestartPolicy, Start};
+use crate::node::Node;
+use crate::reader::Section;
+use rohrpost_mailbox::{BODY_BYTES_MAX, Full, Name, Priority};
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+/// Most nodes of a system.
+pub const NODES_MAX: usize = 64;
+/// Level of what is not real time; the real-time levels 0..=30 go before it.
+pub const LEVEL_NOT_REAL_TIME: u8 = 31;
+/// The mailbox in which a router takes what goes to other nodes: slots for the largest body each. What has waited longer than its
+/// `max_age` is dropped, since the answer would come too late for every caller.
+pub const TRANSIT: MailboxSpec = MailboxSpec {
+    slots: 64,
+    size: BODY_BYTES_MAX as u32,
+    full: Full::Displace,
+    max_age: Some(Duration::from_secs(2)),
+    claims: 1,
+};
+
+const PORT: u16 = 21_117;
+const MTU: i64 = 1500;
+const MTUS: RangeInclusive<i64> = 576..=65_535;
+/// Every link that carries IPv6 carries datagrams so large (RFC 8200).
+const MTU_V6_MIN: i64 = 1280;
+/// Heads of IP and UDP, in bytes.
+const HEADS_V4: usize = 20 + 8;
+const HEADS_V6: usize = 40 + 8;
+/// Most that UDP over IPv4 carries, in bytes.
+const PAYLOAD_MAX: usize = 65_507;
+const RATE: u64 = 100 << 20;
+/// A largest package at the least takes a second, half of what a package may wait.
+const RATES: RangeInclusive<u64> = 64 << 10..=64 << 30;
+const QUOTA: u64 = 256 << 10;
+/// Two largest packages, so that a sender's second one does not push the first out.
+const QUOTAS: RangeInclusive<u64> = 128 << 10..=64 << 20;
+const BULK_BELOW: u8 = 16;
+
+/// How the routers of an installation send.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Network {
+    /// UDP port of packages; time has the next one.
+    pub port: u16,
+    /// Largest IP packet that every link carries, in bytes.
+    pub mtu: u16,
+    /// Largest datagram, in bytes behind the heads of IP and UDP.
+    pub datagram_bytes_max: usize,
+    /// Bytes a second that a router sends at most, the heads of IP and UDP counted.
+    pub rate_bytes_s: u64,
+    /// Bytes of one sender's packages that its node's router keeps waiting.
+    pub quota_bytes: usize,
+    /// Classes below this id are not real time.
+    pub bulk_below: u8,
+}
+
+/// Mailbox names of another node: all from the first to the last, by number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Route {
+    /// First of them.
+    pub first: Name,
+    /// Last of them.
+    pub last: Name,
+    /// The node, by its place in the file.
+    pub node: u8,
+}
+
+impl Network {
+    /// What `check` says of it, and each start of a router.
+    pub const UNPROTECTED: &str = "security = \"none\": packages between nodes are neither sealed nor signed; use a network that nobody else reaches";
+
+    /// UDP port of time.
+    pub fn time_port(&self) -> u16 {
+        self.port + 1
+    }
+
+    /// In which of a router's queues a package waits: 0 goes first, 30 is the last real-time level, [`LEVEL_NOT_REAL_TIME`] goes when all
+    /// others are empty. The highest four bits of the priority count, as in RTnet (seed 002, 4.2); each of its 16 levels takes two of ours,
+    /// so that there is room for what routers themselves have to say.
+    pub fn level(&self, priority: Priority) -> u8 {
+        if priority.0 < self.bulk_below { LEVEL_NOT_REAL_TIME } else { (15 - (priority.0 >> 4)) * 2 }
+    }
+
+    pub(crate) fn read(section: Section<'_>, nodes: &[Node]) -> Self {
+        if nodes.len() == 1 {
+            section
+                .report("there is one node, so nothing goes over a network; drop this section, or add the other nodes");
+        }
+        let security = section.required("security", "security = \"none\"");
+        security.and_then(|item| item.choice(&[("none", ())]));
+        let port = section.get("port").and_then(|item| item.whole(1024..=65_534, PORT.into()));
+        let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
+        let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
+        let mtu = section.get("mtu").and_then(|item| item.whole(least..=*MTUS.end(), MTU)).unwrap_or(MTU) as usize;
+        let rate = section.get("rate").and_then(|item| item.size(RATES, "100 MiB"));
+        let quota = section.get("quota").and_then(|item| item.size(QUOTAS, "256 KiB"));
+        let bulk = section.get("bulk-below").and_then(|item| item.whole(0..=255, BULK_BELOW.into()));
+        section.finish();
+        let heads = if is_v6 { HEADS_V6 } else { HEADS_V4 };
+        Self {
+            port: port.map_or(PORT, |port| port as u16),
+            mtu: mtu as u16,
+            datagram_bytes_max: (mtu - heads).min(PAYLOAD_MAX),
+            rate_bytes_s: rate.unwrap_or(RATE),
+            quota_bytes: quota.unwrap_or(QUOTA) as usize,
+            bulk_below: bulk.map_or(BULK_BELOW, |bulk| bulk as u8),
+        }
+    }
+
+    /// What must be equal at both ends of the wire.
+    pub(crate) fn lan_text(&self) -> String {
+        format!("port {} mtu {}", self.port, self.mtu)
+    }
+}
+
+/// Judges what several nodes need beside `[network]`: addresses that can reach each other, and the class of routers.
+pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
+    if nodes.len() < 2 {
+        return;
+    }
+    if let Some(node) = nodes.get(NODES_MAX) {
+        file.reader.report(node.line, format!("[nodes]: there are {}; a system has at most {NODES_MAX}", nodes.len()));
+    }
+    if file.get("network").is_none() {
+        file.report(
+            "section `[network]` is missing; with several nodes add `[network]` with `security = \"none\"`: packages between \
+             nodes are neither sealed nor signed in this version, and the file says so in words",
+        );
+    }
+    if classes.id(ROUTER).is_none() {
+        let line = file.get("classes").map_or(file.line, |classes| classes.line);
+        file.reader.report(
+            line,
+            "[classes]: class `router` is missing, and with several nodes each has a router; \
+             add `router = { id = 250, text = \"Carries packages between nodes\" }`",
+        );
+    }
+}
+
+/// The routers of all nodes, which no `[[module]]` describes; their messages name the line of the node.
+pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(Module, Lines)> {
+    let Some(class) = classes.id(ROUTER).filter(|_| nodes.len() > 1) else { return Vec::new() };
+    let router = |(index, node): (usize, &Node)| {
+        let module = Module {
+            name: Name::new(system, class.0, index as u8, rohrpost_mailbox::local::COMMANDS),
+            faces: Vec::new(),
+            node: node.name.clone(),
+            program: Program::Builtin(ROUTER.into()),
+            optional: false,
+            calls: Vec::new(),
+            although: Vec::new(),
+            settings: toml::Table::new(),
+            start: Start::On,
+            // Without it the node is cut off, so it is never given up: no backoff is short enough for so many in a second.
+            restart: Restart {
+                policy: RestartPolicy::Always,
+                backoff: Duration::from_millis(100),
+                at_most: 1000,
+                within: Duration::from_secs(1),
+            },
+            ready_within: Duration::from_secs(10),
+            stop_within: Duration::from_secs(2),
+            spin: Duration::ZERO,
+            mailboxes: Mailboxes::default(),
+            line: node.line,
+            index: None,
+        };
+        (module, Lines { mailboxes: lines_at(node.line), calls: Vec::new() })
+    };
+    nodes.iter().take(NODES_MAX).enumerate().map(router).collect()
+}
+
+impl Installation {
+    /// The place of a node in the file, from 0: what routers call it.
+    pub fn node_index(&self, node: &str) -> Option<u8> {
+        self.nodes.iter().position(|known| known.name == node).and_then(|index| u8::try_from(index).ok())
+    }
+
+    /// The router of a node; none if there is one node only.
+    pub fn router_of(&self, node: &str) -> Option<Name> {
+        let class = self.classes.id(ROUTER).filter(|_| self.network.is_some())?;
+        self.node_index(node).map(|index| Name::new(self.system.id, class.0, index, rohrpost_mailbox::local::COMMANDS))
+    }
+
+    /// All names that lie on other nodes than this one: their modules, faces and tools, each with all its mailboxes. Sorted by name; no
+    /// two overlap.
+    pub fn routes_from(&self, node: &str) -> Vec<Route> {
+        let mut routes = Vec::new();
+        for (other, index) in self.nodes.iter().zip(0..).filter(|(other, _)| other.name != node) {
+            let whole = |first: Name, last: Name| Route {
+                first: first.with_local(0),
+                last: last.with_local(u8::MAX),
+                node: index,
+            };
+            let tool = |instance: u8| Name::new(self.system.id, self.classes.tool().0, instance, 0);
+            routes.push(whole(tool(*other.tools.start()), tool(*other.tools.end())));
+            routes.extend(self.modules_on(&other.name).flat_map(Module::names).map(|name| whole(name, name)));
+        }
+        routes.sort_by_key(|route| route.first);
+        routes
+    }
+}

@@ -1,0 +1,159 @@
+//! Which names are on other nodes, and the mailbox of the router that takes packages there: the file `routes`.
+//!
+//! ```text
+//! routes  =  header (24 B)  +  ranges of names (8 B each: first, last), in order
+//!            via: 1.250.0.3    1.200.0.0 ..= 1.200.0.255 | …
+//! ```
+//!
+//! This crate does not know why: the router of the node works it out from the configuration. The file appears whole. It is read
+//! only for a name that has no mailbox here, when a [`Sender`](crate::Sender) is opened.
+
+use crate::files::{open_shared, open_to_read};
+use crate::layout::{MAGIC, VERSION};
+use crate::name::Name;
+use crate::node::{Node, NodeError};
+use std::fs;
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+/// Ranges that a node can have: all instances of every class of a system, alone.
+pub const ROUTES_MAX: usize = 65_536;
+const HEAD_BYTES: usize = 24;
+const RANGE_BYTES: usize = 8;
+
+const FILE: &str = "routes";
+
+/// Why the file cannot be believed; another process wrote it.
+const DAMAGED: &str = "its file `routes` is damaged, or another version's; start the node's router again";
+
+impl Node {
+    /// Says that packages for these names (first and last of each range) go to the mailbox `via`, if they have no mailbox
+    /// here. What was said before is forgotten. Without ranges, nothing goes anywhere.
+    ///
+    /// # Errors
+    /// When the file cannot be written; what was said before stays.
+    ///
+    /// # Panics
+    /// When there are more than [`ROUTES_MAX`] ranges, or they are not in order and apart: the caller makes them from a
+    /// configuration that was checked.
+    pub fn set_routes(&self, via: Name, ranges: &[(Name, Name)]) -> Result<(), NodeError> {
+        assert!(ranges.len() <= ROUTES_MAX && ranges.iter().all(|(first, last)| first <= last));
+        assert!(ranges.windows(2).all(|pair| pair[0].1 < pair[1].0), "ranges are in order, and none overlaps another");
+        let mut bytes = Vec::with_capacity(HEAD_BYTES + ranges.len() * RANGE_BYTES);
+        bytes.extend_from_slice(&MAGIC.to_ne_bytes());
+        for field in [VERSION, via.raw(), ranges.len() as u32, 0] {
+            bytes.extend_from_slice(&field.to_ne_bytes());
+        }
+        for (first, last) in ranges {
+            bytes.extend_from_slice(&first.raw().to_ne_bytes());
+            bytes.extend_from_slice(&last.raw().to_ne_bytes());
+        }
+        // Named after its writer: two that write at once must not write into one.
+        let (path, unfinished) = (self.path().join(FILE), self.path().join(format!("{FILE}.{}", std::process::id())));
+        let write = || {
+            let _ = fs::remove_file(&unfinished);
+            open_shared(&unfinished, true)?.write_all(&bytes)?;
+            fs::rename(&unfinished, &path)
+        };
+        write().map_err(|error: io::Error| {
+            let _ = fs::remove_file(&unfinished);
+            NodeError::of(&path, error)
+        })?;
+        // Who did not find a name before may find a way to it now.
+        self.raise_registry_epoch();
+        Ok(())
+    }
+
+    /// The mailbox of the router that takes packages for this name to another node; none if it has no route. A name with a
+    /// mailbox on this node may have one too: nobody follows it.
+    pub fn route(&self, name: Name) -> Option<Name> {
+        find(self.path(), name).ok().flatten()
+    }
+}
+
+/// The mailbox that packages for a name go to, or what is wrong with the file.
+pub(crate) fn find(node: &Path, name: Name) -> Result<Option<Name>, String> {
+    let mut bytes = Vec::new();
+    match open_to_read(&node.join(FILE)) {
+        Ok(file) => {
+            let most = (HEAD_BYTES + ROUTES_MAX * RANGE_BYTES) as u64;
+            file.take(most).read_to_end(&mut bytes).map_err(|error| format!("its file `routes`: {error}"))?;
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(format!("its file `routes`: {error}")),
+    }
+    look_up(&bytes, name).ok_or_else(|| DAMAGED.into())
+}
+
+/// None when these bytes are no routes.
+fn look_up(bytes: &[u8], name: Name) -> Option<Option<Name>> {
+    let (head, ranges) = bytes.split_first_chunk::<HEAD_BYTES>()?;
+    let field = |at: usize| u32::from_ne_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+    let (via, count) = (Name::from_raw(field(12)), field(16) as usize);
+    let whole = head.starts_with(&MAGIC.to_ne_bytes()) && field(8) == VERSION && ranges.len() == count * RANGE_BYTES;
+    if !whole || (count > 0 && !via.is_mailbox()) {
+        return None;
+    }
+    let raw = |b: &[u8]| b.first_chunk().map_or(0, |b| u32::from_ne_bytes(*b));
+    let has = |range: &[u8]| (raw(range)..=raw(&range[4..])).contains(&name.raw());
+    Some(ranges.chunks_exact(RANGE_BYTES).any(has).then_some(via))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VIA: Name = Name::new(1, 250, 0, 3);
+
+    fn routes(ranges: &[(Name, Name)]) -> (tempfile::TempDir, std::sync::Arc<Node>) {
+        let folder = tempfile::tempdir().unwrap();
+        let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+        node.set_routes(VIA, ranges).unwrap();
+        (folder, node)
+    }
+
+    #[test]
+    fn a_name_has_a_route_if_it_lies_in_a_range() {
+        let first = (Name::new(1, 16, 64, 0), Name::new(1, 16, 127, 255));
+        let second = (Name::new(1, 200, 0, 0), Name::new(1, 200, 0, 255));
+        let (_folder, node) = routes(&[first, second]);
+        for (name, goes, why) in [
+            (Name::new(1, 16, 63, 255), false, "just before the first"),
+            (Name::new(1, 16, 64, 0), true, "the first of the first"),
+            (Name::new(1, 16, 127, 255), true, "the last of the first"),
+            (Name::new(1, 16, 128, 0), false, "just behind it"),
+            (Name::new(1, 200, 0, 7), true, "any mailbox of a module"),
+            (Name::new(1, 200, 1, 0), false, "another instance"),
+            (Name::new(2, 200, 0, 0), false, "another system"),
+        ] {
+            assert_eq!(node.route(name), goes.then_some(VIA), "{name}: {why}");
+        }
+    }
+
+    #[test]
+    fn new_routes_take_the_place_of_old_ones_and_raise_the_epoch() {
+        let name = Name::new(1, 200, 0, 0);
+        let (folder, node) = routes(&[(name, name)]);
+        let epoch = node.registry_epoch();
+        node.set_routes(VIA, &[]).unwrap();
+        assert!(node.route(name).is_none() && node.registry_epoch() != epoch);
+        let files: Vec<_> = fs::read_dir(folder.path().join("node")).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(files.len(), 2, "`node`, `routes`, and nothing unfinished: {files:?}");
+    }
+
+    #[test]
+    fn bytes_that_are_no_routes_lead_nowhere() {
+        let name = Name::new(1, 200, 0, 0);
+        let (_folder, node) = routes(&[(name, name)]);
+        let whole = fs::read(node.path().join(FILE)).unwrap();
+        assert_eq!(look_up(&whole, name), Some(Some(VIA)));
+        for cut in 0..whole.len() {
+            assert_eq!(look_up(&whole[..cut], name), None, "cut to {cut}");
+        }
+        for (at, what) in [(0, "magic"), (8, "version"), (15, "the router's system"), (16, "count")] {
+            let mut bytes = whole.clone();
+            bytes[at] = if at == 15 { 0 } else { bytes[at] ^ 1 };
+            assert_eq!(look_up(&bytes, name), None, "{what}");
+        }
+    }
+}

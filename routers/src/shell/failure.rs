@@ -1,0 +1,70 @@
+//! Why a datagram could not be sent, as far as it makes a difference, and how often that happened.
+
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What the kernel says instead of sending a datagram.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Failure {
+    /// The computer is there, but nobody listens at the port. Told of an earlier datagram; this one was sent.
+    NobodyThere,
+    /// No way to the address: the network is down, the way is missing, or a firewall forbids it.
+    NoWay,
+    /// Longer than what is between can carry.
+    TooLong,
+    /// The kernel or the network card had no room.
+    NoRoom,
+    /// Anything else.
+    Other,
+}
+
+impl Failure {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Other];
+
+    pub(super) fn of(error: &io::Error) -> Self {
+        use nix::errno::Errno;
+        match Errno::from_raw(error.raw_os_error().unwrap_or(0)) {
+            Errno::ECONNREFUSED => Self::NobodyThere,
+            Errno::ENETUNREACH
+            | Errno::EHOSTUNREACH
+            | Errno::ENETDOWN
+            | Errno::EHOSTDOWN
+            | Errno::EADDRNOTAVAIL
+            | Errno::EINVAL
+            | Errno::EACCES
+            | Errno::EPERM => Self::NoWay,
+            Errno::EMSGSIZE => Self::TooLong,
+            Errno::ENOBUFS | Errno::ENOMEM | Errno::EAGAIN => Self::NoRoom,
+            _ => Self::Other,
+        }
+    }
+
+    /// What happened, and what to do.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::NobodyThere => "nobody listens at its port; does its router run?",
+            Self::NoWay => {
+                "there is no way to its address; is the network up, and does a firewall forbid it? (`ip route get ADDRESS`)"
+            }
+            Self::TooLong => "the datagram was too long for the network; lower `mtu` in [network], on all nodes",
+            Self::NoRoom => "the kernel had no room; lower `rate` in [network] to what the network can carry",
+            Self::Other => "the kernel refused it",
+        }
+    }
+}
+
+/// How often each of them happened.
+#[derive(Default, Debug)]
+pub struct Failures([AtomicU64; Failure::ALL.len()]);
+
+impl Failures {
+    pub(super) fn count(&self, failure: Failure) {
+        self.0[failure as usize].fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// How often this one did.
+    pub fn of(&self, failure: Failure) -> u64 {
+        self.0[failure as usize].load(Ordering::Relaxed)
+    }
+}

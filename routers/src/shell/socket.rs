@@ -1,0 +1,239 @@
+//! The sockets of a node's router: one that takes what comes to the node's address and port, and one to each peer.
+//!
+//! Those to peers are connected: the kernel keeps the way there, and says when nobody listens. Their own port is any; what tells a
+//! node is its address.
+
+use super::failure::Failure;
+use nix::sys::socket::{setsockopt, sockopt};
+use socket2::{Domain, Protocol, SockRef, Socket, Type};
+use std::io::{self, IoSlice};
+use std::net::{IpAddr, Shutdown, SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// What may wait in the kernel for the thread that reads: a hundredth of a second of 10 Gbit/s, small datagrams counted with what
+/// the kernel needs for each.
+const RECEIVE_BYTES: usize = 8 << 20;
+/// Expedited forwarding (RFC 3246), for switches and radios that know it; and the highest priority in this computer's own queues
+/// that needs no rights.
+const TRAFFIC_CLASS: u32 = 46 << 2;
+const PRIORITY: u32 = 6;
+/// When reading fails.
+const PAUSE: Duration = Duration::from_millis(1);
+
+/// Why a router cannot use its address.
+#[derive(Debug, thiserror::Error)]
+pub enum SocketError {
+    /// Somebody is there.
+    #[error(
+        "{0} is in use: does the router of this node run already, or another program? Stop it, or choose another `port` in \
+         [network], the same on all nodes"
+    )]
+    InUse(SocketAddr),
+    /// It is another computer's address.
+    #[error(
+        "{0} is no address of this computer: launch this node on the computer that has it, or correct its `address` in the \
+         configuration (`ip addr` shows which there are)"
+    )]
+    NotHere(SocketAddr),
+    /// The system says no for another reason.
+    #[error("{1} for {0}: {2}")]
+    Io(SocketAddr, &'static str, io::Error),
+}
+
+/// Takes datagrams from all peers. Reading blocks, until [`InSocket::close`].
+pub(super) struct InSocket {
+    socket: UdpSocket,
+    closed: AtomicBool,
+    /// What may wait in the kernel, bytes; less than asked for if the system's limit is lower.
+    pub(super) receive_bytes: usize,
+}
+
+impl InSocket {
+    /// Binds the node's own address and port. Not shared with anybody: two routers of one node would each get some datagrams.
+    pub(super) fn open(own: SocketAddr) -> Result<Self, SocketError> {
+        let failed = |what| move |error| SocketError::Io(own, what, error);
+        let socket = new_socket(own).map_err(failed("making a socket"))?;
+        if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
+            // Without the right to go beyond the limit, up to the limit.
+            socket.set_recv_buffer_size(RECEIVE_BYTES).map_err(failed("SO_RCVBUF"))?;
+        }
+        // The kernel tells twice what was asked for: it counts what it needs itself.
+        let receive_bytes = socket.recv_buffer_size().map_err(failed("SO_RCVBUF"))? / 2;
+        bind(&socket, own)?;
+        Ok(Self { socket: socket.into(), closed: AtomicBool::new(false), receive_bytes })
+    }
+
+    /// The next datagram: how long it is and where it came from; none when the socket was closed.
+    pub(super) fn receive(&self, datagram: &mut [u8]) -> Option<(usize, IpAddr)> {
+        while !self.closed.load(Ordering::Acquire) {
+            match self.socket.recv_from(datagram) {
+                Ok((bytes, source)) => return Some((bytes, source.ip())),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                // Closed; or the kernel lacks memory, and a real-time thread must not ask it again and again.
+                Err(_) => std::thread::sleep(PAUSE),
+            }
+        }
+        None
+    }
+
+    /// Ends the reading, also of a thread that blocks in it.
+    pub(super) fn close(&self) {
+        self.closed.store(true, Ordering::Release);
+        // An unconnected socket answers that it is not connected, and wakes its readers all the same.
+        let _ = SockRef::from(&self.socket).shutdown(Shutdown::Both);
+    }
+}
+
+/// Sends datagrams to one peer.
+pub(super) struct OutSocket {
+    own: IpAddr,
+    peer: SocketAddr,
+    /// None while there is no way there, as when the network is down.
+    socket: Option<Socket>,
+}
+
+impl OutSocket {
+    pub(super) fn new(own: IpAddr, peer: SocketAddr) -> Self {
+        Self { own, peer, socket: connect(own, peer).ok() }
+    }
+
+    /// Sends these parts as one datagram. Blocks while the network card has more than it can send: what waits then waits in the
+    /// router's queue, where important packages overtake.
+    ///
+    /// # Errors
+    /// The datagram was not sent, or not because of what became of an earlier one.
+    pub(super) fn send(&mut self, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
+        let socket = match &mut self.socket {
+            Some(socket) => socket,
+            none => none.insert(connect(self.own, self.peer).map_err(|error| Failure::of(&error))?),
+        };
+        let sent = loop {
+            match socket.send_vectored(parts) {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                sent => break sent,
+            }
+        };
+        let Err(error) = sent else { return Ok(()) };
+        let failure = Failure::of(&error);
+        match failure {
+            // What an earlier datagram brought back. This one was not sent; once more, without the error in its way.
+            Failure::NobodyThere => {
+                let again = socket.send_vectored(parts);
+                again.map(drop).map_err(|error| Failure::of(&error)).and(Err(Failure::NobodyThere))
+            }
+            Failure::NoWay => {
+                // The address may have gone, and come back: begin anew.
+                self.socket = None;
+                Err(failure)
+            }
+            _ => Err(failure),
+        }
+    }
+}
+
+fn connect(own: IpAddr, peer: SocketAddr) -> io::Result<Socket> {
+    let socket = new_socket(peer)?;
+    socket.bind(&SocketAddr::new(own, 0).into())?;
+    // Refusals are not worth a failure: the network then treats these datagrams as all others.
+    let _ = if peer.is_ipv4() { socket.set_tos_v4(TRAFFIC_CLASS) } else { socket.set_tclass_v6(TRAFFIC_CLASS) };
+    // After the class, which brings a priority along.
+    let _ = socket.set_priority(PRIORITY);
+    socket.connect(&peer.into())?;
+    Ok(socket)
+}
+
+fn new_socket(of: SocketAddr) -> io::Result<Socket> {
+    let socket = Socket::new(Domain::for_address(of), Type::DGRAM, Some(Protocol::UDP))?;
+    if of.is_ipv6() {
+        // Else a port taken here would be taken of all IPv4 addresses too.
+        socket.set_only_v6(true)?;
+    }
+    Ok(socket)
+}
+
+/// Binds; the errors that users can do something about say what.
+fn bind(socket: &Socket, own: SocketAddr) -> Result<(), SocketError> {
+    socket.bind(&own.into()).map_err(|error| match error.kind() {
+        io::ErrorKind::AddrInUse => SocketError::InUse(own),
+        io::ErrorKind::AddrNotAvailable => SocketError::NotHere(own),
+        _ => SocketError::Io(own, "binding a socket", error),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::{Ipv4Addr, Ipv6Addr};
+    use std::sync::Arc;
+
+    const ONE: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 1));
+    const OTHER: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
+
+    /// A port that nobody uses just now.
+    fn free_port(address: IpAddr) -> u16 {
+        UdpSocket::bind((address, 0)).unwrap().local_addr().unwrap().port()
+    }
+
+    fn pair(address: IpAddr) -> (InSocket, OutSocket) {
+        let at = SocketAddr::new(address, free_port(address));
+        (InSocket::open(at).unwrap(), OutSocket::new(address, at))
+    }
+
+    #[test]
+    fn parts_arrive_as_one_datagram_with_their_senders_address() {
+        for address in [ONE, OTHER, IpAddr::V6(Ipv6Addr::LOCALHOST)] {
+            let (inside, mut outside) = pair(address);
+            outside.send(&[IoSlice::new(b"head"), IoSlice::new(b""), IoSlice::new(b"body")]).unwrap();
+            let mut datagram = [0; 100];
+            assert_eq!(inside.receive(&mut datagram), Some((8, address)));
+            assert_eq!(&datagram[..8], b"headbody");
+            assert!(inside.receive_bytes >= 100_000, "{}", inside.receive_bytes);
+        }
+    }
+
+    #[test]
+    fn closing_ends_a_thread_that_blocks_in_reading() {
+        let (inside, _outside) = pair(ONE);
+        let inside = Arc::new(inside);
+        let reader = std::thread::spawn({
+            let inside = inside.clone();
+            move || inside.receive(&mut [0; 10])
+        });
+        inside.close();
+        assert_eq!(reader.join().unwrap(), None);
+        assert_eq!(inside.receive(&mut [0; 10]), None, "and any other");
+    }
+
+    #[test]
+    fn an_address_in_use_and_one_of_another_computer_are_told_plainly() {
+        let at = SocketAddr::new(ONE, free_port(ONE));
+        let _first = InSocket::open(at).unwrap();
+        let error = InSocket::open(at).err().unwrap();
+        assert!(
+            matches!(error, SocketError::InUse(_)) && error.to_string().contains("choose another `port`"),
+            "{error}"
+        );
+        // Set aside for documentation (RFC 5737), so nobody has it.
+        let error = InSocket::open("192.0.2.1:21117".parse().unwrap()).err().unwrap();
+        assert!(
+            matches!(error, SocketError::NotHere(_)) && error.to_string().contains("correct its `address`"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn failures_have_a_cause_and_do_not_stay() {
+        let at = SocketAddr::new(OTHER, free_port(OTHER));
+        let mut sender = OutSocket::new(ONE, at);
+        let big = vec![0; 65_508];
+        assert_eq!(sender.send(&[IoSlice::new(&big)]), Err(Failure::TooLong));
+        assert_eq!(sender.send(&[IoSlice::new(b"to nobody")]), Ok(()), "it is not known yet");
+        // Loopback answers at once.
+        assert_eq!(sender.send(&[IoSlice::new(b"to nobody either")]), Err(Failure::NobodyThere));
+        let there = InSocket::open(at).unwrap();
+        let _ = sender.send(&[IoSlice::new(b"here")]);
+        let mut datagram = [0; 10];
+        assert_eq!(there.receive(&mut datagram), Some((4, ONE)), "sent although an earlier one had failed");
+    }
+}
