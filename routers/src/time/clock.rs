@@ -467,7 +467,7 @@ impl Clock {
         (exchange.reply_sent_ns, exchange.reply_came) = (reply.sent_ns, received);
         let master_by_kernel = reply.sync_by_kernel && reply.request_by_kernel;
         exchange.by_kernel = master_by_kernel && exchange.sync_came.by_kernel && exchange.request_left.by_kernel;
-        self.election.reply(reply.epoch, reply.error_ns);
+        self.election.reply(reply.epoch, reply.error_ns, received.ns);
         let doubt_ns = exchange.sync_came.doubt_ns.max(exchange.request_left.doubt_ns);
         let sample =
             sample(&exchange, u64::from(doubt_ns) + u64::from(reply.doubt_ns)).ok_or(Ignored::NegativeDelay)?;

@@ -135,9 +135,11 @@ fn a_long_split(world: &mut World) {
     world.heal();
     world.run_until(2 * INTERVAL, "one master after a long split", |world| world.masters_now().len() == 1);
     agrees_again(world, 8 * SECOND);
-    let stepped = (0..4).all(|node| world.epoch(node) == 2);
-    if (apart_ns > 2 * u128::from(STEP_MIN_NS)) != stepped && apart_ns > u128::from(STEP_MIN_NS) {
-        world.fail(&format!("{apart_ns} ns apart, and epoch {}", world.epoch(0)));
+    // Near the limit either is right: they drift while they are measured.
+    let (steps, epoch) = (apart_ns > u128::from(STEP_MIN_NS), world.epoch(0));
+    let is_near = apart_ns.abs_diff(u128::from(STEP_MIN_NS)) < u128::from(MS);
+    if !is_near && epoch != 1 + u64::from(steps) {
+        world.fail(&format!("{apart_ns} ns apart, and epoch {epoch}"));
     }
 }
 
