@@ -26,6 +26,7 @@ mod published;
 mod router;
 mod run;
 mod send;
+mod sight;
 mod speech;
 mod status;
 mod summary;
