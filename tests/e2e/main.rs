@@ -15,6 +15,7 @@ mod crash;
 mod demo;
 mod doctor;
 mod harness;
+mod lan;
 mod launch;
 mod mailbox;
 mod mailboxes;
