@@ -16,6 +16,7 @@ mod demo;
 mod doctor;
 mod harness;
 mod launch;
+mod looks;
 mod mailbox;
 mod mailboxes;
 mod measure;
