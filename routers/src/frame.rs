@@ -1,31 +1,37 @@
 //! The bytes of a datagram between routers: checked once, then no accessor can fail. The page `docs/src/wire.md` is exact.
 //!
 //! ```text
-//!  0     2    3    4       5     6     7  8        16            24         32
-//! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬──────────────────────────────────┐
-//! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ as its kind says                 │
-//! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴──────────────────────────────────┘
+//!  0     2    3    4       5     6     7  8        16            24         32      36
+//! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬───────┬──────────────────────────────────┐
+//! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ check │ as its kind says                 │
+//! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴───────┴──────────────────────────────────┘
 //!  packages: (package head 16, body) over and over        fragment: first u64, index u16, count u16, offset u32, package head, bytes
 //!  alive: incarnation u64 and next sequence u64 of the peer as we heard it, datagrams of it that we missed u64
 //!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
 //! ```
 //!
-//! All fields of ours are little-endian; the head of a package is in the order that its own options tell.
+//! All fields of ours are little-endian; the head of a package is in the order that its own options tell. The check is the CRC-32 of
+//! zlib over all bytes but itself: a flipped bit that the 16 bits of UDP let pass must not look like a restarted router.
 
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 
 /// Bytes before what depends on the kind.
-pub const HEAD_BYTES: usize = 32;
-/// The version of this format; the first four bytes and a refusal mean the same in all of them.
+pub const HEAD_BYTES: usize = 36;
+/// The version of this format; the first four bytes, the check and a refusal mean the same in all of them.
 pub const VERSION: u8 = 1;
 /// Bytes of a fragment's own head, the package's head included.
 pub const FRAGMENT_HEAD_BYTES: usize = 32;
+/// Parts of a package, at most: one of 64 KiB in the smallest datagrams has fewer.
+pub const PARTS_MAX: u16 = 256;
 /// Bytes of what an alive datagram says.
 pub const ALIVE_BYTES: usize = 24;
 /// Bytes of what a refusal says.
 pub const REFUSAL_BYTES: usize = 16;
 
 const MAGIC: [u8; 2] = *b"Rp";
+/// A million datagrams a second reach it after nine years; so a sequence and a place in its datagram fit in 64 bits.
+pub const SEQUENCE_MAX: u64 = (1 << 48) - 1;
+const CHECK: std::ops::Range<usize> = 32..36;
 
 /// A node by its place in the configuration, from 0.
 pub type NodeIndex = u8;
@@ -44,8 +50,8 @@ pub enum Kind {
     Refusal = 4,
     /// Time: the master says what time it is.
     Sync = 16,
-    /// Time: when the last such frame left.
-    FollowUp = 17,
+    /// Time: makes the way warm for the next, and says nothing.
+    WarmUp = 17,
     /// Time: a slave asks how long the way is.
     Request = 18,
     /// Time: the master's answer.
@@ -59,7 +65,7 @@ impl Kind {
         Self::Alive,
         Self::Refusal,
         Self::Sync,
-        Self::FollowUp,
+        Self::WarmUp,
         Self::Request,
         Self::Reply,
     ];
@@ -99,14 +105,16 @@ pub enum BadFrame {
 }
 
 impl FrameHead {
-    /// The 32 bytes.
-    pub fn to_bytes(&self) -> [u8; HEAD_BYTES] {
+    /// The 36 bytes that go before `rest`, which is all that follows, in parts.
+    pub fn to_bytes(&self, rest: &[&[u8]]) -> [u8; HEAD_BYTES] {
         let mut bytes = [0; HEAD_BYTES];
         bytes[0..2].copy_from_slice(&MAGIC);
         bytes[2..7].copy_from_slice(&[VERSION, self.kind as u8, self.system, self.from, self.to]);
         bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
         bytes[16..24].copy_from_slice(&self.incarnation.to_le_bytes());
         bytes[24..32].copy_from_slice(&self.sequence.to_le_bytes());
+        let check = check(&bytes, rest);
+        bytes[CHECK].copy_from_slice(&check.to_le_bytes());
         bytes
     }
 
@@ -115,12 +123,16 @@ impl FrameHead {
     /// # Errors
     /// [`BadFrame`]
     pub fn parse(datagram: &[u8]) -> Result<(Self, &[u8]), BadFrame> {
-        match datagram {
-            [a, b, version, ..] if [*a, *b] == MAGIC && *version != VERSION => return Err(BadFrame::Version(*version)),
-            [a, b, ..] if [*a, *b] == MAGIC => {}
-            _ => return Err(BadFrame::Foreign),
+        let (b, rest) = datagram.split_first_chunk::<HEAD_BYTES>().ok_or(BadFrame::Foreign)?;
+        if b[0..2] != MAGIC {
+            return Err(BadFrame::Foreign);
         }
-        let Some((b, rest)) = datagram.split_first_chunk::<HEAD_BYTES>() else { return Err(BadFrame::Foreign) };
+        if b[CHECK] != check(b, &[rest]).to_le_bytes() {
+            return Err(BadFrame::Damaged("the check differs"));
+        }
+        if b[2] != VERSION && b[3] != Kind::Refusal as u8 {
+            return Err(BadFrame::Version(b[2]));
+        }
         let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
         if b[7] != 0 {
             return Err(BadFrame::Damaged("byte 7 is not 0"));
@@ -137,8 +149,18 @@ impl FrameHead {
         if head.incarnation == 0 {
             return Err(BadFrame::Damaged("incarnation 0"));
         }
+        if head.sequence > SEQUENCE_MAX {
+            return Err(BadFrame::Damaged("a sequence that no router reaches"));
+        }
         Ok((head, rest))
     }
+}
+
+fn check(head: &[u8; HEAD_BYTES], rest: &[&[u8]]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&head[..CHECK.start]);
+    rest.iter().for_each(|part| hasher.update(part));
+    hasher.finalize()
 }
 
 /// What a datagram of packages brought, whole.
@@ -167,8 +189,8 @@ impl<'a> Frame<'a> {
             Kind::Packages => Self::Packages(Packages::check(rest)?),
             Kind::Fragment => Self::Fragment(Fragment::parse(rest)?),
             Kind::Alive => Self::Alive(Alive::parse(rest)?),
-            Kind::Refusal => Self::Refusal(Refusal::parse(rest)?),
-            Kind::Sync | Kind::FollowUp | Kind::Request | Kind::Reply => Self::Time(rest),
+            Kind::Refusal => Self::Refusal(Refusal::parse(datagram[2], rest)?),
+            Kind::Sync | Kind::WarmUp | Kind::Request | Kind::Reply => Self::Time(rest),
         };
         Ok((head, frame))
     }
@@ -238,7 +260,7 @@ impl<'a> Fragment<'a> {
         bytes
     }
 
-    fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
+    pub(crate) fn parse(rest: &'a [u8]) -> Result<Self, BadFrame> {
         let Some((b, bytes)) = rest.split_first_chunk::<FRAGMENT_HEAD_BYTES>() else {
             return Err(BadFrame::Damaged("a fragment is cut short"));
         };
@@ -246,11 +268,30 @@ impl<'a> Fragment<'a> {
         let offset = u32::from_le_bytes([b[12], b[13], b[14], b[15]]);
         let Ok(head) = Head::from_bytes(&b[16..]) else { return Err(BadFrame::Damaged("a fragment is cut short")) };
         let part = Self { first: long(b, 0), index: half(8), count: half(10), offset, head, bytes };
-        let end = u64::from(part.offset) + bytes.len() as u64;
-        let is_last = part.index.checked_add(1) == Some(part.count);
-        let fits = part.index < part.count && part.count > 1 && !bytes.is_empty() && end <= part.head.len.into();
-        let reaches = (end == part.head.len.into()) == is_last && (part.offset == 0) == (part.index == 0);
-        if fits && reaches { Ok(part) } else { Err(BadFrame::Damaged("a fragment lies outside its package")) }
+        if part.is_sound() { Ok(part) } else { Err(BadFrame::Damaged("a fragment lies outside its package")) }
+    }
+
+    /// Bytes of each part but the last.
+    pub fn part_bytes(&self) -> usize {
+        if self.is_last() { self.offset as usize / usize::from(self.index).max(1) } else { self.bytes.len() }
+    }
+
+    /// Of the body's first bytes those that are here.
+    pub(crate) fn beginning(&self) -> &'a [u8] {
+        if self.index == 0 { self.bytes } else { &[] }
+    }
+
+    fn is_last(&self) -> bool {
+        usize::from(self.index) + 1 == usize::from(self.count)
+    }
+
+    /// All parts but the last are of one size, so that those of every index, each once, make the whole without gap or overlap.
+    fn is_sound(&self) -> bool {
+        let (part, len, index) = (self.part_bytes(), usize::from(self.head.len), usize::from(self.index));
+        let begins = usize::try_from(self.offset).ok() == index.checked_mul(part);
+        let is_part = self.index < self.count && (2..=PARTS_MAX).contains(&self.count) && self.first <= SEQUENCE_MAX;
+        let length = if self.is_last() { len.saturating_sub(index * part) } else { part };
+        is_part && begins && part > 0 && len.div_ceil(part) == self.count.into() && self.bytes.len() == length
     }
 }
 
@@ -296,6 +337,8 @@ pub enum Reason {
 /// "I take nothing from you, since …"
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Refusal {
+    /// Wire version of who refuses: the third byte of all its datagrams.
+    pub version: u8,
     /// Why.
     pub reason: Reason,
     /// Digest of who refuses.
@@ -311,12 +354,12 @@ impl Refusal {
         bytes
     }
 
-    fn parse(rest: &[u8]) -> Result<Self, BadFrame> {
+    fn parse(version: u8, rest: &[u8]) -> Result<Self, BadFrame> {
         let b: &[u8; REFUSAL_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("a refusal has 16 bytes"))?;
         let reasons = [Reason::Version, Reason::Digest, Reason::Stranger];
         let reason = reasons.into_iter().find(|reason| *reason as u8 == b[0]);
         let reason = reason.filter(|_| b[1..8] == [0; 7]).ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
-        Ok(Self { reason, digest: long(b, 8) })
+        Ok(Self { version, reason, digest: long(b, 8) })
     }
 }
 

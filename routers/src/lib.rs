@@ -11,13 +11,18 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "broken-variants")]
+pub mod broken;
 pub mod fragment;
 pub mod frame;
 pub mod impair;
 pub mod inbound;
 pub mod lab;
+pub mod link;
 pub mod outbound;
 pub mod queue;
+pub mod report;
+pub mod settings;
 pub mod shell;
 pub mod sim;
 pub mod stats;

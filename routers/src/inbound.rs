@@ -1,1 +1,0 @@
-//! What comes from other nodes: who sent it, what is missing, what came twice, and where it goes.

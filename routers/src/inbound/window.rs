@@ -1,0 +1,116 @@
+//! Which datagrams of a peer's life have come: what comes twice is dropped, and what is missing is counted.
+//!
+//! ```text
+//!        copies      lost, unless it still comes        may still come        not yet
+//!  ─────────────┬──────────────────────────────────┬─────────────────────┬──────────────▶ sequence
+//!           next - 1024                       settled (next - 64)       next
+//! ```
+
+/// Sequences whose coming is remembered.
+pub const WINDOW: u64 = 1024;
+/// So many may overtake a datagram before it counts as lost.
+pub const REORDER_MAX: u64 = 64;
+
+/// What a sequence is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Arrival {
+    /// The newest.
+    Newest,
+    /// Newer ones came before it.
+    Overtaken,
+    /// It had been counted as lost.
+    Returned,
+    /// It came before, or is so old that it cannot be told.
+    Copy,
+}
+
+/// Sequences of one life of one peer.
+#[derive(Debug)]
+pub(super) struct Window {
+    next: u64,
+    /// All below is judged.
+    settled: u64,
+    /// What came before this is none of ours.
+    start: u64,
+    came: [u64; (WINDOW / 64) as usize],
+    /// `next` as it stood at the last two ticks.
+    ticks: [u64; 2],
+}
+
+impl Window {
+    /// Of a life that is first heard with this sequence. Who has just begun itself cannot know what earlier ones were for.
+    pub(super) fn new(sequence: u64) -> Self {
+        let start = if sequence < REORDER_MAX { 0 } else { sequence };
+        Self { next: start, settled: start, start, came: [0; (WINDOW / 64) as usize], ticks: [start; 2] }
+    }
+
+    /// The sequence expected next.
+    pub(super) fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// Judges a sequence that came, and adds to `lost` what is given up since newer ones have come.
+    pub(super) fn arrive(&mut self, sequence: u64, lost: &mut u64) -> Arrival {
+        if sequence >= self.next {
+            self.advance(sequence, lost);
+            return Arrival::Newest;
+        }
+        if self.next - sequence > WINDOW || self.has(sequence) {
+            return Arrival::Copy;
+        }
+        self.note(sequence);
+        if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Overtaken }
+    }
+
+    /// Gives up what was missing two ticks ago; how many.
+    pub(super) fn tick(&mut self) -> u64 {
+        let lost = self.settle(self.ticks[1]);
+        self.ticks = [self.next, self.ticks[0]];
+        lost
+    }
+
+    /// Gives up all that is missing; how many.
+    pub(super) fn close(&mut self) -> u64 {
+        self.settle(self.next)
+    }
+
+    fn advance(&mut self, sequence: u64, lost: &mut u64) {
+        let next = sequence + 1;
+        // What leaves the window is judged before its bit is used again.
+        let judged = next.saturating_sub(REORDER_MAX);
+        *lost += self.settle(judged.min(self.next));
+        if judged > self.settled {
+            *lost += judged - self.settled;
+            self.settled = judged;
+        }
+        if next - self.next >= WINDOW {
+            self.came = [0; (WINDOW / 64) as usize];
+        } else {
+            (self.next..sequence).for_each(|skipped| self.came[word(skipped)] &= !bit(skipped));
+        }
+        self.note(sequence);
+        self.next = next;
+    }
+
+    fn settle(&mut self, until: u64) -> u64 {
+        let lost = (self.settled..until).filter(|sequence| !self.has(*sequence)).count() as u64;
+        self.settled = self.settled.max(until);
+        lost
+    }
+
+    fn has(&self, sequence: u64) -> bool {
+        self.came[word(sequence)] & bit(sequence) != 0
+    }
+
+    fn note(&mut self, sequence: u64) {
+        self.came[word(sequence)] |= bit(sequence);
+    }
+}
+
+fn word(sequence: u64) -> usize {
+    (sequence % WINDOW / 64) as usize
+}
+
+fn bit(sequence: u64) -> u64 {
+    1 << (sequence % 64)
+}

@@ -1,1 +1,0 @@
-//! What goes to other nodes: which package next, in which datagram, and when.

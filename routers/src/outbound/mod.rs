@@ -1,0 +1,413 @@
+//! What goes to other nodes: which package next, in which datagram, and when.
+//!
+//! ```text
+//!  accept: route ─ age ─ peer there? ─┬─ nothing waits, may leave now ──▶ at once, from where it lies
+//!                                     └─ Queue ──▶ poll: first level first; with it all for that peer that fits; in parts if too large
+//! ```
+//!
+//! Each package that is accepted is sent or lost with a cause; see [`Stats`].
+
+use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
+use crate::link::{ALIVE_EVERY_NS, State, TELL_EVERY_NS};
+use crate::queue::{Place, Queue, Waiting};
+use crate::report::Report;
+use crate::settings::{LEVELS, Settings};
+use crate::stats::{Cause, Stats};
+use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
+use std::sync::Arc;
+
+mod pace;
+
+use pace::Pace;
+
+/// Longest time from the publishing of a package to its leaving. The time to its mailbox is [`TRANSIT_MAX`] of "at most once" at most,
+/// so this leaves half a second for the wire and the other end.
+///
+/// [`TRANSIT_MAX`]: https://docs.rs/rohrpost-modules
+pub const WAIT_MAX_NS: u64 = 1_500_000_000;
+/// What does not leave is looked for this often.
+const SWEEP_EVERY_NS: u64 = 100_000_000;
+/// Bytes before the body of a package that leaves at once.
+pub const DIRECT_HEAD_BYTES: usize = frame::HEAD_BYTES + PACKAGE_HEAD_BYTES;
+
+/// A package that a router is to carry.
+#[derive(Clone, Copy, Debug)]
+pub struct Package<'a> {
+    /// Its head.
+    pub head: Head,
+    /// When its sender published it, ns.
+    pub published_ns: u64,
+    /// Its body; as long as the head says.
+    pub body: &'a [u8],
+}
+
+/// What became of a package.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Accepted {
+    /// Send these bytes and then the body, now, as one datagram.
+    Send {
+        /// To this node.
+        to: NodeIndex,
+        /// What goes before the body.
+        head: [u8; DIRECT_HEAD_BYTES],
+    },
+    /// It waits; `poll`.
+    Waits,
+    /// It was reported as lost.
+    Lost,
+}
+
+/// What to do.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Output {
+    /// Send the first bytes of the buffer as one datagram, then ask again.
+    Send {
+        /// To this node.
+        to: NodeIndex,
+        /// How many.
+        bytes: usize,
+    },
+    /// Nothing before this time, unless a package comes.
+    Wait {
+        /// Ns of the monotonic clock.
+        until_ns: u64,
+    },
+}
+
+/// The outgoing half of a router. One thread has it.
+#[derive(Debug)]
+pub struct Outbound {
+    settings: Settings,
+    stats: Arc<Stats>,
+    queue: Queue,
+    pace: Pace,
+    levels: [u8; 256],
+    /// Modules of this node by their numbers, sorted, and which quota they have.
+    senders: Box<[(u32, u16)]>,
+    /// The quota of everyone else.
+    others: u16,
+    peers: Box<[Peer]>,
+    /// Nobody is due to be told anything before this, ns.
+    alive_ns: u64,
+    sweep_ns: u64,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Peer {
+    /// When it is to be told at the latest that we are still there: if nothing goes to it, and anyway, ns.
+    quiet_until_ns: u64,
+    tell_ns: u64,
+}
+
+impl Outbound {
+    /// For the router of `settings.own`. Takes all its memory now.
+    pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
+        let groups = settings.senders.iter().enumerate();
+        let names = groups.flat_map(|(index, names)| names.iter().map(move |name| (name.module().raw(), index as u16)));
+        let mut senders: Vec<_> = names.collect();
+        senders.sort_unstable();
+        let others = settings.senders.len();
+        Self {
+            queue: Queue::new(others + 1, settings.nodes.len(), settings.network.quota_bytes),
+            pace: Pace::new(settings),
+            levels: std::array::from_fn(|priority| settings.network.level(Priority(priority as u8))),
+            senders: senders.into(),
+            others: others as u16,
+            peers: vec![Peer::default(); settings.nodes.len()].into(),
+            alive_ns: 0,
+            sweep_ns: 0,
+            settings: settings.clone(),
+            stats,
+        }
+    }
+
+    /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram.
+    pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
+        let mut head = package.head;
+        if matches!(head.kind.kind(), rohrpost_mailbox::Kind::Command(_)) {
+            // Nobody makes others hurry more than it may hurry itself.
+            head.priority = head.priority.at_most(head.from.class().priority());
+        }
+        self.stats.out.came(head.priority);
+        let peer = match self.admit(now_ns, &head, package.published_ns) {
+            Ok(peer) => peer,
+            Err((peer, cause)) => {
+                lose(&self.stats, peer, &head, package.body, cause, report);
+                return Accepted::Lost;
+            }
+        };
+        if alone && self.may_leave_at_once(now_ns, package.body.len()) {
+            return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package.body) };
+        }
+        let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
+        let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
+        let stats = &self.stats;
+        let taken = self.queue.push(waiting, package.body, |gone, body| {
+            take_from_level(stats, gone.level);
+            lose(stats, Some(gone.peer), &gone.head, body, Cause::Quota, report);
+        });
+        if taken {
+            self.stats.waiting[usize::from(level)].add(1);
+        } else {
+            lose(&self.stats, Some(peer), &head, package.body, Cause::Quota, report);
+        }
+        self.stats.waiting_bytes.set(self.queue.used_bytes());
+        if taken { Accepted::Waits } else { Accepted::Lost }
+    }
+
+    /// What leaves next, or when to ask again. `datagram` has room for the largest.
+    ///
+    /// # Panics
+    /// If it has not.
+    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
+        let datagram = &mut datagram[..self.settings.network.datagram_bytes_max];
+        if now_ns >= self.sweep_ns {
+            self.sweep(now_ns, report);
+        }
+        if now_ns >= self.alive_ns
+            && let Some(peer) = self.due(now_ns)
+        {
+            return self.alive(now_ns, peer, datagram);
+        }
+        let quiet_until_ns = if self.queue.is_empty() { self.alive_ns } else { self.alive_ns.min(self.sweep_ns) };
+        while let Some(place) = self.queue.first() {
+            if let Err(until_ns) = self.pace.may_leave(now_ns) {
+                return Output::Wait { until_ns: until_ns.min(quiet_until_ns) };
+            }
+            let waiting = *self.queue.at(place);
+            if let Some(cause) = self.why_not(now_ns, waiting.peer, waiting.published_ns) {
+                self.drop_out(place, cause, report);
+                continue;
+            }
+            return if self.is_large(&waiting) {
+                self.part(now_ns, place, datagram)
+            } else {
+                self.pack(now_ns, waiting.peer, waiting.level, datagram, report)
+            };
+        }
+        self.stats.waiting_bytes.set(0);
+        Output::Wait { until_ns: self.alive_ns }
+    }
+
+    /// Says that the socket did not take what was to be sent last: the datagram, and the body besides if it was [`Accepted::Send`].
+    pub fn unsent(&mut self, datagram: &[u8], body: &[u8], report: &mut impl Report) {
+        let Some((head, mut rest)) = datagram.split_first_chunk::<{ frame::HEAD_BYTES }>() else { return };
+        let (kind, peer) = (head[3], head[6]);
+        self.stats.peer(peer).sent.unsent.add(1);
+        if kind == Kind::Packages as u8 {
+            while let Ok(head) = Head::from_bytes(rest) {
+                rest = &rest[PACKAGE_HEAD_BYTES..];
+                let (inside, behind) = rest.split_at_checked(head.len.into()).unwrap_or((body, &[]));
+                self.came_back(peer, &head, inside, report);
+                rest = behind;
+            }
+        }
+        if kind == Kind::Fragment as u8
+            && let Ok(part) = Fragment::parse(rest)
+        {
+            // Without this part the others are worth nothing.
+            let level = self.levels[usize::from(part.head.priority.0)];
+            let under_way = self.queue.first_of(peer, level);
+            match under_way.filter(|place| self.queue.at(*place).parts > 0 && self.queue.at(*place).first == part.first)
+            {
+                Some(place) => self.drop_out(place, Cause::Socket, report),
+                None => self.came_back(peer, &part.head, &[], report),
+            }
+        }
+    }
+
+    fn came_back(&mut self, peer: NodeIndex, head: &Head, body: &[u8], report: &mut impl Report) {
+        self.stats.peer(peer).sent.packages.take_back(1);
+        self.stats.out.came_back(head.priority, head.len);
+        lose(&self.stats, Some(peer), head, body, Cause::Socket, report);
+    }
+
+    fn admit(&self, now_ns: u64, head: &Head, published_ns: u64) -> Result<NodeIndex, (Option<NodeIndex>, Cause)> {
+        let peer = self.settings.node_of(head.to).filter(|node| *node != self.settings.own);
+        let peer = peer.ok_or((None, Cause::NoRoute))?;
+        match self.why_not(now_ns, peer, published_ns) {
+            Some(cause) => Err((Some(peer), cause)),
+            None => Ok(peer),
+        }
+    }
+
+    fn why_not(&self, now_ns: u64, peer: NodeIndex, published_ns: u64) -> Option<Cause> {
+        match self.stats.state(peer, now_ns) {
+            _ if now_ns.saturating_sub(published_ns) > WAIT_MAX_NS => Some(Cause::Stale),
+            State::Unknown | State::Alive => None,
+            State::Silent => Some(Cause::Silent),
+            State::Unheard => Some(Cause::Unheard),
+            State::Refused(_) => Some(Cause::Refused),
+        }
+    }
+
+    fn sender_of(&self, name: Name) -> u16 {
+        let raw = name.module().raw();
+        self.senders.binary_search_by_key(&raw, |(name, _)| *name).map_or(self.others, |at| self.senders[at].1)
+    }
+
+    fn may_leave_at_once(&self, now_ns: u64, body_bytes: usize) -> bool {
+        let bytes = DIRECT_HEAD_BYTES + body_bytes;
+        self.queue.is_empty()
+            && bytes <= self.settings.network.datagram_bytes_max
+            && self.pace.may_leave(now_ns).is_ok()
+    }
+
+    fn is_large(&self, waiting: &Waiting) -> bool {
+        DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.settings.network.datagram_bytes_max
+    }
+
+    fn direct(&mut self, now_ns: u64, peer: NodeIndex, head: &Head, body: &[u8]) -> [u8; DIRECT_HEAD_BYTES] {
+        let package_head = head.to_bytes();
+        let frame = self.head(Kind::Packages, peer).to_bytes(&[&package_head, body]);
+        let mut bytes = [0; DIRECT_HEAD_BYTES];
+        bytes[..frame::HEAD_BYTES].copy_from_slice(&frame);
+        bytes[frame::HEAD_BYTES..].copy_from_slice(&package_head);
+        self.passed(peer, head);
+        self.left(now_ns, peer, DIRECT_HEAD_BYTES + body.len());
+        bytes
+    }
+
+    /// As many whole packages for a peer as fit, level by level. The first one fits.
+    fn pack(
+        &mut self,
+        now_ns: u64,
+        peer: NodeIndex,
+        from: u8,
+        datagram: &mut [u8],
+        report: &mut impl Report,
+    ) -> Output {
+        let mut end = frame::HEAD_BYTES;
+        let mut level = from;
+        while let Some(next) = self.queue.next_level(peer, level) {
+            level = next;
+            let Some(place) = self.queue.first_of(peer, level) else { break };
+            let waiting = *self.queue.at(place);
+            let size = PACKAGE_HEAD_BYTES + usize::from(waiting.head.len);
+            if waiting.parts > 0 || end + size > datagram.len() {
+                // Its turn comes; behind it nothing of its level may go, but perhaps something of a lower one fits.
+                level += 1;
+                continue;
+            }
+            if now_ns.saturating_sub(waiting.published_ns) > WAIT_MAX_NS {
+                self.drop_out(place, Cause::Stale, report);
+                continue;
+            }
+            let (head, body) = datagram[end..end + size].split_at_mut(PACKAGE_HEAD_BYTES);
+            head.copy_from_slice(&waiting.head.to_bytes());
+            self.queue.read(place, body);
+            end += size;
+            self.take_out(place);
+            self.passed(peer, &waiting.head);
+        }
+        self.finish(now_ns, Kind::Packages, peer, &mut datagram[..end])
+    }
+
+    /// The next part of a package that does not fit in a datagram.
+    fn part(&mut self, now_ns: u64, place: Place, datagram: &mut [u8]) -> Output {
+        let waiting = *self.queue.at(place);
+        let peer = waiting.peer;
+        let start = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
+        let (len, part_bytes) = (usize::from(waiting.head.len), datagram.len() - start);
+        let first = if waiting.parts == 0 { self.stats.peer(peer).sent.datagrams.get() } else { waiting.first };
+        let offset = usize::from(waiting.parts) * part_bytes;
+        let size = part_bytes.min(len - offset);
+        let (index, count, offset) = (waiting.parts, len.div_ceil(part_bytes) as u16, offset as u32);
+        let part = Fragment { first, index, count, offset, head: waiting.head, bytes: &[] };
+        datagram[frame::HEAD_BYTES..start].copy_from_slice(&part.head_bytes());
+        self.queue.read(place, &mut datagram[start..start + size]);
+        self.queue.part_left(place, first);
+        self.stats.peer(peer).sent.fragments.add(1);
+        if index + 1 == count {
+            self.take_out(place);
+            self.passed(peer, &waiting.head);
+        }
+        self.finish(now_ns, Kind::Fragment, peer, &mut datagram[..start + size])
+    }
+
+    fn alive(&mut self, now_ns: u64, peer: NodeIndex, datagram: &mut [u8]) -> Output {
+        let stats = self.stats.peer(peer);
+        let told = stats.link.told(stats.received.missing()).to_bytes();
+        let end = frame::HEAD_BYTES + told.len();
+        datagram[frame::HEAD_BYTES..end].copy_from_slice(&told);
+        self.peers[usize::from(peer)].tell_ns = now_ns + TELL_EVERY_NS;
+        self.finish(now_ns, Kind::Alive, peer, &mut datagram[..end])
+    }
+
+    /// Writes the head before what lies in the datagram already.
+    fn finish(&mut self, now_ns: u64, kind: Kind, to: NodeIndex, datagram: &mut [u8]) -> Output {
+        let (head, rest) = datagram.split_at_mut(frame::HEAD_BYTES);
+        head.copy_from_slice(&self.head(kind, to).to_bytes(&[rest]));
+        self.left(now_ns, to, datagram.len());
+        Output::Send { to, bytes: datagram.len() }
+    }
+
+    fn head(&self, kind: Kind, to: NodeIndex) -> FrameHead {
+        let Settings { system, own, digest, incarnation, .. } = self.settings;
+        let sequence = self.stats.peer(to).sent.datagrams.get();
+        FrameHead { kind, system, from: own, to, digest, incarnation, sequence }
+    }
+
+    fn left(&mut self, now_ns: u64, to: NodeIndex, bytes: usize) {
+        let sent = &self.stats.peer(to).sent;
+        sent.datagrams.add(1);
+        sent.bytes.add(bytes as u64);
+        self.peers[usize::from(to)].quiet_until_ns = now_ns + ALIVE_EVERY_NS;
+        self.pace.left(now_ns, bytes);
+    }
+
+    fn passed(&self, peer: NodeIndex, head: &Head) {
+        self.stats.peer(peer).sent.packages.add(1);
+        self.stats.out.passed(head.priority, head.len);
+    }
+
+    fn take_out(&mut self, place: Place) {
+        let (waiting, _) = self.queue.remove(place);
+        take_from_level(&self.stats, waiting.level);
+    }
+
+    fn drop_out(&mut self, place: Place, cause: Cause, report: &mut impl Report) {
+        let (waiting, body) = self.queue.remove(place);
+        take_from_level(&self.stats, waiting.level);
+        lose(&self.stats, Some(waiting.peer), &waiting.head, body, cause, report);
+    }
+
+    /// Drops what has waited too long behind others, and what goes to peers that are not there any more.
+    fn sweep(&mut self, now_ns: u64, report: &mut impl Report) {
+        self.sweep_ns = now_ns + SWEEP_EVERY_NS;
+        for peer in 0..self.settings.nodes.len() as NodeIndex {
+            for level in 0..LEVELS as u8 {
+                while let Some(place) = self.queue.first_of(peer, level) {
+                    let Some(cause) = self.why_not(now_ns, peer, self.queue.at(place).published_ns) else { break };
+                    self.drop_out(place, cause, report);
+                }
+            }
+        }
+    }
+
+    /// A peer that is to be told that we are still there. If none is, notes when one will be.
+    fn due(&mut self, now_ns: u64) -> Option<NodeIndex> {
+        let when = |peer: &Peer| peer.quiet_until_ns.min(peer.tell_ns);
+        let peers = self.settings.peers().map(|node| (when(&self.peers[usize::from(node)]), node));
+        match peers.min() {
+            Some((at_ns, node)) if at_ns <= now_ns => Some(node),
+            Some((at_ns, _)) => {
+                self.alive_ns = at_ns;
+                None
+            }
+            None => {
+                self.alive_ns = u64::MAX;
+                None
+            }
+        }
+    }
+}
+
+fn take_from_level(stats: &Stats, level: u8) {
+    stats.waiting[usize::from(level)].take_back(1);
+}
+
+fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause, report: &mut impl Report) {
+    stats.out.lost(head.priority, cause);
+    report.lost(peer, head, body, cause);
+}

@@ -1,0 +1,233 @@
+//! Packages that wait for the wire: 32 levels, and a quota for each sender (seed 002, 4.1.2).
+//!
+//! ```text
+//!  level 0 … 31 of each peer   first ─▶ package ─▶ package      first in, first out
+//!  level 0 … 31 of each sender first ─▶ package ─▶ package      who is over its quota loses the newest of its own lowest level
+//!  package                     head · block ─▶ block ─▶ block   256 B each, so that one large package does not need one large hole
+//! ```
+//!
+//! All memory is taken at the start: each sender's quota is there for it alone, so no sender can use up another's.
+
+mod blocks;
+mod list;
+
+use crate::frame::NodeIndex;
+use crate::settings::LEVELS;
+use blocks::{BLOCK_BYTES, Blocks, Chain};
+use list::{List, Lists};
+use rohrpost_config::NODES_MAX;
+use rohrpost_mailbox::Head;
+
+const _: () = assert!(NODES_MAX <= 64, "a level's peers are the bits of a word");
+
+/// A package that waits, without its body.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Waiting {
+    /// Its head, as it leaves.
+    pub head: Head,
+    /// When its sender published it, ns.
+    pub published_ns: u64,
+    /// Where it goes.
+    pub peer: NodeIndex,
+    /// Which sender's quota it is counted in.
+    pub sender: u16,
+    /// Its level; 0 goes first.
+    pub level: u8,
+    /// If parts of it have left: the sequence of the first.
+    pub first: u64,
+    /// How many parts have left.
+    pub parts: u16,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    waiting: Waiting,
+    ticket: u64,
+    body: Chain,
+}
+
+/// A place in the queue; good until its package is taken out.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Place(u32);
+
+/// The packages that wait.
+#[derive(Debug)]
+pub struct Queue {
+    entries: Box<[Entry]>,
+    blocks: Blocks,
+    /// Links of both kinds of lists; an entry that is not in use is in `free`, through its peer's links.
+    by_peer: Lists,
+    by_sender: Lists,
+    free: List,
+    peers: Box<[[List; LEVELS]]>,
+    senders: Box<[Sender]>,
+    /// Peers with something on a level, one bit each.
+    busy: [u64; LEVELS],
+    /// Levels with something, one bit each.
+    levels: u32,
+    quota_blocks: u32,
+    ticket: u64,
+    used_blocks: u32,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Sender {
+    levels: [List; LEVELS],
+    /// Blocks of what could give way, by level.
+    blocks: [u32; LEVELS],
+    /// Blocks in all.
+    used: u32,
+}
+
+impl Queue {
+    /// For so many senders and nodes. `quota_bytes` is what each sender may have waiting.
+    pub fn new(senders: usize, nodes: usize, quota_bytes: usize) -> Self {
+        let quota_blocks = quota_bytes.div_ceil(BLOCK_BYTES);
+        let count = quota_blocks * senders;
+        let mut queue = Self {
+            entries: vec![Entry::default(); count].into(),
+            blocks: Blocks::new(count),
+            by_peer: Lists::new(count),
+            by_sender: Lists::new(count),
+            free: List::default(),
+            peers: vec![[List::default(); LEVELS]; nodes].into(),
+            senders: vec![Sender::default(); senders].into(),
+            busy: [0; LEVELS],
+            levels: 0,
+            quota_blocks: quota_blocks as u32,
+            ticket: 0,
+            used_blocks: 0,
+        };
+        for place in 0..count as u32 {
+            queue.by_peer.append(&mut queue.free, place);
+        }
+        queue
+    }
+
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.levels == 0
+    }
+
+    /// Bytes of memory in use.
+    pub fn used_bytes(&self) -> u64 {
+        u64::from(self.used_blocks) * BLOCK_BYTES as u64
+    }
+
+    /// Lets a package wait. What has to give way for it is handed to `gone`; if nothing less important of the same sender can make room,
+    /// the package itself is not taken.
+    #[must_use]
+    pub fn push(&mut self, waiting: Waiting, body: &[u8], mut gone: impl FnMut(&Waiting, &[u8])) -> bool {
+        let needed = Blocks::needed(body.len());
+        if !self.make_room(usize::from(waiting.sender), waiting.level, needed, &mut gone) {
+            return false;
+        }
+        // A package has at least one block, and there are as many places as blocks.
+        let Some(place) = self.by_peer.take_first(&mut self.free) else { return false };
+        let body = self.blocks.store(body);
+        self.entries[place as usize] = Entry { waiting, ticket: self.ticket, body };
+        self.ticket += 1;
+        self.used_blocks += needed;
+        let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
+        self.by_peer.append(&mut self.peers[peer][level], place);
+        self.busy[level] |= 1 << peer;
+        self.levels |= 1 << level;
+        let sender = &mut self.senders[usize::from(waiting.sender)];
+        self.by_sender.append(&mut sender.levels[level], place);
+        sender.blocks[level] += needed;
+        sender.used += needed;
+        true
+    }
+
+    fn make_room(&mut self, sender: usize, level: u8, needed: u32, gone: &mut impl FnMut(&Waiting, &[u8])) -> bool {
+        let own = &self.senders[sender];
+        let lower = usize::from(level) + 1;
+        let yielding: u32 = own.blocks[lower..].iter().sum();
+        if own.used - yielding + needed > self.quota_blocks {
+            return false;
+        }
+        while self.senders[sender].used + needed > self.quota_blocks {
+            let last = self.senders[sender].levels[lower..].iter().rev().find_map(List::last);
+            // There is one: what could give way was counted.
+            let Some(last) = last else { return false };
+            let (waiting, beginning) = self.remove(Place(last));
+            gone(&waiting, beginning);
+        }
+        true
+    }
+
+    /// The package that goes next: of the first level, the one that has waited longest.
+    pub fn first(&self) -> Option<Place> {
+        if self.levels == 0 {
+            return None;
+        }
+        let level = self.levels.trailing_zeros() as usize;
+        let firsts = bits(self.busy[level]).filter_map(|peer| self.peers[peer][level].first());
+        firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place)
+    }
+
+    /// The first package for a peer on a level, if any.
+    pub fn first_of(&self, peer: NodeIndex, level: u8) -> Option<Place> {
+        self.peers[usize::from(peer)][usize::from(level)].first().map(Place)
+    }
+
+    /// The first level, from this one on, on which something waits for a peer.
+    pub fn next_level(&self, peer: NodeIndex, from: u8) -> Option<u8> {
+        let levels = &self.peers[usize::from(peer)][usize::from(from).min(LEVELS)..];
+        levels.iter().position(|list| list.first().is_some()).map(|further| from + further as u8)
+    }
+
+    /// What waits at a place.
+    pub fn at(&self, place: Place) -> &Waiting {
+        &self.entries[place.0 as usize].waiting
+    }
+
+    /// Copies the next bytes of a package's body out.
+    pub fn read(&mut self, place: Place, into: &mut [u8]) {
+        self.blocks.read(&mut self.entries[place.0 as usize].body, into);
+    }
+
+    /// A part of it has left: it does not give way any more.
+    pub fn part_left(&mut self, place: Place, first: u64) {
+        let entry = &mut self.entries[place.0 as usize];
+        entry.waiting.parts += 1;
+        if entry.waiting.parts == 1 {
+            entry.waiting.first = first;
+            let (sender, level) = (usize::from(entry.waiting.sender), usize::from(entry.waiting.level));
+            let sender = &mut self.senders[sender];
+            sender.blocks[level] -= entry.body.blocks();
+            self.by_sender.remove(&mut sender.levels[level], place.0);
+        }
+    }
+
+    /// Takes a package out; with it comes the beginning of its body.
+    pub fn remove(&mut self, place: Place) -> (Waiting, &[u8]) {
+        let Entry { waiting, body, .. } = self.entries[place.0 as usize];
+        let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
+        self.by_peer.remove(&mut self.peers[peer][level], place.0);
+        if self.peers[peer][level].first().is_none() {
+            self.busy[level] &= !(1 << peer);
+            if self.busy[level] == 0 {
+                self.levels &= !(1 << level);
+            }
+        }
+        let sender = &mut self.senders[usize::from(waiting.sender)];
+        if waiting.parts == 0 {
+            self.by_sender.remove(&mut sender.levels[level], place.0);
+            sender.blocks[level] -= body.blocks();
+        }
+        sender.used -= body.blocks();
+        self.used_blocks -= body.blocks();
+        self.blocks.free(body);
+        self.by_peer.prepend(&mut self.free, place.0);
+        (waiting, self.blocks.beginning(&body, waiting.head.len))
+    }
+}
+
+fn bits(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (word != 0).then(|| word.trailing_zeros() as usize)?;
+        word &= word - 1;
+        Some(bit)
+    })
+}

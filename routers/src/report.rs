@@ -1,0 +1,99 @@
+//! What the cores tell of: packages that go no further, and what happens to peers.
+
+use crate::frame::{NodeIndex, Reason};
+use crate::stats::Cause;
+use rohrpost_mailbox::Head;
+use std::net::IpAddr;
+
+/// How much of a lost package's body is there to be read: enough for what a call begins with.
+pub const BEGINNING_BYTES: usize = 256;
+
+/// Learns of each package that is lost here, once. It may answer its sender; counted it is already.
+pub trait Report {
+    /// `peer` is where it was to go, or came from; none if nobody knows. `body` is the beginning of its body, [`BEGINNING_BYTES`] of it at
+    /// least; less only if it is shorter, or if its first part never came.
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause);
+}
+
+/// Takes what came from other nodes.
+pub trait Deliver: Report {
+    /// Puts a package into its mailbox. If that is not possible, [`Report::lost`] follows.
+    ///
+    /// # Errors
+    /// [`NotDelivered`]
+    fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered>;
+
+    /// Something happened that people want to know of, each once until it is over.
+    fn event(&mut self, event: Event);
+}
+
+/// Why a mailbox did not take a package.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum NotDelivered {
+    /// Nobody has it open.
+    #[error("no such mailbox; is its module running?")]
+    NoMailbox,
+    /// It is full, and nothing in it is less important.
+    #[error("mailbox full")]
+    MailboxFull,
+    /// Its slots are smaller.
+    #[error("larger than the mailbox's slots")]
+    TooLarge,
+}
+
+/// What happens between routers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Event {
+    /// A peer is heard: for the first time, or after silence.
+    Heard {
+        /// Which.
+        peer: NodeIndex,
+    },
+    /// A peer was started anew.
+    Restarted {
+        /// Which.
+        peer: NodeIndex,
+    },
+    /// Nothing came from a peer for a second.
+    Silent {
+        /// Which.
+        peer: NodeIndex,
+    },
+    /// A peer is heard, but does not hear us.
+    Unheard {
+        /// Which.
+        peer: NodeIndex,
+    },
+    /// We take nothing from whoever sent this.
+    Refused {
+        /// Where it came from.
+        source: IpAddr,
+        /// The node with that address.
+        peer: Option<NodeIndex>,
+        /// What differs.
+        mismatch: Mismatch,
+    },
+    /// A peer takes nothing from us.
+    Refuses {
+        /// Which.
+        peer: NodeIndex,
+        /// What differs.
+        mismatch: Mismatch,
+    },
+    /// Two routers send as this node: the address is used twice, or an old router did not end.
+    Twice {
+        /// Which.
+        peer: NodeIndex,
+    },
+}
+
+/// What is not the same on both ends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Mismatch {
+    /// Why it is refused.
+    pub reason: Reason,
+    /// Wire version of the other end; ours is [`frame::VERSION`](crate::frame::VERSION).
+    pub version: u8,
+    /// Digest of the other end, where it was readable.
+    pub digest: Option<u64>,
+}

@@ -1,0 +1,119 @@
+//! What a router knows before the first datagram: who it is, who the others are, and how much of the wire is its.
+//!
+//! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
+
+use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
+use rohrpost_config::{Installation, Network, Route};
+use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name};
+use std::net::IpAddr;
+
+/// Levels of the queue; 0 goes first, the last takes what is not real time: see [`Network::level`].
+pub const LEVELS: usize = 32;
+/// Least that a sender may have waiting: two of the largest packages.
+pub const QUOTA_BYTES_MIN: usize = 128 * 1024;
+/// The smallest datagram that a package of any size goes into, in parts.
+pub const DATAGRAM_BYTES_MIN: usize = 528;
+
+const _: () = {
+    let part = DATAGRAM_BYTES_MIN - frame::HEAD_BYTES - FRAGMENT_HEAD_BYTES;
+    assert!(
+        BODY_BYTES_MAX.div_ceil(part) <= PARTS_MAX as usize,
+        "the largest package fits in the parts that there may be"
+    );
+    assert!(
+        QUOTA_BYTES_MIN >= 2 * (BODY_BYTES_MAX + HEAD_BYTES),
+        "a sender's next package fits behind the one that leaves"
+    );
+    assert!(rohrpost_config::LEVEL_NOT_REAL_TIME as usize == LEVELS - 1, "configuration knows the same levels");
+};
+
+/// One router, and the network that it is on.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// First byte of the names of its mailboxes.
+    pub system: u8,
+    /// Which of `nodes` it runs on.
+    pub own: NodeIndex,
+    /// All nodes, in the order of the configuration; [`NODES_MAX`](rohrpost_config::NODES_MAX) at most.
+    pub nodes: Vec<NodeSettings>,
+    /// What must be equal on both ends of a wire.
+    pub digest: u64,
+    /// Tells this life of the router from its others; not 0, and never the same again.
+    pub incarnation: u64,
+    /// How it sends.
+    pub network: Network,
+    /// Where names are that are not on this node; sorted, without overlap.
+    pub routes: Vec<Route>,
+    /// The modules of this node: the names of a group have a quota together, and so have all other names.
+    pub senders: Vec<Vec<Name>>,
+}
+
+/// A node, as others see it.
+#[derive(Clone, Debug)]
+pub struct NodeSettings {
+    /// Its name in the configuration.
+    pub name: String,
+    /// Where its datagrams come from and go to.
+    pub address: IpAddr,
+}
+
+/// Why there is no router for a node.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum SettingsError {
+    /// There is one node.
+    #[error("the installation has one node, so it needs no router; add the other nodes and `[network]`")]
+    OneNode,
+    /// There is no such node.
+    #[error("the installation has no node `{0}`; it has {1}")]
+    NoNode(String, String),
+}
+
+impl Settings {
+    /// The router of a node. `incarnation`: never the same for two lives of it; not 0.
+    ///
+    /// # Errors
+    /// [`SettingsError`]
+    pub fn new(installation: &Installation, node: &str, incarnation: u64) -> Result<Self, SettingsError> {
+        let network = installation.network.ok_or(SettingsError::OneNode)?;
+        let Some(own) = installation.node_index(node) else {
+            let known: Vec<_> = installation.nodes.iter().map(|node| format!("`{}`", node.name)).collect();
+            return Err(SettingsError::NoNode(node.into(), known.join(", ")));
+        };
+        // With several nodes each has an address: configuration sees to it.
+        let address = |address: Option<IpAddr>| address.unwrap_or(IpAddr::V4(std::net::Ipv4Addr::UNSPECIFIED));
+        let nodes = installation.nodes.iter();
+        Ok(Self {
+            system: installation.system.id,
+            own,
+            nodes: nodes.map(|node| NodeSettings { name: node.name.clone(), address: address(node.address) }).collect(),
+            digest: installation.digest().lan(),
+            incarnation,
+            network,
+            routes: installation.routes_from(node),
+            senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
+        })
+    }
+
+    /// Bytes that IP and UDP put before each datagram; the rate counts them.
+    pub fn overhead_bytes(&self) -> usize {
+        let is_v6 = self.nodes.iter().any(|node| node.address.is_ipv6());
+        if is_v6 { 40 + 8 } else { 20 + 8 }
+    }
+
+    /// The node that a name is on; none for names of this node and for those that nobody has.
+    pub fn node_of(&self, name: Name) -> Option<NodeIndex> {
+        let after = self.routes.partition_point(|route| route.first <= name);
+        let route = self.routes.get(after.checked_sub(1)?)?;
+        (name <= route.last).then_some(route.node)
+    }
+
+    /// The nodes besides this one.
+    pub fn peers(&self) -> impl Iterator<Item = NodeIndex> {
+        (0..self.nodes.len() as NodeIndex).filter(|node| *node != self.own)
+    }
+
+    /// The node with an address.
+    pub fn node_at(&self, address: IpAddr) -> Option<NodeIndex> {
+        self.nodes.iter().position(|node| node.address == address).map(|index| index as NodeIndex)
+    }
+}
