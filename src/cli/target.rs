@@ -124,11 +124,6 @@ impl Running {
         all.filter(|name| self.only.as_deref().is_none_or(|only| only == *name)).collect()
     }
 
-    /// Whether there are other nodes to tell this one from.
-    pub(super) fn has_others(&self) -> bool {
-        self.installation.nodes.len() > 1
-    }
-
     /// Where a module is. What is in no configuration can only be here.
     pub(super) fn node_of(&self, module: Name) -> &str {
         node_of(&self.installation, module).unwrap_or(&self.node_name)

@@ -17,6 +17,7 @@ mod doctor;
 mod harness;
 mod lan;
 mod launch;
+mod looks;
 mod mailbox;
 mod mailboxes;
 mod measure;
