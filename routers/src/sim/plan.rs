@@ -308,7 +308,9 @@ impl Plan {
         let count = if chance.percent(10) { 0 } else { chance.below(4 + self.nodes.len() as u64) };
         for _ in 0..count {
             let fault = self.fault(chance);
-            let from_ns = chance.below(self.mended_ns - S / 2);
+            // A refusal is said up to a second later, and holds for three.
+            let is_strange = matches!(fault, Fault::Foreign { .. } | Fault::Replay { .. });
+            let from_ns = chance.below(self.mended_ns - if is_strange { 3 * S / 2 } else { S / 2 });
             let longest_ns = self.mended_ns - from_ns;
             let long_ns = chance.scale(5 * MS, 4 * S).min(longest_ns);
             self.faults.push(Planned { from_ns, until_ns: from_ns + long_ns, fault });
