@@ -57,13 +57,18 @@ struct Partial {
 
 impl Reassembly {
     /// Takes a part; the whole if it was the last that was missing. A part that does not agree with the others of its package is dropped.
-    pub fn take(&mut self, now_ns: u64, part: &Fragment<'_>, mut tell: impl FnMut(&Head, Change)) -> Option<Whole<'_>> {
+    pub fn take(
+        &mut self,
+        now_ns: u64,
+        part: &Fragment<'_>,
+        mut tell: impl FnMut(&Head, &[u8], Change),
+    ) -> Option<Whole<'_>> {
         let known = self.partial.iter().position(|partial| partial.is_used && partial.first == part.first);
         let at = match known {
             Some(at) => at,
             None if self.given_up.contains(&Some(part.first)) => return None,
             None => {
-                tell(&part.head, Change::Began);
+                tell(&part.head, &[], Change::Began);
                 let at = self.room_for(part, &mut tell)?;
                 self.partial[at].begin(part);
                 at
@@ -78,7 +83,7 @@ impl Reassembly {
     }
 
     /// Gives up what no part came of for too long.
-    pub fn expire(&mut self, now_ns: u64, mut tell: impl FnMut(&Head, Change)) {
+    pub fn expire(&mut self, now_ns: u64, mut tell: impl FnMut(&Head, &[u8], Change)) {
         for at in 0..self.partial.len() {
             let partial = &self.partial[at];
             if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS {
@@ -88,7 +93,7 @@ impl Reassembly {
     }
 
     /// Gives up all: their sender lives no more.
-    pub fn clear(&mut self, mut tell: impl FnMut(&Head, Change)) {
+    pub fn clear(&mut self, mut tell: impl FnMut(&Head, &[u8], Change)) {
         for at in 0..self.partial.len() {
             if self.partial[at].is_used {
                 self.give_up(at, &mut tell);
@@ -109,7 +114,7 @@ impl Reassembly {
     }
 
     /// A place for another package, perhaps at the cost of one; none if it is itself the least important.
-    fn room_for(&mut self, part: &Fragment<'_>, tell: &mut impl FnMut(&Head, Change)) -> Option<usize> {
+    fn room_for(&mut self, part: &Fragment<'_>, tell: &mut impl FnMut(&Head, &[u8], Change)) -> Option<usize> {
         if let Some(free) = self.partial.iter().position(|partial| !partial.is_used) {
             return Some(free);
         }
@@ -121,17 +126,19 @@ impl Reassembly {
         let least = (0..self.partial.len()).min_by_key(worth)?;
         if (part.head.priority.0, part.first) < worth(&least) {
             self.remember_given_up(part.first);
-            tell(&part.head, Change::GivenUp);
+            tell(&part.head, part.beginning(), Change::GivenUp);
             return None;
         }
         self.give_up(least, tell);
         Some(least)
     }
 
-    fn give_up(&mut self, at: usize, tell: &mut impl FnMut(&Head, Change)) {
+    fn give_up(&mut self, at: usize, tell: &mut impl FnMut(&Head, &[u8], Change)) {
         self.partial[at].is_used = false;
         self.remember_given_up(self.partial[at].first);
-        tell(&self.partial[at].head, Change::GivenUp);
+        let partial = &self.partial[at];
+        let beginning = if partial.came[0] & 1 != 0 { &partial.body[..partial.part_bytes] } else { &[] };
+        tell(&partial.head, beginning, Change::GivenUp);
     }
 
     fn remember_given_up(&mut self, first: u64) {

@@ -5,10 +5,14 @@ use crate::stats::Cause;
 use rohrpost_mailbox::Head;
 use std::net::IpAddr;
 
+/// How much of a lost package's body is there to be read: enough for what a call begins with.
+pub const BEGINNING_BYTES: usize = 256;
+
 /// Learns of each package that is lost here, once. It may answer its sender; counted it is already.
 pub trait Report {
-    /// `peer` is where it was to go, or came from; none if nobody knows.
-    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, cause: Cause);
+    /// `peer` is where it was to go, or came from; none if nobody knows. `body` is the beginning of its body, [`BEGINNING_BYTES`] of it at
+    /// least; less only if it is shorter, or if its first part never came.
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause);
 }
 
 /// Takes what came from other nodes.

@@ -3,17 +3,16 @@
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
-use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name, Priority};
+use rohrpost_config::{Installation, Network, Route};
+use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name};
 use std::net::IpAddr;
 
-/// Levels of the queue; 0 goes first, the last takes what is not real time.
+/// Levels of the queue; 0 goes first, the last takes what is not real time: see [`Network::level`].
 pub const LEVELS: usize = 32;
 /// Least that a sender may have waiting: two of the largest packages.
 pub const QUOTA_BYTES_MIN: usize = 128 * 1024;
 /// The smallest datagram that a package of any size goes into, in parts.
 pub const DATAGRAM_BYTES_MIN: usize = 528;
-/// The largest that UDP carries over IPv4.
-pub const DATAGRAM_BYTES_MAX: usize = 65507;
 
 const _: () = {
     let part = DATAGRAM_BYTES_MIN - frame::HEAD_BYTES - FRAGMENT_HEAD_BYTES;
@@ -25,6 +24,7 @@ const _: () = {
         QUOTA_BYTES_MIN >= 2 * (BODY_BYTES_MAX + HEAD_BYTES),
         "a sender's next package fits behind the one that leaves"
     );
+    assert!(rohrpost_config::LEVEL_NOT_REAL_TIME as usize == LEVELS - 1, "configuration knows the same levels");
 };
 
 /// One router, and the network that it is on.
@@ -34,25 +34,17 @@ pub struct Settings {
     pub system: u8,
     /// Which of `nodes` it runs on.
     pub own: NodeIndex,
-    /// All nodes, in the order of the configuration; 255 at most.
+    /// All nodes, in the order of the configuration; [`NODES_MAX`](rohrpost_config::NODES_MAX) at most.
     pub nodes: Vec<NodeSettings>,
     /// What must be equal on both ends of a wire.
     pub digest: u64,
     /// Tells this life of the router from its others; not 0, and never the same again.
     pub incarnation: u64,
-    /// Largest datagram, as UDP's payload.
-    pub datagram_bytes_max: usize,
-    /// Bytes that a datagram takes on the wire besides its own: IP, UDP and Ethernet.
-    pub overhead_bytes: usize,
-    /// What may leave, wire bytes a second; not 0.
-    pub rate_bytes_s: u64,
-    /// What one sender may have waiting, heads included.
-    pub quota_bytes: usize,
-    /// Classes below this id are not real time.
-    pub bulk_below: u8,
+    /// How it sends.
+    pub network: Network,
     /// Where names are that are not on this node; sorted, without overlap.
     pub routes: Vec<Route>,
-    /// The modules of this node: each group has a quota, all other names have one together.
+    /// The modules of this node: the names of a group have a quota together, and so have all other names.
     pub senders: Vec<Vec<Name>>,
 }
 
@@ -65,27 +57,47 @@ pub struct NodeSettings {
     pub address: IpAddr,
 }
 
-/// Names that are on another node: from `first` to `last`, both included, by their numbers.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Route {
-    /// The lowest.
-    pub first: Name,
-    /// The highest.
-    pub last: Name,
-    /// The node.
-    pub node: NodeIndex,
+/// Why there is no router for a node.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum SettingsError {
+    /// There is one node.
+    #[error("the installation has one node, so it needs no router; add the other nodes and `[network]`")]
+    OneNode,
+    /// There is no such node.
+    #[error("the installation has no node `{0}`; it has {1}")]
+    NoNode(String, String),
 }
 
 impl Settings {
-    /// Bytes of a datagram on Ethernet that are not UDP's payload: preamble, head, check and gap of the frame (38), IP and UDP.
-    pub fn overhead_bytes(address: IpAddr) -> usize {
-        if address.is_ipv4() { 38 + 20 + 8 } else { 38 + 40 + 8 }
+    /// The router of a node. `incarnation`: never the same for two lives of it; not 0.
+    ///
+    /// # Errors
+    /// [`SettingsError`]
+    pub fn new(installation: &Installation, node: &str, incarnation: u64) -> Result<Self, SettingsError> {
+        let network = installation.network.ok_or(SettingsError::OneNode)?;
+        let Some(own) = installation.node_index(node) else {
+            let known: Vec<_> = installation.nodes.iter().map(|node| format!("`{}`", node.name)).collect();
+            return Err(SettingsError::NoNode(node.into(), known.join(", ")));
+        };
+        // With several nodes each has an address: configuration sees to it.
+        let address = |address: Option<IpAddr>| address.unwrap_or(IpAddr::V4(std::net::Ipv4Addr::UNSPECIFIED));
+        let nodes = installation.nodes.iter();
+        Ok(Self {
+            system: installation.system.id,
+            own,
+            nodes: nodes.map(|node| NodeSettings { name: node.name.clone(), address: address(node.address) }).collect(),
+            digest: installation.digest().lan(),
+            incarnation,
+            network,
+            routes: installation.routes_from(node),
+            senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
+        })
     }
 
-    /// The level of a priority: two to each value of the highest four bits, which are what counts on the wire (seed 002, 4.2);
-    /// the even ones are in use.
-    pub fn level(&self, priority: Priority) -> u8 {
-        if priority.0 < self.bulk_below { LEVELS as u8 - 1 } else { (15 - (priority.0 >> 4)) * 2 }
+    /// Bytes that IP and UDP put before each datagram; the rate counts them.
+    pub fn overhead_bytes(&self) -> usize {
+        let is_v6 = self.nodes.iter().any(|node| node.address.is_ipv6());
+        if is_v6 { 40 + 8 } else { 20 + 8 }
     }
 
     /// The node that a name is on; none for names of this node and for those that nobody has.

@@ -25,6 +25,7 @@ mod ping;
 mod published;
 mod run;
 mod send;
+mod sight;
 mod speech;
 mod status;
 mod summary;

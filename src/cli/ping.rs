@@ -5,7 +5,7 @@ use super::target::{Running, Target};
 use super::units::{Stop, seconds};
 use super::{Failure, say};
 use rohrpost::mailbox::{Latency, ModuleState};
-use rohrpost::survey::Survey;
+use rohrpost::survey::Scope;
 use rohrpost::{CallError, Name};
 use serde_json::json;
 use std::process::ExitCode;
@@ -89,7 +89,7 @@ fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64
 /// What shared memory tells of a module that does not answer, and what to do.
 fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
     let name = running.text(module);
-    let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
+    let survey = running.look(running.node_of(module), Scope::Module(module.raw()))?;
     let found = survey.module(module);
     Ok(match found.and_then(|found| found.process.as_ref().map(|process| (found, process))) {
         Some((found, process)) => format!(

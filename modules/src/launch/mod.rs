@@ -21,15 +21,18 @@ mod end;
 mod error;
 mod events;
 mod leftovers;
+mod look;
 mod policy;
 mod printed;
 mod program;
 mod serve;
 
-pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase};
+pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase, launcher_of};
+pub(crate) use control::{LOOK, LOOK_ON};
 pub use error::LaunchError;
 pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
+pub use look::{LOOK_BYTES_MAX, Look, LookError, LookPage};
 
 use crate::call::CallError;
 use crate::output::Relay;
@@ -38,6 +41,7 @@ use crate::survey::Survey;
 use child::Child;
 use end::Ending;
 use events::Bell;
+use look::Looks;
 use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as ConfiguredTime};
 use rohrpost_mailbox::{
     LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
@@ -76,6 +80,8 @@ pub struct Launch {
     switching: Vec<Option<u32>>,
     tool: ToolLink,
     counter: Counter,
+    /// What it saw for tools on other nodes.
+    looks: Looks,
     bell: Bell,
     lock: LaunchLock,
     _time: TimeKeeper,
@@ -134,8 +140,21 @@ impl Launch {
         drop(relay);
         let node_name = node_name.to_owned();
         let switching = vec![None; children.len()];
-        let mut launch =
-            Self { installation, node_name, node, children, switching, tool, counter, bell, lock, _time: time, notes };
+        let looks = Looks::default();
+        let mut launch = Self {
+            installation,
+            node_name,
+            node,
+            children,
+            switching,
+            tool,
+            counter,
+            looks,
+            bell,
+            lock,
+            _time: time,
+            notes,
+        };
         match launch.start_all() {
             Ok(()) => Ok(launch),
             Err(error) => Err(error.with(launch.stop())),
@@ -196,7 +215,9 @@ impl Launch {
     /// Answers tools, and removes what those leave that have ended, or were told to stay so.
     fn serve(&mut self, ending: bool) {
         let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
-        self.counter.serve(Orders { children, installation, node, ending }, &mut self.tool.link);
+        let orders =
+            Orders { children, installation, node, node_name: &self.node_name, looks: &mut self.looks, ending };
+        self.counter.serve(orders, &mut self.tool.link);
         // At the end all goes at once, with the node.
         if !ending {
             (0..self.children.len()).for_each(|index| self.remove_left_mailboxes(index));

@@ -240,7 +240,8 @@ impl Inbound {
             }
             Frame::Fragment(part) => {
                 way.peer.received.fragments.add(1);
-                let whole = peer.reassembly.take(now_ns, &part, |head, change| way.partial(head, change, deliver));
+                let whole =
+                    peer.reassembly.take(now_ns, &part, |head, body, change| way.partial(head, body, change, deliver));
                 if let Some(whole) = whole {
                     way.pass(is_old, &mut peer.order, position(whole.first, 0), &whole.head, whole.body, deliver);
                 }
@@ -261,7 +262,7 @@ impl Inbound {
         for from in self.settings.peers() {
             let way = Way { from, stats: &self.stats, peer: self.stats.peer(from) };
             let peer = &mut self.peers[usize::from(from)];
-            peer.reassembly.expire(now_ns, |head, change| way.partial(head, change, deliver));
+            peer.reassembly.expire(now_ns, |head, body, change| way.partial(head, body, change, deliver));
             if is_tick {
                 way.peer.received.lost.add(peer.window.tick());
             }
@@ -322,7 +323,7 @@ impl Peer {
         if self.incarnation != 0 {
             way.peer.received.lost.add(self.window.close());
             way.peer.received.restarts.add(1);
-            self.reassembly.clear(|head, change| way.partial(head, change, deliver));
+            self.reassembly.clear(|head, body, change| way.partial(head, body, change, deliver));
             self.order.clear();
             self.old[self.old_next % OLD_KEPT] = self.incarnation;
             self.old_next += 1;
@@ -411,23 +412,23 @@ impl Way<'_> {
     ) {
         self.peer.received.packages.add(1);
         if is_old {
-            return self.lose(head, Cause::Stale, deliver);
+            return self.lose(head, body, Cause::Stale, deliver);
         }
         if !order.admit(head, position) {
-            return self.lose(head, Cause::Late, deliver);
+            return self.lose(head, body, Cause::Late, deliver);
         }
         match deliver.deliver(self.from, head, body) {
             Ok(()) => self.stats.inn.passed(head.priority, head.len),
-            Err(NotDelivered::NoMailbox) => self.lose(head, Cause::NoMailbox, deliver),
-            Err(NotDelivered::MailboxFull) => self.lose(head, Cause::MailboxFull, deliver),
-            Err(NotDelivered::TooLarge) => self.lose(head, Cause::TooLarge, deliver),
+            Err(NotDelivered::NoMailbox) => self.lose(head, body, Cause::NoMailbox, deliver),
+            Err(NotDelivered::MailboxFull) => self.lose(head, body, Cause::MailboxFull, deliver),
+            Err(NotDelivered::TooLarge) => self.lose(head, body, Cause::TooLarge, deliver),
         }
     }
 
-    fn partial(&self, head: &Head, change: Change, deliver: &mut impl Deliver) {
+    fn partial(&self, head: &Head, body: &[u8], change: Change, deliver: &mut impl Deliver) {
         match change {
             Change::Began => self.stats.inn.came(head.priority),
-            Change::GivenUp => self.lose(head, Cause::Incomplete, deliver),
+            Change::GivenUp => self.lose(head, body, Cause::Incomplete, deliver),
         }
     }
 
@@ -438,8 +439,8 @@ impl Way<'_> {
         }
     }
 
-    fn lose(&self, head: &Head, cause: Cause, deliver: &mut impl Deliver) {
+    fn lose(&self, head: &Head, body: &[u8], cause: Cause, deliver: &mut impl Deliver) {
         self.stats.inn.lost(head.priority, cause);
-        deliver.lost(Some(self.from), head, cause);
+        deliver.lost(Some(self.from), head, body, cause);
     }
 }

@@ -108,9 +108,9 @@ impl Outbound {
         senders.sort_unstable();
         let others = settings.senders.len();
         Self {
-            queue: Queue::new(others + 1, settings.nodes.len(), settings.quota_bytes),
+            queue: Queue::new(others + 1, settings.nodes.len(), settings.network.quota_bytes),
             pace: Pace::new(settings),
-            levels: std::array::from_fn(|priority| settings.level(Priority(priority as u8))),
+            levels: std::array::from_fn(|priority| settings.network.level(Priority(priority as u8))),
             senders: senders.into(),
             others: others as u16,
             peers: vec![Peer::default(); settings.nodes.len()].into(),
@@ -132,7 +132,7 @@ impl Outbound {
         let peer = match self.admit(now_ns, &head, package.published_ns) {
             Ok(peer) => peer,
             Err((peer, cause)) => {
-                lose(&self.stats, peer, &head, cause, report);
+                lose(&self.stats, peer, &head, package.body, cause, report);
                 return Accepted::Lost;
             }
         };
@@ -142,14 +142,14 @@ impl Outbound {
         let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
         let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
         let stats = &self.stats;
-        let taken = self.queue.push(waiting, package.body, |gone| {
+        let taken = self.queue.push(waiting, package.body, |gone, body| {
             take_from_level(stats, gone.level);
-            lose(stats, Some(gone.peer), &gone.head, Cause::Quota, report);
+            lose(stats, Some(gone.peer), &gone.head, body, Cause::Quota, report);
         });
         if taken {
             self.stats.waiting[usize::from(level)].add(1);
         } else {
-            lose(&self.stats, Some(peer), &head, Cause::Quota, report);
+            lose(&self.stats, Some(peer), &head, package.body, Cause::Quota, report);
         }
         self.stats.waiting_bytes.set(self.queue.used_bytes());
         if taken { Accepted::Waits } else { Accepted::Lost }
@@ -160,7 +160,7 @@ impl Outbound {
     /// # Panics
     /// If it has not.
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
-        let datagram = &mut datagram[..self.settings.datagram_bytes_max];
+        let datagram = &mut datagram[..self.settings.network.datagram_bytes_max];
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
         }
@@ -189,15 +189,17 @@ impl Outbound {
         Output::Wait { until_ns: self.alive_ns }
     }
 
-    /// Says that the socket did not take what was to be sent last: the datagram, or the head of a package that was to leave at once.
-    pub fn unsent(&mut self, datagram: &[u8], report: &mut impl Report) {
+    /// Says that the socket did not take what was to be sent last: the datagram, and the body besides if it was [`Accepted::Send`].
+    pub fn unsent(&mut self, datagram: &[u8], body: &[u8], report: &mut impl Report) {
         let Some((head, mut rest)) = datagram.split_first_chunk::<{ frame::HEAD_BYTES }>() else { return };
         let (kind, peer) = (head[3], head[6]);
         self.stats.peer(peer).sent.unsent.add(1);
         if kind == Kind::Packages as u8 {
             while let Ok(head) = Head::from_bytes(rest) {
-                self.came_back(peer, &head, report);
-                rest = rest.get(PACKAGE_HEAD_BYTES + usize::from(head.len)..).unwrap_or_default();
+                rest = &rest[PACKAGE_HEAD_BYTES..];
+                let (inside, behind) = rest.split_at_checked(head.len.into()).unwrap_or((body, &[]));
+                self.came_back(peer, &head, inside, report);
+                rest = behind;
             }
         }
         if kind == Kind::Fragment as u8
@@ -209,15 +211,15 @@ impl Outbound {
             match under_way.filter(|place| self.queue.at(*place).parts > 0 && self.queue.at(*place).first == part.first)
             {
                 Some(place) => self.drop_out(place, Cause::Socket, report),
-                None => self.came_back(peer, &part.head, report),
+                None => self.came_back(peer, &part.head, &[], report),
             }
         }
     }
 
-    fn came_back(&mut self, peer: NodeIndex, head: &Head, report: &mut impl Report) {
+    fn came_back(&mut self, peer: NodeIndex, head: &Head, body: &[u8], report: &mut impl Report) {
         self.stats.peer(peer).sent.packages.take_back(1);
         self.stats.out.came_back(head.priority, head.len);
-        lose(&self.stats, Some(peer), head, Cause::Socket, report);
+        lose(&self.stats, Some(peer), head, body, Cause::Socket, report);
     }
 
     fn admit(&self, now_ns: u64, head: &Head, published_ns: u64) -> Result<NodeIndex, (Option<NodeIndex>, Cause)> {
@@ -246,11 +248,13 @@ impl Outbound {
 
     fn may_leave_at_once(&self, now_ns: u64, body_bytes: usize) -> bool {
         let bytes = DIRECT_HEAD_BYTES + body_bytes;
-        self.queue.is_empty() && bytes <= self.settings.datagram_bytes_max && self.pace.may_leave(now_ns).is_ok()
+        self.queue.is_empty()
+            && bytes <= self.settings.network.datagram_bytes_max
+            && self.pace.may_leave(now_ns).is_ok()
     }
 
     fn is_large(&self, waiting: &Waiting) -> bool {
-        DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.settings.datagram_bytes_max
+        DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.settings.network.datagram_bytes_max
     }
 
     fn direct(&mut self, now_ns: u64, peer: NodeIndex, head: &Head, body: &[u8]) -> [u8; DIRECT_HEAD_BYTES] {
@@ -357,15 +361,15 @@ impl Outbound {
         self.stats.out.passed(head.priority, head.len);
     }
 
-    fn take_out(&mut self, place: Place) -> Waiting {
-        let waiting = self.queue.remove(place);
+    fn take_out(&mut self, place: Place) {
+        let (waiting, _) = self.queue.remove(place);
         take_from_level(&self.stats, waiting.level);
-        waiting
     }
 
     fn drop_out(&mut self, place: Place, cause: Cause, report: &mut impl Report) {
-        let waiting = self.take_out(place);
-        lose(&self.stats, Some(waiting.peer), &waiting.head, cause, report);
+        let (waiting, body) = self.queue.remove(place);
+        take_from_level(&self.stats, waiting.level);
+        lose(&self.stats, Some(waiting.peer), &waiting.head, body, cause, report);
     }
 
     /// Drops what has waited too long behind others, and what goes to peers that are not there any more.
@@ -403,7 +407,7 @@ fn take_from_level(stats: &Stats, level: u8) {
     stats.waiting[usize::from(level)].take_back(1);
 }
 
-fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, cause: Cause, report: &mut impl Report) {
+fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause, report: &mut impl Report) {
     stats.out.lost(head.priority, cause);
-    report.lost(peer, head, cause);
+    report.lost(peer, head, body, cause);
 }

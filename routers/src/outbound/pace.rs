@@ -20,9 +20,9 @@ pub(super) struct Pace {
 
 impl Pace {
     pub(super) fn new(settings: &Settings) -> Self {
-        let byte = (1_000_000_000 << FRACTION) / u128::from(settings.rate_bytes_s.max(1));
-        let mut pace = Self { byte, overhead_bytes: settings.overhead_bytes, through_ns: 0, ahead_ns: 0 };
-        pace.ahead_ns = BURST_NS.saturating_sub(pace.takes_ns(settings.datagram_bytes_max));
+        let byte = (1_000_000_000 << FRACTION) / u128::from(settings.network.rate_bytes_s.max(1));
+        let mut pace = Self { byte, overhead_bytes: settings.overhead_bytes(), through_ns: 0, ahead_ns: 0 };
+        pace.ahead_ns = BURST_NS.saturating_sub(pace.takes_ns(settings.network.datagram_bytes_max));
         pace
     }
 

@@ -1,7 +1,9 @@
 //! Memory in blocks of one size: a body is a chain of them, written once and read once, front to back.
 
-/// Bytes of a block.
-pub(super) const BLOCK_BYTES: usize = 256;
+use crate::report::BEGINNING_BYTES;
+
+/// Bytes of a block: what is told of a lost package lies in its first.
+pub(super) const BLOCK_BYTES: usize = BEGINNING_BYTES;
 const NONE: u32 = u32::MAX;
 
 /// All blocks.
@@ -70,6 +72,12 @@ impl Blocks {
             chain.offset += count as u32;
             into = rest;
         }
+    }
+
+    /// The first of a body's bytes, also when they were read or freed, until others are stored.
+    pub(super) fn beginning(&self, chain: &Chain, len: u16) -> &[u8] {
+        let start = chain.first as usize * BLOCK_BYTES;
+        &self.bytes[start..start + BLOCK_BYTES.min(len.into())]
     }
 
     pub(super) fn free(&mut self, chain: Chain) {

@@ -15,7 +15,10 @@ use crate::frame::NodeIndex;
 use crate::settings::LEVELS;
 use blocks::{BLOCK_BYTES, Blocks, Chain};
 use list::{List, Lists};
+use rohrpost_config::NODES_MAX;
 use rohrpost_mailbox::Head;
+
+const _: () = assert!(NODES_MAX <= 64, "a level's peers are the bits of a word");
 
 /// A package that waits, without its body.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,8 +61,8 @@ pub struct Queue {
     free: List,
     peers: Box<[[List; LEVELS]]>,
     senders: Box<[Sender]>,
-    /// Peers with something on a level, 64 to a word.
-    busy: [[u64; 4]; LEVELS],
+    /// Peers with something on a level, one bit each.
+    busy: [u64; LEVELS],
     /// Levels with something, one bit each.
     levels: u32,
     quota_blocks: u32,
@@ -89,7 +92,7 @@ impl Queue {
             free: List::default(),
             peers: vec![[List::default(); LEVELS]; nodes].into(),
             senders: vec![Sender::default(); senders].into(),
-            busy: [[0; 4]; LEVELS],
+            busy: [0; LEVELS],
             levels: 0,
             quota_blocks: quota_blocks as u32,
             ticket: 0,
@@ -114,7 +117,7 @@ impl Queue {
     /// Lets a package wait. What has to give way for it is handed to `gone`; if nothing less important of the same sender can make room,
     /// the package itself is not taken.
     #[must_use]
-    pub fn push(&mut self, waiting: Waiting, body: &[u8], mut gone: impl FnMut(&Waiting)) -> bool {
+    pub fn push(&mut self, waiting: Waiting, body: &[u8], mut gone: impl FnMut(&Waiting, &[u8])) -> bool {
         let needed = Blocks::needed(body.len());
         if !self.make_room(usize::from(waiting.sender), waiting.level, needed, &mut gone) {
             return false;
@@ -127,7 +130,7 @@ impl Queue {
         self.used_blocks += needed;
         let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
         self.by_peer.append(&mut self.peers[peer][level], place);
-        self.busy[level][peer / 64] |= 1 << (peer % 64);
+        self.busy[level] |= 1 << peer;
         self.levels |= 1 << level;
         let sender = &mut self.senders[usize::from(waiting.sender)];
         self.by_sender.append(&mut sender.levels[level], place);
@@ -136,7 +139,7 @@ impl Queue {
         true
     }
 
-    fn make_room(&mut self, sender: usize, level: u8, needed: u32, gone: &mut impl FnMut(&Waiting)) -> bool {
+    fn make_room(&mut self, sender: usize, level: u8, needed: u32, gone: &mut impl FnMut(&Waiting, &[u8])) -> bool {
         let own = &self.senders[sender];
         let lower = usize::from(level) + 1;
         let yielding: u32 = own.blocks[lower..].iter().sum();
@@ -147,7 +150,8 @@ impl Queue {
             let last = self.senders[sender].levels[lower..].iter().rev().find_map(List::last);
             // There is one: what could give way was counted.
             let Some(last) = last else { return false };
-            gone(&self.remove(Place(last)));
+            let (waiting, beginning) = self.remove(Place(last));
+            gone(&waiting, beginning);
         }
         true
     }
@@ -158,7 +162,7 @@ impl Queue {
             return None;
         }
         let level = self.levels.trailing_zeros() as usize;
-        let firsts = bits(&self.busy[level]).filter_map(|peer| self.peers[peer][level].first());
+        let firsts = bits(self.busy[level]).filter_map(|peer| self.peers[peer][level].first());
         firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place)
     }
 
@@ -196,14 +200,14 @@ impl Queue {
         }
     }
 
-    /// Takes a package out.
-    pub fn remove(&mut self, place: Place) -> Waiting {
+    /// Takes a package out; with it comes the beginning of its body.
+    pub fn remove(&mut self, place: Place) -> (Waiting, &[u8]) {
         let Entry { waiting, body, .. } = self.entries[place.0 as usize];
         let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
         self.by_peer.remove(&mut self.peers[peer][level], place.0);
         if self.peers[peer][level].first().is_none() {
-            self.busy[level][peer / 64] &= !(1 << (peer % 64));
-            if self.busy[level] == [0; 4] {
+            self.busy[level] &= !(1 << peer);
+            if self.busy[level] == 0 {
                 self.levels &= !(1 << level);
             }
         }
@@ -216,17 +220,14 @@ impl Queue {
         self.used_blocks -= body.blocks();
         self.blocks.free(body);
         self.by_peer.prepend(&mut self.free, place.0);
-        waiting
+        (waiting, self.blocks.beginning(&body, waiting.head.len))
     }
 }
 
-fn bits(words: &[u64; 4]) -> impl Iterator<Item = usize> {
-    words.iter().enumerate().flat_map(|(at, word)| {
-        let mut rest = *word;
-        std::iter::from_fn(move || {
-            let bit = rest.checked_ilog2().map(|_| rest.trailing_zeros() as usize)?;
-            rest &= rest - 1;
-            Some(at * 64 + bit)
-        })
+fn bits(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (word != 0).then(|| word.trailing_zeros() as usize)?;
+        word &= word - 1;
+        Some(bit)
     })
 }
