@@ -80,7 +80,9 @@ fn networks_keep_their_promises() {
         let t = std::time::Instant::now();
         let outcome = simulate(seed);
         let d = t.elapsed();
-        if d.as_millis() > 200 { eprintln!("seed {seed} {} nodes {d:?} {:?}", Plan::new(seed).nodes.len(), outcome.seen["accepted"]); }
+        if d.as_millis() > 200 {
+            eprintln!("seed {seed} {} nodes {d:?} {:?}", Plan::new(seed).nodes.len(), outcome.seen["accepted"]);
+        }
         if !outcome.problems.is_empty() {
             eprintln!("seed {seed}: {:?}", outcome.problems[0]);
             bad.push(seed);

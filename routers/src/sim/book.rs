@@ -6,7 +6,9 @@
 //! ```
 
 use super::clock::Now;
+use super::times::Times;
 use crate::frame::{Frame, NodeIndex};
+use crate::time::Term;
 use rohrpost_mailbox::{Head, Name};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
@@ -68,6 +70,11 @@ pub enum Role {
         call: usize,
         /// What it says.
         answer: super::calls::Answer,
+    },
+    /// A router's answer to a command that it could not deliver. It has no place among those of the module for which it speaks.
+    Report {
+        /// Which call.
+        call: usize,
     },
 }
 
@@ -212,6 +219,10 @@ pub struct Book {
     pattern: Vec<u8>,
     /// Level of a priority.
     bulk_below: u8,
+    /// System time.
+    pub times: Times,
+    /// The master, and its term, that all nodes must agree on by now.
+    pub master: Option<(Option<NodeIndex>, Term)>,
     /// Packages that came to an end at a receiver's side.
     pub delivered_or_lost: u64,
     /// Whether damaged datagrams were handed to routers; then not all is theirs.
@@ -250,7 +261,7 @@ impl Book {
         head.id = *id;
         self.by_head.insert(key(&head), number);
         let place = self.places.entry((head.from, head.to, head.priority.0)).or_default();
-        *place += 1;
+        *place += u32::from(!matches!(role, Role::Report { .. }));
         self.packages.push(Package {
             head,
             from_node: nodes.0 as NodeIndex,
@@ -469,6 +480,7 @@ impl Book {
         let twice = package.deliveries.contains(&lives);
         package.deliveries.push(lives);
         let (head, place) = (package.head, package.place);
+        let has_place = !twice && !redelivered && !matches!(package.role, Role::Report { .. });
         if twice {
             self.broken(
                 now,
@@ -479,7 +491,7 @@ impl Book {
         let last = self.last.entry((head.from, head.to, head.priority.0, life)).or_default();
         let before = *last;
         *last = before.max(place);
-        if place <= before && !twice && !redelivered {
+        if place <= before && has_place {
             let text = format!("package {number}, the {place}th of {head:?}, was delivered after the {before}th");
             self.broken(now, Promise::Order, text);
         }
