@@ -15,4 +15,4 @@ pub mod nodes;
 pub mod udp;
 pub mod wire;
 
-pub use wire::Wire;
+pub use wire::{Wire, prepare};

@@ -21,7 +21,8 @@ const WHOLE: usize = 65_535;
 
 /// What all turns of a case happen on.
 struct Ground {
-    wire: Wire,
+    /// None where there may be no namespaces.
+    wire: Result<Wire, Failure>,
     /// None where there is no command, or it does not start: then ours has no figure, and the floors still have.
     nodes: Result<Nodes, Failure>,
     turns: Counter<u8>,
@@ -29,10 +30,15 @@ struct Ground {
 
 impl Ground {
     /// Makes the network and starts the routers.
-    fn new(settings: &Settings, network: &Network) -> Result<Self, Failure> {
-        let wire = Wire::new()?;
-        let nodes = Nodes::start(&wire, network, settings.command());
-        Ok(Self { wire, nodes, turns: Counter::new(0) })
+    fn new(settings: &Settings, network: &Network) -> Self {
+        let wire = Wire::new();
+        let nodes =
+            wire.as_ref().map_err(Clone::clone).and_then(|wire| Nodes::start(wire, network, settings.command()));
+        Self { wire, nodes, turns: Counter::new(0) }
+    }
+
+    fn wire(&self) -> Result<&Wire, Failure> {
+        self.wire.as_ref().map_err(Clone::clone)
     }
 
     /// For a turn of ours: the nodes, and its number.
