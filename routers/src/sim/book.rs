@@ -326,7 +326,11 @@ impl Book {
         let taken = self.taken.entry((life, head.incarnation)).or_default();
         taken.highest = taken.highest.max(head.sequence);
         if !taken.sequences.insert(head.sequence) {
-            self.broken(now, Promise::NoCopies, format!("datagram {} of {:#x} was taken twice", head.sequence, head.incarnation));
+            self.broken(
+                now,
+                Promise::NoCopies,
+                format!("datagram {} of {:#x} was taken twice", head.sequence, head.incarnation),
+            );
         }
         match frame {
             Frame::Packages(packages) => {
@@ -348,7 +352,10 @@ impl Book {
         let Ok((head, _)) = Frame::parse(datagram) else { return };
         let taken = self.taken.entry((life, head.incarnation)).or_default();
         if !taken.sequences.contains(&head.sequence) && head.sequence + window > taken.highest {
-            let text = format!("datagram {} was dropped as a copy; it is the first, {} the highest", head.sequence, taken.highest);
+            let text = format!(
+                "datagram {} was dropped as a copy; it is the first, {} the highest",
+                head.sequence, taken.highest
+            );
             self.broken(now, Promise::Accounts, text);
         }
     }
@@ -357,7 +364,11 @@ impl Book {
         let receipt = self.receipts.entry((life, number)).or_default();
         (receipt.parts, receipt.of) = (receipt.parts + 1, of);
         if receipt.parts == of && !receipt.ended {
-            self.broken(now, Promise::Accounts, format!("package {number} came whole, and was neither delivered nor counted"));
+            self.broken(
+                now,
+                Promise::Accounts,
+                format!("package {number} came whole, and was neither delivered nor counted"),
+            );
         }
     }
 
@@ -421,7 +432,11 @@ impl Book {
         package.deliveries.push(lives);
         let (head, place) = (package.head, package.place);
         if twice {
-            self.broken(now, Promise::NoCopies, format!("package {number} was delivered twice by one router: {head:?}"));
+            self.broken(
+                now,
+                Promise::NoCopies,
+                format!("package {number} was delivered twice by one router: {head:?}"),
+            );
         }
         let last = self.last.entry((head.from, head.to, head.priority.0, life)).or_default();
         let before = *last;

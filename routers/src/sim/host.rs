@@ -51,7 +51,8 @@ impl Transit {
 
     /// The most urgent; of those, the first.
     pub fn take(&mut self) -> Option<Parcel> {
-        let first = self.waiting.iter().enumerate().max_by_key(|(at, parcel)| (parcel.head.priority.0, usize::MAX - at));
+        let first =
+            self.waiting.iter().enumerate().max_by_key(|(at, parcel)| (parcel.head.priority.0, usize::MAX - at));
         first.map(|(at, _)| at).map(|at| self.waiting.remove(at))
     }
 

@@ -11,8 +11,9 @@ use crate::inbound::{self, Datagram, Inbound, WINDOW};
 use crate::link::State;
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::settings::{NodeSettings, Route, Settings};
+use crate::settings::{NodeSettings, Settings};
 use crate::stats::{Cause, Side, Stats};
+use rohrpost_config::{Network, Route};
 use rohrpost_mailbox::{Head, Kind, Options, Type};
 use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
@@ -45,11 +46,14 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
         nodes: nodes.collect(),
         digest: 0x1234_5678,
         incarnation,
-        datagram_bytes_max: plan.shape.datagram_bytes_max,
-        overhead_bytes: Settings::overhead_bytes(address(node)),
-        rate_bytes_s: plan.shape.rate_bytes_s,
-        quota_bytes: plan.shape.quota_bytes,
-        bulk_below: plan.shape.bulk_below,
+        network: Network {
+            datagram_bytes_max: plan.shape.datagram_bytes_max,
+            rate_bytes_s: plan.shape.rate_bytes_s,
+            quota_bytes: plan.shape.quota_bytes,
+            bulk_below: plan.shape.bulk_below,
+            port: 21117,
+            mtu: u16::MAX,
+        },
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
     }
@@ -78,8 +82,8 @@ impl Packages {
         Self {
             outbound: Outbound::new(settings, stats.clone()),
             inbound: Inbound::new(settings, stats.clone()),
-            buffer: vec![0; settings.datagram_bytes_max.max(1500)],
-            queue_bytes_max: (settings.quota_bytes as u64 + 1024) * (settings.senders.len() as u64 + 1),
+            buffer: vec![0; settings.network.datagram_bytes_max.max(1500)],
+            queue_bytes_max: (settings.network.quota_bytes as u64 + 1024) * (settings.senders.len() as u64 + 1),
             in_hand: None,
             lost_before: None,
             undelivered: Vec::new(),
@@ -105,7 +109,9 @@ impl Packages {
     fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) {
         let package = Package { head, published_ns, body };
         let mut watch = Watch { io, is_out: true, undelivered: &mut self.undelivered };
-        if let Accepted::Send { to, head } = self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch) {
+        if let Accepted::Send { to, head } =
+            self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch)
+        {
             let bytes: Rc<[u8]> = head.iter().chain(body).copied().collect();
             io.book.saw("sent at once");
             self.send(io, to, bytes);
@@ -115,7 +121,7 @@ impl Packages {
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
         if io.host.unsendable > 0 && io.chance.percent(50) {
             let mut watch = Watch { io, is_out: true, undelivered: &mut self.undelivered };
-            return self.outbound.unsent(&bytes, &mut watch);
+            return self.outbound.unsent(&bytes, &[], &mut watch);
         }
         io.book.leaves(io.now, io.life, &bytes);
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
@@ -309,7 +315,7 @@ struct Watch<'a, 'b> {
 }
 
 impl Report for Watch<'_, '_> {
-    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, cause: Cause) {
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, _body: &[u8], cause: Cause) {
         let io = &mut *self.io;
         io.book.saw(cause.word());
         io.line(|| format!("{}: from or to {peer:?}, {head:?}", cause.word()));

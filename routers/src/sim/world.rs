@@ -330,7 +330,9 @@ impl<'a> World<'a> {
     }
 
     pub(super) fn wake_at(&mut self, node: usize, at_ns: u64) {
-        if at_ns <= self.plan.end_ns && self.stations[node].wake_ns.is_none_or(|before| at_ns < before || before <= self.now_ns) {
+        if at_ns <= self.plan.end_ns
+            && self.stations[node].wake_ns.is_none_or(|before| at_ns < before || before <= self.now_ns)
+        {
             self.stations[node].wake_ns = Some(at_ns);
             self.at(at_ns, Event::Wake { node });
         }

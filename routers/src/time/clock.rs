@@ -658,7 +658,7 @@ impl Clock {
         let TimeSettings { system, own: from, digest, incarnation, .. } = self.settings;
         let head = FrameHead { kind: message.kind(), system, from, to, digest, incarnation, sequence };
         let rest = message.to_bytes();
-        datagram[..HEAD_BYTES].copy_from_slice(&head.to_bytes());
+        datagram[..HEAD_BYTES].copy_from_slice(&head.to_bytes(&[&rest]));
         datagram[HEAD_BYTES..].copy_from_slice(&rest);
         let stamped = matches!(message, Message::Sync(_) | Message::Request(Request { id: 1.., .. }));
         Some(stamped.then_some(SentId { to, sequence }))
