@@ -12,6 +12,7 @@ pub mod chain;
 pub mod ends;
 pub mod flow;
 pub mod nodes;
+pub mod rtnet;
 pub mod udp;
 pub mod wire;
 

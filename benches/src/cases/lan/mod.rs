@@ -1,5 +1,6 @@
 //! Two nodes on a network of their own: how long a package takes over two routers, how many go, what is urgent past a flood.
 
+mod clock;
 mod hop;
 mod rates;
 mod urgent;
@@ -13,7 +14,7 @@ use std::cell::Cell as Counter;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [hop::cases(), rates::cases(), urgent::cases()].into_iter().flatten().collect()
+    [hop::cases(), rates::cases(), urgent::cases(), clock::cases()].into_iter().flatten().collect()
 }
 
 /// As large as a datagram can be, so that none is parted.
