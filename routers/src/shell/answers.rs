@@ -6,14 +6,9 @@ use crate::link::State;
 use crate::report::Mismatch;
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
-use rohrpost_mailbox::{Head, Kind, Name, Options, Participant, Type, monotonic_ns};
+use rohrpost_mailbox::{Head, Kind, Options, Participant, Type, monotonic_ns};
 use std::sync::Arc;
 
-/// Bytes of a command's body that its answer may need.
-pub const CALL_BYTES: usize = 32;
-/// Commands whose beginnings are remembered while they wait in the queue. Of one that waits behind so many others the beginning is
-/// gone, and so its sender gets no answer.
-const CALLS_KEPT: usize = 1024;
 /// Longest answer.
 const ANSWER_BYTES_MAX: usize = 1024;
 
@@ -32,18 +27,8 @@ pub struct Undelivered<'a> {
 
 /// Writes the bodies of such answers: what a fault looks like is not the routers' business.
 pub trait Faults: Send + Sync {
-    /// Appends the answer to a command whose body begins with these bytes; false when it is not one that can be answered.
+    /// Appends the answer to a command whose body begins with these bytes ([`BEGINNING_BYTES`](crate::report::BEGINNING_BYTES) of it at least); false when it is not one that can be answered.
     fn write(&self, call: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool;
-}
-
-/// The beginning of a command that waits.
-#[derive(Clone, Copy, Default)]
-struct Call {
-    from: Name,
-    to: Name,
-    id: u16,
-    len: u8,
-    bytes: [u8; CALL_BYTES],
 }
 
 /// Answers in the name of modules that cannot.
@@ -52,8 +37,6 @@ pub(super) struct Answers {
     stats: Arc<Stats>,
     faults: Arc<dyn Faults>,
     ways: Ways,
-    /// By a number made of `from` and `id`.
-    calls: Box<[Call]>,
     body: Vec<u8>,
 }
 
@@ -69,28 +52,21 @@ impl Answers {
             stats: stats.clone(),
             faults: faults.clone(),
             ways: Ways::new(participant, Reach::Everywhere),
-            calls: vec![Call::default(); CALLS_KEPT].into(),
             body: Vec::with_capacity(ANSWER_BYTES_MAX),
         }
     }
 
-    /// Remembers how a command begins, before its body goes out of sight.
-    pub(super) fn note(&mut self, head: &Head, body: &[u8]) {
-        if !matches!(head.kind.kind(), Kind::Command(_)) {
-            return;
-        }
-        let len = body.len().min(CALL_BYTES);
-        let call = &mut self.calls[place(head)];
-        (call.from, call.to, call.id, call.len) = (head.from, head.to, head.id, len as u8);
-        call.bytes[..len].copy_from_slice(&body[..len]);
-    }
-
-    /// Answers a command whose beginning was noted; all other packages nobody waits for.
-    pub(super) fn answer(&mut self, peer: Option<NodeIndex>, head: &Head, cause: Cause, takes_bytes: Option<usize>) {
+    /// Answers a command, of whose body this is the beginning; for all other packages nobody waits.
+    pub(super) fn answer(
+        &mut self,
+        peer: Option<NodeIndex>,
+        head: &Head,
+        body: &[u8],
+        cause: Cause,
+        takes_bytes: Option<usize>,
+    ) {
         let Kind::Command(number) = head.kind.kind() else { return };
-        let call = self.calls[place(head)];
-        let noted = (call.from, call.to, call.id) == (head.from, head.to, head.id);
-        if !noted || !head.from.is_mailbox() {
+        if !head.from.is_mailbox() {
             return;
         }
         let settings = self.settings.clone();
@@ -101,7 +77,7 @@ impl Answers {
         });
         let why = Undelivered { cause, node: node.map(|node| node.name.as_str()), mismatch, takes_bytes };
         self.body.clear();
-        if !self.faults.write(&call.bytes[..usize::from(call.len)], &why, &mut self.body) {
+        if !self.faults.write(body, &why, &mut self.body) {
             return;
         }
         let answer = Head {
@@ -115,9 +91,4 @@ impl Answers {
         // Who has gone, or takes no more answers, waits for its timeout.
         let _ = self.ways.send(&answer, &self.body);
     }
-}
-
-/// Where the beginning of a command is kept: those of one sender lie one behind the other.
-fn place(head: &Head) -> usize {
-    (head.from.raw().wrapping_mul(0x9e37_79b1) as usize >> 16).wrapping_add(head.id.into()) % CALLS_KEPT
 }

@@ -64,15 +64,14 @@ pub(super) struct Desk {
 }
 
 impl Report for Desk {
-    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, cause: Cause) {
-        self.answers.answer(peer, head, cause, self.takes_bytes.take());
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
+        self.answers.answer(peer, head, body, cause, self.takes_bytes.take());
     }
 }
 
 impl Deliver for Desk {
     fn deliver(&mut self, _from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
         let Err(error) = self.ways.send(head, body) else { return Ok(()) };
-        self.answers.note(head, body);
         Err(match error {
             SendError::Full(_) | SendError::InUse(_) => NotDelivered::MailboxFull,
             SendError::TooLarge { max, .. } => {

@@ -40,8 +40,8 @@ pub(super) struct Departures {
 }
 
 impl Report for Answers {
-    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, cause: Cause) {
-        self.answer(peer, head, cause, None);
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
+        self.answer(peer, head, body, cause, None);
     }
 }
 
@@ -71,13 +71,12 @@ impl Departures {
             let Some(waiting) = transit.try_receive() else { return taken };
             let (now_ns, body) = (monotonic_ns(), waiting.body());
             let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body };
-            answers.note(&package.head, body);
             let alone = taken == 0 && !waiting.is_followed();
             if let Accepted::Send { to, head } = outbound.accept(now_ns, &package, alone, answers)
                 && let Err(failure) = wire.send(now_ns, to, &[IoSlice::new(&head), IoSlice::new(body)])
                 && failure.is_loss()
             {
-                outbound.unsent(&head, answers);
+                outbound.unsent(&head, body, answers);
             }
         }
         BURST
@@ -87,7 +86,7 @@ impl Departures {
         let datagram = &self.datagram[..bytes];
         let sent = self.wire.send(monotonic_ns(), to, &[IoSlice::new(datagram)]);
         if sent.is_err_and(Failure::is_loss) {
-            self.outbound.unsent(datagram, &mut self.answers);
+            self.outbound.unsent(datagram, &[], &mut self.answers);
         }
     }
 
@@ -113,16 +112,11 @@ pub(super) struct Wire {
 }
 
 impl Wire {
-    pub(super) fn new(
-        settings: &Arc<Settings>,
-        port: u16,
-        impair: Option<impair::Settings>,
-        failures: &Arc<Failures>,
-    ) -> Self {
+    pub(super) fn new(settings: &Arc<Settings>, impair: Option<impair::Settings>, failures: &Arc<Failures>) -> Self {
         let own = settings.nodes[usize::from(settings.own)].address;
         let socket = |node: NodeIndex| {
             let peer = settings.nodes[usize::from(node)].address;
-            (node != settings.own).then(|| OutSocket::new(own, (peer, port).into()))
+            (node != settings.own).then(|| OutSocket::new(own, (peer, settings.network.port).into()))
         };
         Self {
             sockets: (0..settings.nodes.len() as NodeIndex).map(socket).collect(),

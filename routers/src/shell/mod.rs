@@ -18,15 +18,14 @@ mod arrivals;
 mod departures;
 mod failure;
 mod news;
-mod plan;
 mod socket;
 mod threads;
+mod transit;
 mod ways;
 
-pub use answers::{CALL_BYTES, Faults, Undelivered};
+pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
 pub use news::difference;
-pub use plan::plan;
 pub use socket::SocketError;
 
 use crate::impair;
@@ -38,18 +37,13 @@ use answers::Answers;
 use arrivals::{Arrivals, Desk};
 use departures::{Departures, Wire};
 use news::News;
-use rohrpost_config::TRANSIT;
-use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, Shape, monotonic_ns};
+use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
 use socket::InSocket;
 use std::io;
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use threads::Shared;
 use ways::{Reach, Ways};
-
-/// Slots of the router's mailbox that one participant may be filling: as many mailboxes of other nodes as it may send to.
-const CLAIMS: u8 = u8::MAX;
 
 /// Why a router did not start.
 #[derive(Debug, thiserror::Error)]
@@ -76,8 +70,6 @@ pub struct Parts<'a> {
     pub name: Name,
     /// Who it is, who the others are.
     pub settings: Settings,
-    /// Where it takes datagrams; the others take theirs at the same port.
-    pub own: SocketAddr,
     /// How commands are answered that cannot be delivered.
     pub faults: Arc<dyn Faults>,
     /// A bad network between it and its sockets.
@@ -100,7 +92,8 @@ impl Shell {
     /// # Errors
     /// [`ShellError`]
     pub fn start(parts: Parts<'_>) -> Result<Self, ShellError> {
-        let Parts { node, name, settings, own, faults, impair } = parts;
+        let Parts { node, name, settings, faults, impair } = parts;
+        let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
         let socket = Arc::new(InSocket::open(own)?);
         if socket.receive_bytes < InSocket::WANTED_BYTES {
             tracing::debug!(
@@ -113,18 +106,18 @@ impl Shell {
         let stats = Stats::new(&settings, monotonic_ns());
         let failures = Arc::new(Failures::default());
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
-        let via = plan::transit(name);
-        let transit = sender.receiver(via, transit_shape())?;
-        node.set_routes(via, &plan::ranges(&settings.routes))?;
+        let via = transit::name(name);
+        let mailbox = sender.receiver(via, transit::shape())?;
+        node.set_routes(via, &transit::ranges(&settings.routes))?;
         let shared = Arc::new(Shared::new(&sender));
         let answers = |participant| Answers::new(&settings, &stats, &faults, participant);
         let departures = Departures {
             shared: shared.clone(),
-            transit,
+            transit: mailbox,
             outbound: Outbound::new(&settings, stats.clone()),
             answers: answers(&sender),
-            wire: Wire::new(&settings, own.port(), impair, &failures),
-            datagram: vec![0; settings.datagram_bytes_max].into(),
+            wire: Wire::new(&settings, impair, &failures),
+            datagram: vec![0; settings.network.datagram_bytes_max].into(),
         };
         let arrivals = Arrivals {
             shared: shared.clone(),
@@ -192,15 +185,5 @@ impl Drop for Shell {
             // One that panicked has said so.
             let _ = thread.join();
         }
-    }
-}
-
-fn transit_shape() -> Shape {
-    Shape {
-        slots: TRANSIT.slots,
-        body_bytes_max: TRANSIT.size.min(u16::MAX.into()) as u16,
-        full: TRANSIT.full,
-        max_age: TRANSIT.max_age,
-        claims: CLAIMS,
     }
 }

@@ -2,10 +2,11 @@
 
 use rohrpost::Fault;
 use rohrpost_modules::call::CallEnvelope;
-use rohrpost_routers::shell::{CALL_BYTES, Faults, Undelivered, difference};
+use rohrpost_routers::report::BEGINNING_BYTES;
+use rohrpost_routers::shell::{Faults, Undelivered, difference};
 use rohrpost_routers::stats::Cause;
 
-const _: () = assert!(CALL_BYTES >= CallEnvelope::BYTES, "the answer needs the command's envelope");
+const _: () = assert!(BEGINNING_BYTES >= CallEnvelope::BYTES, "the answer needs the command's envelope");
 
 /// Writes them as modules write theirs.
 pub(super) struct Encoded {

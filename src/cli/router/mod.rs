@@ -4,13 +4,14 @@ mod faults;
 mod links;
 
 use super::Failure;
-use rohrpost::config::{Installation, Network};
+use rohrpost::config::Network;
 use rohrpost::interfaces::{Router, RouterInterface};
 use rohrpost::mailbox::realtime_ns;
 use rohrpost::{Context, Module, ModuleError, Start};
 use rohrpost_modules::runtime::{exit, run_started};
 use rohrpost_routers::impair;
-use rohrpost_routers::shell::{Parts, Shell, plan};
+use rohrpost_routers::settings::Settings;
+use rohrpost_routers::shell::{Parts, Shell};
 use serde::Deserialize;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -35,7 +36,7 @@ pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Settings {}
+struct NoSettings {}
 
 struct RouterModule {
     shell: Shell,
@@ -44,20 +45,21 @@ struct RouterModule {
 impl Router for RouterModule {}
 
 impl Module for RouterModule {
-    type Settings = Settings;
+    type Settings = NoSettings;
     type Interfaces = RouterInterface;
 
-    fn new(_: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         let installation = context.installation();
         let impair = impairment()?;
-        let (settings, own) = planned(installation, context.me())?;
+        let node = installation.node_of(context.me()).unwrap_or_default();
+        let settings = Settings::new(installation, node, realtime_ns())?;
         tracing::warn!("{}", Network::UNPROTECTED);
         if let Some(impair) = impair {
             tracing::warn!("makes the network worse, as {} says: {impair}", impair::ENVIRONMENT);
         }
         let faults = Arc::new(faults::Encoded::new(settings.digest));
         let node = context.link().borrow().participant().node().clone();
-        let shell = Shell::start(Parts { node: &node, name: context.me(), settings, own, faults, impair })?;
+        let shell = Shell::start(Parts { node: &node, name: context.me(), settings, faults, impair })?;
         context.set_period(PERIOD);
         Ok(Self { shell })
     }
@@ -68,16 +70,6 @@ impl Module for RouterModule {
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
         Ok(())
     }
-}
-
-/// What the configuration says to this router.
-fn planned(
-    installation: &Installation,
-    me: rohrpost::Name,
-) -> Result<(rohrpost_routers::settings::Settings, std::net::SocketAddr), ModuleError> {
-    let node = installation.node_of(me).ok_or_else(|| ModuleError::new("the configuration has no such router"))?;
-    let planned = plan(installation, node, realtime_ns());
-    planned.ok_or_else(|| ModuleError::new("the configuration has one node only, which needs no router"))
 }
 
 /// The bad network that a test wants.
