@@ -34,7 +34,7 @@ proptest! {
         wire in prop::collection::vec(wire(), 64),
     ) {
         let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
-        let (mut now_ns, mut on_wire, mut left, mut lost_on_wire) = (START, Vec::new(), 0usize, 0u64);
+        let (mut now_ns, mut busy_ns, mut on_wire, mut left, mut lost_on_wire) = (START, START, Vec::new(), 0usize, 0u64);
         let mut bodies = HashMap::new();
         let mut steps = packages.into_iter();
         loop {
@@ -68,8 +68,11 @@ proptest! {
                 base.take(now_ns, 1, &on_wire.remove(0).1);
             }
             base.refusals(now_ns);
+            if step.is_some() || !on_wire.is_empty() {
+                busy_ns = now_ns;
+            }
             // Long after the last, so that all that is missing was given up, and every part.
-            if step.is_none() && on_wire.is_empty() && now_ns > START + 10 * S {
+            if now_ns > busy_ns + 3 * S {
                 break;
             }
         }
