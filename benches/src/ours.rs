@@ -3,6 +3,7 @@
 use crate::harness::{End, Failure, Link, Meetings};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Receiver, Sender, Shape, Type, Waiting};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// How long a spinning receiver looks before it sleeps: longer than any message takes, so that it never sleeps.
@@ -74,6 +75,51 @@ impl Link for Mailboxes {
             return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), self.bytes)));
         }
         message.copy_from_slice(&body[..message.len()]);
+        Ok(())
+    }
+}
+
+/// A process of a chain: its mailbox, if it receives, and the way into another's, opened when it is first used.
+pub struct Station {
+    participant: Arc<Participant>,
+    receiver: Option<Receiver>,
+    other: Name,
+    sender: Option<Sender>,
+}
+
+impl Station {
+    /// On the node in this directory.
+    ///
+    /// # Errors
+    /// When the mailbox cannot be made.
+    pub fn open(directory: &Path, own: Option<Name>, other: Name, bytes: usize) -> Result<Self, Failure> {
+        let failed = |error: &dyn std::fmt::Display| Failure::of("mailbox", error);
+        let body_bytes_max = u16::try_from(bytes).map_err(|error| failed(&error))?;
+        let node = Node::create(directory, 0o700).map_err(|error| failed(&error))?;
+        let participant = Participant::join(&node, own.unwrap_or(Name::NONE)).map_err(|error| failed(&error))?;
+        let shape = Shape { body_bytes_max, ..Shape::default() };
+        let receiver = own.map(|own| participant.receiver(own, shape)).transpose().map_err(|error| failed(&error))?;
+        Ok(Self { participant, receiver, other, sender: None })
+    }
+}
+
+impl Link for Station {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        let sender = match &mut self.sender {
+            Some(sender) => sender,
+            none => none.insert(self.participant.sender(self.other).map_err(|error| Failure::of("sender", error))?),
+        };
+        let label = Label { kind: Type::data(0), ..Label::default() };
+        sender.send(&label, &[message]).map_err(|error| Failure::of("send", error))
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        let receiver = self.receiver.as_mut().ok_or_else(|| Failure::Failed("it has no mailbox".into()))?;
+        let package = receiver.receive();
+        match package.body() {
+            body if body.len() == message.len() => message.copy_from_slice(body),
+            body => return Err(Failure::Failed(format!("{} bytes came, not {}", body.len(), message.len()))),
+        }
         Ok(())
     }
 }

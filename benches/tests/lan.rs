@@ -11,14 +11,16 @@ use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal,
 
 const CBWARE: &str = "CBWare, its table";
 
+const HOP: &[&str] = &["chain", "chain of mailboxes", "udp"];
+
 /// The cases: a size, and who is in it besides ours.
 const CASES: [(&str, u64, &[&str]); 14] = [
-    ("hop", 64, &["chain", "udp"]),
-    ("hop", 1024, &["chain", "udp"]),
-    ("hop", 16_384, &["chain", "udp"]),
-    ("hop", 62_000, &["chain", "udp"]),
-    ("hop, paced", 64, &["chain", "udp"]),
-    ("hop, in fragments", 16_384, &["chain", "udp"]),
+    ("hop", 64, HOP),
+    ("hop", 1024, HOP),
+    ("hop", 16_384, HOP),
+    ("hop", 62_000, HOP),
+    ("hop, paced", 64, HOP),
+    ("hop, in fragments", 16_384, HOP),
     ("rate", 64, &["udp"]),
     ("rate", 2112, &["udp", CBWARE]),
     ("rate", 5860, &["udp", CBWARE]),

@@ -33,11 +33,13 @@ pub enum TimeSource {
     Simulation = 2,
     /// A log that is played.
     Log = 3,
+    /// The master of the system's time, by way of the node's router.
+    Master = 4,
 }
 
 impl TimeSource {
     fn from_code(code: u64) -> Option<Self> {
-        [Self::Local, Self::Simulation, Self::Log].into_iter().find(|source| *source as u64 == code)
+        [Self::Local, Self::Simulation, Self::Log, Self::Master].into_iter().find(|source| *source as u64 == code)
     }
 
     /// One word for tables.
@@ -46,6 +48,7 @@ impl TimeSource {
             Self::Local => "local",
             Self::Simulation => "simulation",
             Self::Log => "log",
+            Self::Master => "master",
         }
     }
 }

@@ -1,15 +1,52 @@
 //! What runs on a node and what it does, read from shared memory: looking changes nothing.
+//!
+//! ```text
+//!  this node:      shared memory ──▶ Survey
+//!  another node:   shared memory ──▶ Survey ──form──▶ pages of its launch (`launch::look`) ──distant──▶ Survey
+//! ```
+//!
+//! A package that goes to another node is counted by its sender there, and once more by the router that delivers it here under
+//! the sender's name: such a flow is a *hop* ([`is_hop`]). Who adds up several nodes leaves hops out, but for those from nodes
+//! that do not answer. It is also received twice, first in the transit mailbox of its own node's router: of such mailboxes only
+//! the losses are in [`Survey::classes`].
 
-use rohrpost_config::Installation;
+mod distant;
+mod form;
+mod usage;
+
+pub use distant::{Distant, LookFailure, look_at_all};
+pub use form::Seen;
+pub use usage::Usage;
+
+use postcard_schema::Schema;
+use rohrpost_config::{Installation, ROUTER};
+use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
 use rohrpost_mailbox::{
-    ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, Name, Node, NodeError, ParticipantInfo, local, saturating_sum,
+    ClassTraffic, FlowInfo, InspectError, Latency, Loss, MailboxDetail, MailboxInfo, Name, Node, NodeError,
+    ParticipantInfo, SlotInfo, local, monotonic_ns, saturating_sum,
 };
-use std::time::Instant;
+use serde::{Deserialize, Serialize};
+
+/// How much of a node is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Scope {
+    /// Its modules, and the traffic by class.
+    Modules,
+    /// These and all mailboxes.
+    Mailboxes,
+    /// These and what everybody sends.
+    All,
+    /// What there is of one module (its raw name): its mailboxes and those that it sends to, what it sends and what is sent to it.
+    Module(u32),
+}
 
 /// A node at one moment.
+#[derive(Clone, Debug)]
 pub struct Survey {
-    /// When it was made.
-    pub at: Instant,
+    /// The node's name.
+    pub node: String,
+    /// When it was made, ns of that node's monotonic clock; so are all other times in it.
+    pub at_ns: u64,
     /// Modules, in the order of the configuration, then those it does not name.
     pub modules: Vec<ModuleSurvey>,
     /// All mailboxes, in order of their names.
@@ -23,12 +60,20 @@ pub struct Survey {
 /// A module at one moment.
 #[derive(Clone, Debug)]
 pub struct ModuleSurvey {
+    /// Its node.
+    pub node: String,
+    /// When it was looked at, ns of that node's monotonic clock; none when the node does not answer.
+    pub at_ns: Option<u64>,
     /// Its name, local id 0.
     pub name: Name,
     /// Further names of its process.
     pub faces: Vec<Name>,
     /// Its process, as the node's table has it; none when it does not run.
     pub process: Option<ParticipantInfo>,
+    /// What that takes of its computer; none until [`Survey::ask_kernel`], and if it has ended since.
+    pub usage: Option<Usage>,
+    /// How it really is scheduled; likewise.
+    pub scheduling: Option<Scheduling>,
     /// Packages that its mailboxes received so far.
     pub received: u64,
     /// Bytes of their bodies.
@@ -56,7 +101,12 @@ impl Survey {
         let mailboxes: Vec<MailboxInfo> = node.mailboxes()?.into_iter().filter_map(|name| node.look_at(name)).collect();
         let participants = node.participants();
         let flows = node.traffic();
-        let survey = |name, faces| survey(name, faces, &participants, &mailboxes, &flows);
+        let at_ns = monotonic_ns();
+        let survey = |name, faces| ModuleSurvey {
+            node: node_name.into(),
+            at_ns: Some(at_ns),
+            ..survey(name, faces, &participants, &mailboxes, &flows)
+        };
         let mut modules: Vec<ModuleSurvey> =
             installation.modules_on(node_name).map(|module| survey(module.name, module.faces.clone())).collect();
         for participant in participants.iter().filter(|p| p.module != Name::NONE) {
@@ -64,8 +114,76 @@ impl Survey {
                 modules.push(survey(participant.module, Vec::new()));
             }
         }
-        let classes = sum(&mailboxes);
-        Ok(Self { at: Instant::now(), modules, mailboxes, classes, flows })
+        let classes = sum_of_ends(installation, &mailboxes);
+        Ok(Self { node: node_name.into(), at_ns, modules, mailboxes, classes, flows })
+    }
+
+    /// The same, no more of it than is asked for.
+    ///
+    /// # Errors
+    /// When the node's directory cannot be read.
+    pub fn within(scope: Scope, node: &Node, installation: &Installation, node_name: &str) -> Result<Self, NodeError> {
+        Ok(Self::new(node, installation, node_name)?.reduced(scope))
+    }
+
+    fn reduced(mut self, scope: Scope) -> Self {
+        match scope {
+            Scope::All => {}
+            Scope::Mailboxes => self.flows.clear(),
+            Scope::Modules => {
+                self.flows.clear();
+                self.mailboxes.clear();
+            }
+            Scope::Module(raw) => self.reduce_to(Name::from_raw(raw).module()),
+        }
+        self
+    }
+
+    fn reduce_to(&mut self, name: Name) {
+        let is_own = |other: Name| other.module() == name;
+        self.flows.retain(|flow| is_own(flow.from) || is_own(flow.to));
+        let flows = &self.flows;
+        let is_sent_to = |mailbox: Name| flows.iter().any(|flow| is_own(flow.from) && flow.to == mailbox);
+        self.mailboxes.retain(|mailbox| is_own(mailbox.name) || is_sent_to(mailbox.name));
+        self.modules.retain(|module| module.name == name || module.faces.contains(&name));
+    }
+
+    /// Several nodes as one, in this order; of each node of `silent`, which do not answer, the modules that the configuration
+    /// names. What routers delivered for nodes that answer is left out: it is among what these sent.
+    pub fn joined(surveys: Vec<Self>, silent: &[&str], installation: &Installation) -> Self {
+        let mut all = Self {
+            node: surveys.first().map(|first| first.node.clone()).unwrap_or_default(),
+            at_ns: monotonic_ns(),
+            modules: Vec::new(),
+            mailboxes: Vec::new(),
+            classes: Vec::new(),
+            flows: Vec::new(),
+        };
+        for survey in surveys {
+            all.modules.extend(survey.modules);
+            all.mailboxes.extend(survey.mailboxes);
+            add(&mut all.classes, &survey.classes);
+            let counts = |flow: &FlowInfo| !is_hop(installation, flow) || is_of(installation, flow.from, silent);
+            all.flows.extend(survey.flows.into_iter().filter(counts));
+        }
+        for node in silent {
+            let modules = installation.modules_on(node);
+            let unseen = modules.map(|module| survey(module.name, module.faces.clone(), &[], &[], &[]));
+            all.modules.extend(unseen.map(|module| ModuleSurvey { node: (*node).into(), ..module }));
+        }
+        all.mailboxes.sort_by_key(|mailbox| mailbox.name);
+        all.classes.sort_by_key(|class| std::cmp::Reverse(class.class));
+        all
+    }
+
+    /// Asks the kernel what the processes take and how they are scheduled. On their own computer alone: elsewhere the numbers of
+    /// processes mean others.
+    pub fn ask_kernel(&mut self) {
+        for module in &mut self.modules {
+            let pid = module.process.as_ref().map(|process| process.pid);
+            module.usage = pid.and_then(Usage::of);
+            module.scheduling = pid.and_then(|pid| scheduling_of(pid).ok());
+        }
     }
 
     /// The module of this name, or with this face.
@@ -77,7 +195,8 @@ impl Survey {
     /// Packages a second that a module received since `earlier`.
     pub fn received_per_s(&self, earlier: &Self, name: Name) -> f64 {
         let (Some(now), Some(before)) = (self.module(name), earlier.module(name)) else { return 0.0 };
-        let seconds = self.at.duration_since(earlier.at).as_secs_f64();
+        let (Some(now_ns), Some(before_ns)) = (now.at_ns, before.at_ns) else { return 0.0 };
+        let seconds = now_ns.saturating_sub(before_ns) as f64 / 1e9;
         if seconds > 0.0 { now.received.saturating_sub(before.received) as f64 / seconds } else { 0.0 }
     }
 }
@@ -98,9 +217,13 @@ fn survey(
     let mut waited = Latency::default();
     classes().for_each(|class| waited.add(&class.latency));
     ModuleSurvey {
+        node: String::new(),
+        at_ns: None,
         name,
         faces,
         process,
+        usage: None,
+        scheduling: None,
         received: saturating_sum(classes().map(|class| class.received)),
         bytes_in: saturating_sum(classes().map(|class| class.body_bytes)),
         lost: saturating_sum(classes().map(ClassTraffic::lost_in_all)),
@@ -115,14 +238,87 @@ fn survey(
 /// Adds up all mailboxes, class by class.
 pub fn sum(mailboxes: &[MailboxInfo]) -> Vec<ClassTraffic> {
     let mut classes: Vec<ClassTraffic> = Vec::new();
-    for class in mailboxes.iter().flat_map(|mailbox| &mailbox.classes) {
-        match classes.iter_mut().find(|known| known.class == class.class) {
-            Some(known) => known.add(class),
-            None => classes.push(class.clone()),
-        }
-    }
+    mailboxes.iter().for_each(|mailbox| add(&mut classes, &mailbox.classes));
     classes.sort_by_key(|class| std::cmp::Reverse(class.class));
     classes
+}
+
+fn add(sums: &mut Vec<ClassTraffic>, classes: &[ClassTraffic]) {
+    for class in classes {
+        match sums.iter_mut().find(|known| known.class == class.class) {
+            Some(known) => known.add(class),
+            None => sums.push(class.clone()),
+        }
+    }
+}
+
+/// Whether a name is one of these nodes' modules or tools.
+fn is_of(installation: &Installation, name: Name, nodes: &[&str]) -> bool {
+    node_of(installation, name).is_some_and(|node| nodes.contains(&node))
+}
+
+/// The node that a name is on: that of its module, or the one that hands out its instance of class `tool`. None for what is in
+/// no configuration.
+pub fn node_of(installation: &Installation, name: Name) -> Option<&str> {
+    if name.class() == installation.classes.tool() {
+        let instance = name.instance();
+        return installation.nodes.iter().find(|node| node.tools.contains(&instance)).map(|node| node.name.as_str());
+    }
+    installation.module(name.module()).map(|module| module.node.as_str())
+}
+
+/// The same, but of packages in transit only those that were lost there: the others are received once more where they go.
+fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<ClassTraffic> {
+    let router = installation.classes.id(ROUTER);
+    let mut mailboxes = mailboxes.to_vec();
+    let is_transit = |name: Name| Some(name.class()) == router && name.local() == local::TRANSIT;
+    for class in
+        mailboxes.iter_mut().filter(|mailbox| is_transit(mailbox.name)).flat_map(|mailbox| &mut mailbox.classes)
+    {
+        (class.received, class.body_bytes, class.latency) = (0, 0, Latency::default());
+    }
+    sum(&mailboxes)
+}
+
+/// Whether a flow is the last part of the way of packages that came from another node: a router sends them under the name of
+/// their sender, which counts them itself.
+pub fn is_hop(installation: &Installation, flow: &FlowInfo) -> bool {
+    let router = installation.classes.id(ROUTER);
+    flow.module != Name::NONE && Some(flow.module.class()) == router && flow.from.module() != flow.module
+}
+
+/// A mailbox down to its slots.
+#[derive(Clone, Debug)]
+pub struct MailboxLook {
+    /// What it says of itself.
+    pub detail: MailboxDetail,
+    /// Processes in it that stand: by SIGSTOP, Ctrl-Z or a debugger.
+    pub stopped: Vec<u32>,
+}
+
+impl MailboxLook {
+    /// Looks at a mailbox of a node on this computer.
+    ///
+    /// # Errors
+    /// When there is no such mailbox, or what is there is none.
+    pub fn new(node: &Node, name: Name) -> Result<Self, InspectError> {
+        let detail = node.inspect(name)?;
+        let fillers = detail.slots.iter().filter_map(|slot| match slot {
+            SlotInfo::Filling { by, .. } => Some(by),
+            _ => None,
+        });
+        let parties = fillers.chain(&detail.receiver).filter(|party| party.is_alive);
+        let mut stopped: Vec<u32> = parties.filter_map(|party| party.pid).filter(|pid| is_stopped(*pid)).collect();
+        stopped.sort_unstable();
+        stopped.dedup();
+        Ok(Self { detail, stopped })
+    }
+}
+
+/// Whether a process stands: the letter after its name, which may hold anything, says so.
+fn is_stopped(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['T', 't']))
 }
 
 /// What a mailbox is for, by its local id.

@@ -6,6 +6,7 @@ use super::units::{bytes, short};
 use super::watch::{Figures, Pace};
 use super::{Failure, say};
 use rohrpost::mailbox::{FlowInfo, Type};
+use rohrpost::survey::is_hop;
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -14,8 +15,8 @@ use std::process::ExitCode;
   rohrpost bw mapper.0                what goes in and out, two lines a second; Ctrl-C ends it
   rohrpost bw laser.0 scan            the values that it publishes, each counted once whoever subscribes
   rohrpost bw mapper.0 --seconds 5 --json
-Bytes are those of bodies: a package has 16 bytes of head besides. It reads counters in shared memory: nothing is \
-subscribed to, nothing is sent. Smallest and largest are those of the whole seconds that the window touches.")]
+Bytes are those of bodies: a package has 16 bytes of head besides. It reads counters in shared memory, on another node by \
+way of that node's launch: nothing is subscribed to, and the module is sent nothing. Smallest and largest are those of the whole seconds that the window touches.")]
 pub(super) struct Arguments {
     /// Module or face, such as mapper.0.
     name: String,
@@ -29,23 +30,25 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut watched = Watched::new(&arguments.target, &arguments.name, arguments.pace.window()?)?;
-    watched.running.present(&arguments.name)?;
+    watched.require_present()?;
     let wanted = arguments.data.as_deref();
     let mut data = match wanted {
         Some(_) => data_of(&watched.running, watched.module, wanted)?,
         None => Vec::new(),
     };
     let look = |watched: &mut Watched| {
-        watched.find_again()?;
-        let module = watched.module;
+        let Some(survey) = watched.look()? else { return Ok(()) };
         if wanted.is_some() {
-            let flows = watched.published();
-            watched.tracks.look(flows);
-        } else {
-            let touches = |flow: &FlowInfo| [flow.from, flow.to].iter().any(|name| name.module() == module);
-            let flows = watched.running.node.traffic().into_iter();
-            watched.tracks.look(flows.filter(|flow| !flow.is_publication() && touches(flow)));
+            watched.take_published(survey);
+            return Ok(());
         }
+        let module = watched.module;
+        let flows = survey.flows.into_iter().filter(|flow| !flow.is_publication());
+        // All that comes in is counted on the module's node: what comes from another one, by the router that delivers it.
+        let installation = &watched.running.installation;
+        let counts =
+            |flow: &FlowInfo| flow.to.module() == module || flow.from.module() == module && !is_hop(installation, flow);
+        watched.tracks.look(survey.at_ns, flows.filter(counts));
         Ok(())
     };
     let tell = |watched: &mut Watched| {

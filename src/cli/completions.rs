@@ -118,14 +118,14 @@ fn target() -> Target {
     Target::new(option(&words, "--config").map(PathBuf::from), option(&words, "--node"))
 }
 
-/// The configuration that is meant: the one named, or that of the one node that runs; and the node, if it is known.
-fn installation() -> Option<(Installation, Option<String>)> {
+/// The configuration that is meant: the one named, or that of what runs.
+fn installation() -> Option<Installation> {
     if let Ok(running) = target().find() {
-        return Some((running.installation, Some(running.node_name)));
+        return Some(running.installation);
     }
     let words = words();
     let named = ["--config", "check", "launch"].iter().find_map(|before| option(&words, before))?;
-    Some((Installation::load(named.as_ref()).ok()?, None))
+    Installation::load(named.as_ref()).ok()
 }
 
 fn candidate(name: impl Into<std::ffi::OsString>, help: &str) -> CompletionCandidate {
@@ -133,13 +133,12 @@ fn candidate(name: impl Into<std::ffi::OsString>, help: &str) -> CompletionCandi
 }
 
 fn modules() -> Vec<CompletionCandidate> {
-    let Some((installation, node)) = installation() else { return Vec::new() };
-    let modules = installation.modules.iter().filter(|module| node.as_ref().is_none_or(|node| module.node == *node));
+    let Some(installation) = installation() else { return Vec::new() };
     let name = |name| {
         let text = installation.classes.text(Name::class(name)).unwrap_or_default();
         candidate(installation.classes.format(name), text)
     };
-    modules.flat_map(|module| module.names()).map(name).collect()
+    installation.modules.iter().flat_map(|module| module.names()).map(name).collect()
 }
 
 fn mailboxes() -> Vec<CompletionCandidate> {
@@ -149,7 +148,7 @@ fn mailboxes() -> Vec<CompletionCandidate> {
 }
 
 fn nodes() -> Vec<CompletionCandidate> {
-    let Some((installation, _)) = installation() else { return Vec::new() };
+    let Some(installation) = installation() else { return Vec::new() };
     installation.nodes.iter().map(|node| candidate(&node.name, "")).collect()
 }
 
@@ -194,10 +193,10 @@ fn call_arguments() -> Vec<CompletionCandidate> {
     }
 }
 
-/// What the module says of itself that the words name: noted beside its mailboxes, so that it is not asked.
+/// What the module says of itself that the words name.
 fn described() -> Option<Description> {
     let running = target().find().ok()?;
-    running.noted(named(&running)?).ok()
+    running.describe(named(&running)?).ok()
 }
 
 /// The module that the words name.

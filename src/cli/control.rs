@@ -4,6 +4,7 @@ use super::target::{Running, Target};
 use super::{Failure, say};
 use rohrpost::launch::{ChildState, ControlError, Phase};
 use rohrpost::mailbox::{ModuleState, Name};
+use rohrpost::survey::Scope;
 use rohrpost::{CallError, ToolLink};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -47,7 +48,9 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
         format!("the configuration has no module `{}`; `rohrpost list` shows which there are", arguments.name)
     })?;
     let text = running.text(module.name);
-    if running.node.launcher().is_none() {
+    let node = running.node_of(module.name);
+    let launcher = running.launcher_of(module.name).ok_or_else(|| format!("no node `{node}`"))?;
+    if running.is_own(module.name) && running.node.launcher().is_none() {
         return Err(format!(
             "no launch watches over {text}: node {} runs by hand. End the module's process and start it yourself, or launch \
              the node: `rohrpost launch {}`",
@@ -61,7 +64,8 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
         None => module.stop_within + module.ready_within + MARGIN,
     };
     let tool = running.join(PATIENCE)?;
-    let mut asked = Asked { running: &running, name: module.name, text, tool, began: Instant::now(), timeout };
+    let began = Instant::now();
+    let mut asked = Asked { running: &running, name: module.name, text, launcher, tool, began, timeout };
     let result = asked.carry_out(order, !arguments.no_wait);
     asked.tool.close();
     say(result?);
@@ -73,6 +77,8 @@ struct Asked<'a> {
     running: &'a Running,
     name: Name,
     text: String,
+    /// Launch of its node.
+    launcher: Name,
     tool: ToolLink,
     began: Instant,
     timeout: Duration,
@@ -84,10 +90,10 @@ impl Asked<'_> {
         let before = self.child()?.pid.map_or(String::new(), |pid| format!("; before it was process {pid}"));
         let text = self.text.clone();
         let life = match order {
-            Order::Restart => self.tool.restart(&text),
-            Order::Start => self.tool.start(&text),
+            Order::Restart => self.tool.restart(self.launcher, &text),
+            Order::Start => self.tool.start(self.launcher, &text),
             Order::Stop => {
-                self.tool.stop(&text).map_err(|error| self.told(&error))?;
+                self.tool.stop(self.launcher, &text).map_err(|error| self.told(&error))?;
                 return if wait { self.wait_stopped() } else { Ok(format!("{text} is told to end")) };
             }
         };
@@ -115,8 +121,9 @@ impl Asked<'_> {
     /// Its process is there, and was switched on if it is to be. How it is, it says itself.
     fn at_work(&mut self, child: &ChildState, before: &str) -> Result<String, Failure> {
         let (text, pid, took_s) = (&self.text, child.pid.unwrap_or_default(), self.began.elapsed().as_secs_f64());
-        let process = self.running.node.participants().into_iter().find(|p| p.module == self.name && p.pid == pid);
-        let state = process.and_then(|process| process.state);
+        let survey = self.running.look(self.running.node_of(self.name), Scope::Module(self.name.raw()))?;
+        let process = survey.module(self.name).and_then(|module| module.process.as_ref());
+        let state = process.filter(|process| process.pid == pid).and_then(|process| process.state);
         if state == Some(ModuleState::Error) {
             let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
             return Err(format!("{text} was started (process {pid}), but is in error: {why}").into());
@@ -150,13 +157,15 @@ impl Asked<'_> {
 
     /// What launch knows of it.
     fn child(&mut self) -> Result<ChildState, Failure> {
-        let children = self.tool.children().map_err(|error| self.told(&error.widen()))?;
+        let children = self.tool.children(self.launcher).map_err(|error| self.told(&error.widen()))?;
         let child = children.into_iter().find(|child| child.module == self.text);
         child.ok_or_else(|| ControlError::NoModule(self.text.clone()).into())
     }
 
     /// Lower layers know launch by its number only.
     fn told(&self, error: &CallError<ControlError>) -> Failure {
-        error.to_string().replace(&self.tool.launcher().to_string(), "launch").into()
+        let node = self.running.node_of(self.name);
+        let launch = if self.running.is_own(self.name) { "launch".into() } else { format!("launch of node {node}") };
+        error.to_string().replace(&self.launcher.to_string(), &launch).into()
     }
 }

@@ -8,8 +8,8 @@ use super::units::short;
 use super::watch::{Pace, Window};
 use super::{Failure, say};
 use rohrpost::Name;
-use rohrpost::mailbox::{Class, Kind, Latency};
-use rohrpost::survey::purpose;
+use rohrpost::mailbox::{Class, ClassTraffic, FlowInfo, Kind, Latency, MailboxInfo};
+use rohrpost::survey::{Scope, Survey, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -19,7 +19,8 @@ use std::process::ExitCode;
   rohrpost delay mapper.0 --count 1 --window 5
   rohrpost delay laser.0 --json       also how long its data wait for those that subscribed
 A package waits from being published to being taken. The mean is exact; p50 and p99 come from a histogram and are \
-right to a quarter or so; the longest is that of the mailbox's whole life. It reads counters: nothing is sent.")]
+right to a quarter or so; the longest is that of the mailbox's whole life. It reads counters, on other nodes by way of their \
+launches: the modules are sent nothing.")]
 pub(super) struct Arguments {
     /// Module or face, such as mapper.0.
     name: String,
@@ -73,23 +74,19 @@ struct Delays<'a> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.pace.window()?;
-    let module = Watched::new(&arguments.target, &arguments.name, long)?;
-    module.running.present(&arguments.name)?;
+    let mut module = Watched::new(&arguments.target, &arguments.name, long)?;
+    module.require_present()?;
     let mut names = data_of(&module.running, module.module, None).unwrap_or_default();
     let mut looked = Looked { waits: Window::new(long), module };
     let look = |looked: &mut Looked| {
         let Looked { waits: window, module } = looked;
-        if module.find_again()? {
+        let Some(survey) = module.look()? else { return Ok(()) };
+        let waits = waits(&module.running, module.module, &survey)?;
+        if window.ends().is_some_and(|(_, before)| begins_anew(before, &waits)) {
             *window = Window::new(long);
         }
-        // Its directory goes with a node that has ended; there is nothing to be seen until the next.
-        match waits(&module.running, module.module) {
-            Ok(waits) => window.push(waits),
-            Err(_) if module.waits_for_launch() => window.push(Vec::new()),
-            Err(error) => return Err(error),
-        }
-        let flows = module.published();
-        module.tracks.look(flows);
+        window.push(survey.at_ns, waits);
+        module.take_published(survey);
         Ok(())
     };
     let tell = |looked: &mut Looked| {
@@ -101,19 +98,31 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Waits in the module's mailboxes, and in those that it sends data to.
-fn waits(running: &Running, module: Name) -> Result<Vec<Wait>, Failure> {
-    let data = running.node.traffic().into_iter().filter(|flow| matches!(flow.kind.kind(), Kind::Data(_)));
-    let sent = data.filter(|flow| !flow.is_publication() && flow.from.module() == module).map(|flow| flow.to);
-    let own = running.node.mailboxes()?.into_iter().filter(|mailbox| mailbox.module() == module);
-    let mut mailboxes: Vec<Name> = own.chain(sent).collect();
-    mailboxes.sort_unstable_by_key(|mailbox| (mailbox.module() != module, *mailbox));
-    mailboxes.dedup();
-    let infos = mailboxes.into_iter().filter_map(|mailbox| running.node.look_at(mailbox));
+/// Whether mailboxes were made anew, and count from 0: as when their node was launched again.
+fn begins_anew(before: &[Wait], now: &[Wait]) -> bool {
+    let known = |wait: &Wait| before.iter().find(|known| (known.mailbox, known.class) == (wait.mailbox, wait.class));
+    now.iter().any(|wait| known(wait).is_some_and(|known| wait.latency.count() < known.latency.count()))
+}
+
+/// Waits in the module's mailboxes, and in those that it sends data to, on whichever nodes they are. What is on a node that does not
+/// answer is left out.
+fn waits(running: &Running, module: Name, survey: &Survey) -> Result<Vec<Wait>, Failure> {
+    let is_sent = |flow: &&FlowInfo| matches!(flow.kind.kind(), Kind::Data(_)) && !flow.is_publication();
+    let sent: Vec<Name> =
+        survey.flows.iter().filter(is_sent).filter(|flow| flow.from.module() == module).map(|flow| flow.to).collect();
+    let mut others: Vec<&str> =
+        sent.iter().map(|to| running.node_of(*to)).filter(|node| *node != survey.node).collect();
+    others.sort_unstable();
+    others.dedup();
+    let elsewhere = running.look_at(&others, Scope::Module(module.raw()))?;
+    let seen = elsewhere.iter().flatten().chain([survey]).flat_map(|survey| &survey.mailboxes);
+    let of = |mailbox: &&MailboxInfo| mailbox.name.module() == module || sent.contains(&mailbox.name);
+    let mut mailboxes: Vec<&MailboxInfo> = seen.filter(of).collect();
+    mailboxes.sort_unstable_by_key(|mailbox| (mailbox.name.module() != module, mailbox.name));
     let wait = |mailbox: Name| {
-        move |class: rohrpost::mailbox::ClassTraffic| Wait { mailbox, class: class.class, latency: class.latency }
+        move |class: &ClassTraffic| Wait { mailbox, class: class.class, latency: class.latency.clone() }
     };
-    Ok(infos.flat_map(|info| info.classes.into_iter().map(wait(info.name))).collect())
+    Ok(mailboxes.into_iter().flat_map(|mailbox| mailbox.classes.iter().map(wait(mailbox.name))).collect())
 }
 
 fn delays<'a>(name: &'a str, looked: &Looked, names: &[(u16, String)]) -> Delays<'a> {

@@ -13,7 +13,8 @@ use std::process::ExitCode;
   rohrpost hz odometry.0              all its data, a line each a second; Ctrl-C ends it
   rohrpost hz laser.0 scan --seconds 5
   rohrpost hz laser.0 scan --window 60 --json
-It reads what the module counts in shared memory: nothing is subscribed to, nothing is sent. Rate and standard \
+It reads what the module counts in shared memory, on another node by way of that node's launch: nothing is subscribed \
+to, and the module is sent nothing. Rate and standard \
 deviation are exact; minimum and maximum are those of the whole seconds that the window touches.")]
 pub(super) struct Arguments {
     /// Module or face, such as odometry.0.
@@ -31,9 +32,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let wanted = arguments.data.as_deref();
     let mut data = data_of(&watched.running, watched.module, wanted)?;
     let look = |watched: &mut Watched| {
-        watched.find_again()?;
-        let flows = watched.published();
-        watched.tracks.look(flows);
+        if let Some(survey) = watched.look()? {
+            watched.take_published(survey);
+        }
         Ok(())
     };
     let tell = |watched: &mut Watched| {

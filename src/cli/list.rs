@@ -1,17 +1,20 @@
 //! `rohrpost list`.
 
+use super::sight::Silence;
 use super::summary::{Losses, ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
 use super::target::Target;
 use super::{Failure, say};
 use rohrpost::config::Installation;
 use rohrpost::mailbox::{Loss, MailboxInfo, saturating_sum};
-use rohrpost::survey::{Survey, purpose};
+use rohrpost::survey::{Scope, node_of, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: rohrpost list --mailboxes\nReading the counters disturbs nobody.")]
+#[command(
+    after_help = "Example: rohrpost list --mailboxes\nOf several nodes all are listed; --node lists one. Reading the counters disturbs nobody."
+)]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
@@ -26,6 +29,7 @@ pub(super) struct Arguments {
 /// A mailbox, as the tables show it.
 #[derive(Serialize)]
 pub(super) struct MailboxLine {
+    pub(super) node: String,
     pub(super) mailbox: String,
     pub(super) purpose: &'static str,
     pub(super) owner: Option<u32>,
@@ -43,20 +47,38 @@ pub(super) struct MailboxLine {
     pub(super) lost_text: String,
 }
 
+/// A node, and whether it shows itself.
+#[derive(Serialize)]
+struct NodeLine {
+    node: String,
+    /// Why not, if it does not.
+    silent: Option<String>,
+}
+
+fn node_line(node: &str, silent: &[Silence]) -> NodeLine {
+    let silence = silent.iter().find(|silence| silence.node == node);
+    NodeLine { node: node.into(), silent: silence.map(|silence| silence.why.clone()) }
+}
+
 #[derive(Serialize)]
 struct Listing<'a> {
     installation: &'a str,
+    /// The node that the tool looked from.
     node: &'a str,
+    nodes: Vec<NodeLine>,
     modules: Vec<ModuleLine>,
     mailboxes: Vec<MailboxLine>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
-    let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
+    let scope = if arguments.mailboxes || arguments.json { Scope::Mailboxes } else { Scope::Modules };
+    let (survey, silent) = running.survey(scope)?;
+    let nodes = running.shown();
     let listing = Listing {
         installation: &running.installation.name,
         node: &running.node_name,
+        nodes: nodes.iter().map(|node| node_line(node, &silent)).collect(),
         modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
         mailboxes: mailbox_lines(&running.installation, &survey.mailboxes),
     };
@@ -64,8 +86,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say(serde_json::to_string(&listing)?);
         return Ok(ExitCode::SUCCESS);
     }
-    say(format_args!("node {} of {}\n", listing.node, listing.installation));
-    say(print_modules(&listing.modules).trim_end());
+    let several = nodes.len() > 1;
+    if several {
+        say(format_args!("nodes {} of {}, seen from {}\n", nodes.join(", "), listing.installation, listing.node));
+    } else {
+        say(format_args!("node {} of {}\n", nodes.join(", "), listing.installation));
+    }
+    say(print_modules(&listing.modules, several).trim_end());
+    if !silent.is_empty() {
+        let lines: Vec<String> = silent.iter().map(Silence::text).collect();
+        say(format_args!("\n{}", lines.join("\n")));
+    }
     if arguments.mailboxes {
         say(format_args!("\n{}", print_mailboxes(&listing.mailboxes).trim_end()));
     }
@@ -80,6 +111,7 @@ pub(super) fn mailbox_lines(installation: &Installation, mailboxes: &[MailboxInf
 fn mailbox_line(installation: &Installation, mailbox: &MailboxInfo) -> MailboxLine {
     let lost = |cause: Loss| saturating_sum(mailbox.classes.iter().map(|class| class.lost(cause)));
     MailboxLine {
+        node: node_of(installation, mailbox.name).unwrap_or_default().into(),
         mailbox: installation.classes.format_full(mailbox.name),
         purpose: purpose(mailbox.name.local()),
         owner: mailbox.owner,

@@ -8,10 +8,10 @@ use super::{Failure, say};
 use rohrpost::Name;
 use rohrpost::config::{Installation, nearest};
 use rohrpost::mailbox::{
-    ClassTraffic, Full, InspectError, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, Party, Priority, SlotInfo,
-    WaitingPackage, saturating_sum,
+    ClassTraffic, Full, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, Party, Priority, SlotInfo, WaitingPackage,
+    saturating_sum,
 };
-use rohrpost::survey::purpose;
+use rohrpost::survey::{MailboxLook, Scope, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -122,21 +122,18 @@ struct VictimLine {
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let name = running.installation.classes.parse_name(&arguments.name)?;
-    let detail = match running.node.inspect(name) {
-        Ok(detail) => detail,
-        Err(InspectError::Missing(_)) => return Err(missing(&running, name, &arguments.name)),
-        Err(error @ InspectError::Bad(..)) => return Err(running.told(name, &error)),
-    };
-    let seen = Seen::new(&running, &detail);
-    say(if arguments.json { serde_json::to_string(&seen)? } else { print(&running.installation, &detail, &seen) });
+    let look = running.inspect(name)?.ok_or_else(|| missing(&running, name, &arguments.name))?;
+    let seen = Seen::new(&running, &look);
+    say(if arguments.json { serde_json::to_string(&seen)? } else { print(&running.installation, &look.detail, &seen) });
     Ok(ExitCode::SUCCESS)
 }
 
 /// There is no such mailbox: what there is instead.
 fn missing(running: &Running, name: Name, text: &str) -> Failure {
-    let all = match running.node.mailboxes() {
-        Ok(all) => all,
-        Err(error) => return error.into(),
+    let node = running.node_of(name);
+    let all: Vec<Name> = match running.look(node, Scope::Mailboxes) {
+        Ok(survey) => survey.mailboxes.iter().map(|mailbox| mailbox.name).collect(),
+        Err(error) => return error,
     };
     let module = running.text(name.module());
     let own: Vec<String> = all.iter().filter(|n| n.module() == name.module()).map(|n| running.text(*n)).collect();
@@ -149,18 +146,19 @@ fn missing(running: &Running, name: Name, text: &str) -> Failure {
     let all: Vec<String> = all.iter().map(|n| running.text(*n)).collect();
     let nearest = nearest(text, all.iter().map(String::as_str));
     let nearest = nearest.map_or(String::new(), |nearest| format!("did you mean `{nearest}`? "));
-    format!("node {} has no mailbox `{text}`; {nearest}`rohrpost list --mailboxes` lists all", running.node_name).into()
+    format!("node {node} has no mailbox `{text}`; {nearest}`rohrpost list --mailboxes` lists all").into()
 }
 
 impl Seen {
-    fn new(running: &Running, detail: &MailboxDetail) -> Self {
-        let (installation, info, shape) = (&running.installation, &detail.info, &detail.info.shape);
-        let party = |party: &Party| PartyLine::new(installation, party);
+    fn new(running: &Running, look: &MailboxLook) -> Self {
+        let (installation, detail) = (&running.installation, &look.detail);
+        let (info, shape) = (&detail.info, &detail.info.shape);
+        let party = |party: &Party| PartyLine::new(installation, look, party);
         Self {
             mailbox: installation.classes.format_full(info.name),
             module: running.text(info.name.module()),
             purpose: purpose(info.name.local()),
-            node: running.node_name.clone(),
+            node: running.node_of(info.name).into(),
             slots: shape.slots,
             body_bytes_max: shape.body_bytes_max,
             memory_bytes: shape.segment_bytes(),
@@ -176,7 +174,10 @@ impl Seen {
             received: saturating_sum(info.classes.iter().map(|class| class.received)),
             losses: Losses::new(&Loss::ALL.map(|cause| lost(&info.classes, cause))),
             classes: info.classes.iter().map(|class| ClassLine::new(installation, class)).collect(),
-            slot_states: (0..).zip(&detail.slots).map(|(at, slot)| SlotLine::new(installation, at, slot)).collect(),
+            slot_states: (0..)
+                .zip(&detail.slots)
+                .map(|(at, slot)| SlotLine::new(installation, look, at, slot))
+                .collect(),
         }
     }
 }
@@ -186,13 +187,13 @@ fn lost(classes: &[ClassTraffic], cause: Loss) -> u64 {
 }
 
 impl PartyLine {
-    fn new(installation: &Installation, party: &Party) -> Self {
+    fn new(installation: &Installation, look: &MailboxLook, party: &Party) -> Self {
         Self {
             module: (party.module != Name::NONE).then(|| installation.classes.format(party.module)),
             pid: party.pid,
             participant: party.participant,
             alive: party.is_alive,
-            stopped: party.is_alive && party.pid.is_some_and(is_stopped),
+            stopped: party.is_alive && party.pid.is_some_and(|pid| look.stopped.contains(&pid)),
         }
     }
 
@@ -205,12 +206,6 @@ impl PartyLine {
             (false, _) => format!("{name}, which is dead"),
         }
     }
-}
-
-/// Whether a process stands: the letter after its name, which may hold anything, says so.
-fn is_stopped(pid: u32) -> bool {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['T', 't']))
 }
 
 impl ClassLine {
@@ -246,7 +241,7 @@ fn bars(latency: &Latency) -> Vec<Bar> {
 }
 
 impl SlotLine {
-    fn new(installation: &Installation, slot: usize, seen: &SlotInfo) -> Self {
+    fn new(installation: &Installation, look: &MailboxLook, slot: usize, seen: &SlotInfo) -> Self {
         let class = |priority: Priority| class_name(installation, Some(rohrpost::Class(priority.0)));
         let state = |state, waiting: Option<&WaitingPackage>| Self {
             slot,
@@ -263,7 +258,7 @@ impl SlotLine {
             SlotInfo::Ready(package) => state("ready", Some(package)),
             SlotInfo::Taken(package) => state("taken", Some(package)),
             SlotInfo::Filling { by, victim } => Self {
-                by: Some(PartyLine::new(installation, by)),
+                by: Some(PartyLine::new(installation, look, by)),
                 victim: victim.map(|victim| VictimLine {
                     class: class(victim.priority),
                     priority: victim.priority.0,

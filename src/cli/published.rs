@@ -5,12 +5,13 @@ use super::target::{Running, Target};
 use super::watch::{Figures, Tracks};
 use rohrpost::Name;
 use rohrpost::mailbox::{FlowInfo, Type};
+use rohrpost::survey::{Scope, Survey};
 use std::time::Duration;
 
 /// Numbers and names of the data that are meant.
 pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Result<Vec<(u16, String)>, Failure> {
     let text = running.text(module);
-    let description = running.noted(module)?;
+    let description = running.describe(module)?;
     let known: Vec<(u16, String)> = description.data.into_iter().map(|item| (item.number, item.name)).collect();
     let names = || known.iter().map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ");
     match name {
@@ -37,8 +38,11 @@ pub(super) struct Watched {
     pub(super) tracks: Tracks,
     /// Whether a launch watched over the node when it was last looked for.
     launched: bool,
-    /// Whether the node was launched again, and what the module publishes now is not known yet.
+    /// Whether the node was launched again, or answers again, and what the module publishes now is not known yet.
     changed: bool,
+    /// Whether the module's node was heard, and does not answer now.
+    heard: bool,
+    silent: bool,
 }
 
 impl Watched {
@@ -47,33 +51,72 @@ impl Watched {
         let running = target.find()?;
         let module = running.module(text)?;
         let launched = running.node.launcher().is_some();
-        Ok(Self { running, module, text: text.into(), tracks: Tracks::new(window), launched, changed: false })
+        Ok(Self {
+            running,
+            module,
+            text: text.into(),
+            tracks: Tracks::new(window),
+            launched,
+            changed: false,
+            heard: false,
+            silent: false,
+        })
     }
 
-    /// If the node's launch has ended, looks for the node that was launched in its place; true when there is one, and what
-    /// was seen before counts no more. Both are said where they do not stand among the figures.
-    pub(super) fn find_again(&mut self) -> Result<bool, Failure> {
+    /// What there is of the module now; none while its node is away, which is said once.
+    pub(super) fn look(&mut self) -> Result<Option<Survey>, Failure> {
+        let own = self.running.is_own(self.module);
+        if own {
+            self.find_again()?;
+        }
+        let node = self.running.node_of(self.module);
+        match self.running.look(node, Scope::Module(self.module.raw())) {
+            Ok(survey) => {
+                if std::mem::take(&mut self.silent) {
+                    eprintln!("node {node} answers again");
+                    self.changed = true;
+                }
+                self.heard = true;
+                Ok(Some(survey))
+            }
+            // Its directory goes with a node that has ended; there is nothing to be seen until the next.
+            Err(_) if own && !self.launched => Ok(None),
+            Err(error) if own || !self.heard => Err(error),
+            Err(error) => {
+                if !std::mem::replace(&mut self.silent, true) {
+                    eprintln!("{error}; waiting for it (Ctrl-C ends this)");
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// Looks once, and fails when the module has no mailboxes.
+    pub(super) fn require_present(&mut self) -> Result<(), Failure> {
+        let module = self.module;
+        let has = |survey: Survey| survey.mailboxes.iter().any(|mailbox| mailbox.name.module() == module);
+        if self.look()?.is_some_and(has) { Ok(()) } else { Err(self.running.absent(module)) }
+    }
+
+    /// If the node's launch has ended, looks for the node that was launched in its place; when there is one, what was seen
+    /// before counts no more. Both are said where they do not stand among the figures.
+    fn find_again(&mut self) -> Result<(), Failure> {
         if self.running.node.launcher().is_some() {
             self.launched = true;
-            return Ok(false);
+            return Ok(());
         }
         let node = &self.running.node_name;
         if std::mem::take(&mut self.launched) {
             eprintln!("launch of node `{node}` has ended; waiting until it is launched again (Ctrl-C ends this)");
         }
         let Some(running) = self.running.again().ok().filter(|again| again.node.launcher().is_some()) else {
-            return Ok(false);
+            return Ok(());
         };
         eprintln!("node `{node}` was launched again");
         self.module = running.module(&self.text)?;
         self.tracks = Tracks::new(self.tracks.window());
         (self.running, self.launched, self.changed) = (running, true, true);
-        Ok(true)
-    }
-
-    /// Whether the node's launch has ended, and no other is there yet.
-    pub(super) fn waits_for_launch(&self) -> bool {
-        !self.launched
+        Ok(())
     }
 
     /// What is to be told of, as [`data_of`] has it. On a node that was launched again it may be something else; until the
@@ -86,11 +129,11 @@ impl Watched {
         }
     }
 
-    /// What is published under the module's name.
-    pub(super) fn published(&self) -> impl Iterator<Item = FlowInfo> + use<> {
+    /// Takes in what is published under the module's name.
+    pub(super) fn take_published(&mut self, survey: Survey) {
         let module = self.module;
-        let flows = self.running.node.traffic().into_iter();
-        flows.filter(move |flow| flow.is_publication() && flow.from.module() == module)
+        let is_own = |flow: &FlowInfo| flow.is_publication() && flow.from.module() == module;
+        self.tracks.look(survey.at_ns, survey.flows.into_iter().filter(is_own));
     }
 
     /// Figures of data of this number, if it was ever published.

@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let module = running.module(&arguments.name)?;
     let period = Duration::from_secs_f64(1.0 / arguments.rate);
     let timeout = seconds(arguments.timeout)?;
-    let description = running.noted(module)?;
+    let description = running.describe(module)?;
     let function = description.function(&arguments.function).ok_or_else(|| no_function(arguments, &description))?;
     let body = body_of(function, &arguments.arguments)?;
     let stop = Stop::new()?;

@@ -1,11 +1,9 @@
 //! `rohrpost status`.
 
-use super::summary::is_left_out;
 use super::table::{table, time};
 use super::target::Target;
 use super::{Failure, say};
 use rohrpost::common::{State, Status};
-use rohrpost::survey::Survey;
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -28,6 +26,7 @@ pub(super) struct Arguments {
 #[derive(Serialize)]
 struct Line {
     module: String,
+    node: String,
     #[serde(flatten)]
     status: Option<Status>,
     failure: Option<String>,
@@ -36,21 +35,18 @@ struct Line {
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let names = match &arguments.name {
-        Some(name) => vec![running.module(name)?],
-        None => {
-            let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
-            let asked = survey.modules.iter().filter(|module| !is_left_out(module, &running.installation));
-            asked.map(|module| module.name).collect()
-        }
+        Some(name) => vec![(running.module(name)?, None)],
+        None => running.modules_to_ask()?,
     };
     let mut tool = running.join(super::units::seconds(arguments.timeout)?)?;
     let mut lines = Vec::new();
-    for name in names {
-        let (status, failure) = match tool.status(name) {
-            Ok(status) => (Some(status), None),
-            Err(error) => (None, Some(running.told(name, &error).to_string())),
+    for (name, silence) in names {
+        let (status, failure) = match silence.map_or_else(|| Ok(tool.status(name)), Err) {
+            Ok(Ok(status)) => (Some(status), None),
+            Ok(Err(error)) => (None, Some(running.told(name, &error).to_string())),
+            Err(silence) => (None, Some(silence.text())),
         };
-        lines.push(Line { module: running.text(name), status, failure });
+        lines.push(Line { module: running.text(name), node: running.node_of(name).into(), status, failure });
     }
     tool.close();
     if arguments.json {

@@ -1,18 +1,23 @@
 //! What a node does, as text: modules, and traffic by class.
 
-use super::table::{table, time};
+use super::table::{table, table_of, time};
 use rohrpost::config::Installation;
 use rohrpost::launch::Phase;
-use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, ParticipantInfo, saturating_sum};
+use rohrpost::mailbox::sys::Scheduling;
+use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, saturating_sum};
 use rohrpost::survey::{ModuleSurvey, Survey};
 use rohrpost::{Class, Name};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// State of modules whose node does not answer.
+pub(super) const SILENT: &str = "silent";
+
 /// A module, as the tables show it.
 #[derive(Clone, Serialize)]
 pub(super) struct ModuleLine {
     pub(super) module: String,
+    pub(super) node: String,
     pub(super) faces: Vec<String>,
     pub(super) state: String,
     pub(super) priority: u8,
@@ -37,10 +42,11 @@ pub(super) fn module_lines(
         let (restarts, phase) = launch(module.name);
         ModuleLine {
             module: installation.classes.format(module.name),
+            node: module.node.clone(),
             faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
             state: state(module, phase, installation),
             priority: module.name.class().0,
-            scheduling: scheduling(module.process.as_ref()),
+            scheduling: scheduling(module.scheduling),
             pid: module.process.as_ref().map(|process| process.pid),
             received: module.received,
             received_per_s: earlier.map(|earlier| survey.received_per_s(earlier, module.name)),
@@ -53,17 +59,17 @@ pub(super) fn module_lines(
 }
 
 /// How the module's process really is scheduled, which may differ from what was asked for.
-fn scheduling(process: Option<&ParticipantInfo>) -> String {
-    use rohrpost::mailbox::sys::{Scheduling, scheduling_of};
-    match process.map(|process| scheduling_of(process.pid)) {
-        Some(Ok(Scheduling::Fifo(priority))) => format!("fifo {priority}"),
-        Some(Ok(Scheduling::Normal(nice))) => format!("nice {nice}"),
-        Some(Err(_)) | None => "-".into(),
+fn scheduling(scheduling: Option<Scheduling>) -> String {
+    match scheduling {
+        Some(Scheduling::Fifo(priority)) => format!("fifo {priority}"),
+        Some(Scheduling::Normal(nice)) => format!("nice {nice}"),
+        None => "-".into(),
     }
 }
 
 pub(super) fn state(module: &ModuleSurvey, phase: Option<Phase>, installation: &Installation) -> String {
     match (&module.process, phase) {
+        _ if module.at_ns.is_none() => SILENT.into(),
         (_, Some(phase)) if phase.is_over() || phase == Phase::Waiting => phase.name().into(),
         (Some(process), _) => process.state.map_or("-", ModuleState::name).into(),
         (None, _) if is_left_out(module, installation) => "left out".into(),
@@ -73,36 +79,50 @@ pub(super) fn state(module: &ModuleSurvey, phase: Option<Phase>, installation: &
 
 /// Whether a module does not run and need not: it is optional, and its program most likely not there.
 pub(super) fn is_left_out(module: &ModuleSurvey, installation: &Installation) -> bool {
-    module.process.is_none() && installation.module(module.name).is_some_and(|configured| configured.optional)
+    module.at_ns.is_some()
+        && module.process.is_none()
+        && installation.module(module.name).is_some_and(|configured| configured.optional)
 }
 
-/// Modules as a table, one a line.
-pub(super) fn print_modules(lines: &[ModuleLine]) -> String {
-    modules_table(lines, " ", ">received", |line| line.received.to_string())
+/// Modules as a table, one a line; of several nodes, with their nodes.
+pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
+    let mut all = heads(">received").to_vec();
+    let mut rows: Vec<Vec<String>> =
+        lines.iter().map(|line| cells(line, " ", line.received.to_string()).into()).collect();
+    if with_nodes {
+        all.insert(1, "node");
+        rows.iter_mut().zip(lines).for_each(|(row, line)| row.insert(1, line.node.clone()));
+    }
+    table_of(&all, rows)
 }
 
 /// The same for a terminal of 80 columns: faces below their module, and rates.
 pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
-    modules_table(lines, "\n", ">in/s", |line| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}")))
+    let rate = |line: &ModuleLine| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}"));
+    table(heads(">in/s"), lines.iter().map(|line| cells(line, "\n", rate(line))))
 }
 
-fn modules_table(lines: &[ModuleLine], gap: &str, received: &str, of: impl Fn(&ModuleLine) -> String) -> String {
-    let rows = lines.iter().map(|line| {
-        let faces: Vec<String> = line.faces.iter().map(|face| format!("{gap}+ {face}")).collect();
-        [
-            line.module.clone() + &faces.concat(),
-            line.state.clone(),
-            line.priority.to_string(),
-            line.scheduling.clone(),
-            line.pid.map_or("-".into(), |pid| pid.to_string()),
-            of(line),
-            line.waiting.to_string(),
-            line.losses.lost.to_string(),
-            line.restarts.to_string(),
-        ]
-    });
-    let heads = ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"];
-    table(heads, rows)
+const HEADS: usize = 9;
+
+const fn heads(received: &str) -> [&str; HEADS] {
+    ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"]
+}
+
+/// Of what does not answer, nothing is known.
+fn cells(line: &ModuleLine, gap: &str, received: String) -> [String; HEADS] {
+    let faces: Vec<String> = line.faces.iter().map(|face| format!("{gap}+ {face}")).collect();
+    let known = |text: String| if line.state == SILENT { "-".into() } else { text };
+    [
+        line.module.clone() + &faces.concat(),
+        line.state.clone(),
+        line.priority.to_string(),
+        line.scheduling.clone(),
+        line.pid.map_or("-".into(), |pid| pid.to_string()),
+        known(received),
+        known(line.waiting.to_string()),
+        known(line.losses.lost.to_string()),
+        known(line.restarts.to_string()),
+    ]
 }
 
 /// Packages that were lost so far, as programs read it.

@@ -5,10 +5,15 @@ use std::time::Duration;
 
 /// A plain table: a line of heads, then rows; columns whose head begins with `>` stand to the right.
 pub(super) fn table<const N: usize>(heads: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
+    table_of(&heads, rows)
+}
+
+/// The same, where the number of columns depends on what there is.
+pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[&str], rows: impl IntoIterator<Item = R>) -> String {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
-    table.set_header(heads.map(|head| head.trim_start_matches('>')));
-    table.add_rows(rows);
+    table.set_header(heads.iter().map(|head| head.trim_start_matches('>')));
+    table.add_rows(rows.into_iter().map(Into::<Vec<String>>::into));
     for (column, head) in table.column_iter_mut().zip(heads) {
         column.set_padding((0, 2));
         if head.starts_with('>') {

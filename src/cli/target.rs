@@ -1,31 +1,38 @@
-//! Which running node a tool means.
+//! Which running node a tool means, and what the other nodes of its system are.
 
 use super::Failure;
+use super::sight::Sight;
 use clap::Args;
-use rohrpost::ToolLink;
 use rohrpost::config::Installation;
-use rohrpost::description::Description;
-use rohrpost::mailbox::{Name, Node, SendError, node_directory};
+use rohrpost::launch::{choose_node, launcher_of};
+use rohrpost::mailbox::{Name, Node, NodeError, SendError, local, node_directory};
+use rohrpost::survey::node_of;
+use rohrpost::{Fault, ToolLink};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Which node.
+/// Which node. Without options, a tool takes the installation that runs here; of several of its nodes that run here, the first of
+/// the configuration. Modules of the others are reached by its router, so for most tools it makes no difference which it is.
 #[derive(Args)]
 pub(super) struct Target {
-    /// Configuration of the node; without it, the one node that runs.
+    /// Configuration of the nodes; without it, the one that runs here.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Node of the configuration, if it has several.
-    #[arg(long, value_name = "NAME", requires = "config")]
+    /// Look from this node, and show it alone; else from the first of the configuration that runs here.
+    #[arg(long, value_name = "NAME")]
     node: Option<String>,
 }
 
 /// A node that runs, and its configuration.
 pub(super) struct Running {
     pub(super) installation: Installation,
+    /// The node that the tool takes part on.
     pub(super) node_name: String,
     pub(super) node: Arc<Node>,
+    /// The node that was asked for, which may be another one, on another computer.
+    only: Option<String>,
+    pub(super) sight: Sight,
 }
 
 impl Target {
@@ -35,35 +42,53 @@ impl Target {
 
     /// Finds the node that is meant.
     pub(super) fn find(&self) -> Result<Running, Failure> {
-        let (config, node_name) = match &self.config {
-            Some(config) => (config.clone(), self.node.clone()),
-            None => {
-                let (config, node) = only_running()?;
-                (config, Some(node))
-            }
+        let only = self.node.as_deref();
+        let installation = match &self.config {
+            Some(config) => Installation::load(config)?,
+            None => Installation::load(&config_here(only)?)?,
         };
-        let installation = Installation::load(&config)?;
-        let node_name = rohrpost::launch::choose_node(&installation, node_name.as_deref())?.name.clone();
-        let node = Node::open(&node_directory(&installation.name, &node_name))?;
-        Ok(Running { installation, node_name, node })
+        let named = only.map(|name| choose_node(&installation, Some(name))).transpose()?;
+        // The one that is named, if it runs here; else the first that does.
+        let all = named.into_iter().chain(&installation.nodes);
+        let mut failed = None;
+        for config in all {
+            match Node::open(&node_directory(&installation.name, &config.name)) {
+                Ok(node) => {
+                    let (node_name, only) = (config.name.clone(), named.map(|node| node.name.clone()));
+                    return Ok(Running { installation, node_name, node, only, sight: Sight::default() });
+                }
+                Err(error @ NodeError::Missing(_)) => failed = failed.or(Some(error)),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Err(failed.map_or_else(|| "the configuration has no node".into(), Failure::from))
     }
 }
 
-/// Configuration and name of the one node that is launched now.
-fn only_running() -> Result<(PathBuf, String), Failure> {
+/// Configuration of the one installation that runs here, or of the one that has a node of this name.
+fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
     let running = rohrpost::find_running();
-    match &running[..] {
-        [] => {
-            // One that cannot be looked into is no reason to say that none is there.
-            let others = rohrpost::find_other_versions().into_iter().next();
-            Err(others.map_or_else(
-                || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
-                Failure::from,
-            ))
-        }
-        [only] => noted_config(only),
-        several => {
-            let list: Vec<String> = several.iter().map(|path| path.display().to_string()).collect();
+    if running.is_empty() {
+        // One that cannot be looked into is no reason to say that none is there.
+        let others = rohrpost::find_other_versions().into_iter().next();
+        return Err(others.map_or_else(
+            || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
+            Failure::from,
+        ));
+    }
+    let noted: Vec<(PathBuf, String)> = running.iter().map(|path| noted_config(path)).collect::<Result<_, _>>()?;
+    let is_meant = |(_, name): &&(PathBuf, String)| node.is_none_or(|node| node == name);
+    let mut configs: Vec<&PathBuf> = noted.iter().filter(is_meant).map(|(config, _)| config).collect();
+    if configs.is_empty() {
+        // It may be a node of another computer.
+        configs = noted.iter().map(|(config, _)| config).collect();
+    }
+    configs.sort_unstable();
+    configs.dedup();
+    match configs[..] {
+        [only] => Ok(only.clone()),
+        _ => {
+            let list: Vec<String> = running.iter().map(|path| path.display().to_string()).collect();
             Err(format!("several nodes run here; say which with --config and --node:\n  {}", list.join("\n  ")).into())
         }
     }
@@ -84,7 +109,8 @@ impl Running {
     pub(super) fn again(&self) -> Result<Self, Failure> {
         let (config, node_name) = noted_config(self.node.path())?;
         let node = Node::open(self.node.path())?;
-        Ok(Self { installation: Installation::load(&config)?, node_name, node })
+        let (installation, only) = (Installation::load(&config)?, self.only.clone());
+        Ok(Self { installation, node_name, node, only, sight: Sight::default() })
     }
 
     /// Takes part as a tool.
@@ -92,36 +118,47 @@ impl Running {
         Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)
     }
 
+    /// The nodes that are meant when no module is named: the one asked for, or all.
+    pub(super) fn shown(&self) -> Vec<&str> {
+        let all = self.installation.nodes.iter().map(|node| node.name.as_str());
+        all.filter(|name| self.only.as_deref().is_none_or(|only| only == *name)).collect()
+    }
+
+    /// Where a module is. What is in no configuration can only be here.
+    pub(super) fn node_of(&self, module: Name) -> &str {
+        node_of(&self.installation, module).unwrap_or(&self.node_name)
+    }
+
+    /// The launch that watches over a module.
+    pub(super) fn launcher_of(&self, module: Name) -> Option<Name> {
+        launcher_of(&self.installation, self.node_of(module))
+    }
+
+    /// Whether it is on the node that the tool takes part on.
+    pub(super) fn is_own(&self, module: Name) -> bool {
+        self.node_of(module) == self.node_name
+    }
+
     /// The module or face that a user names, or a program run by hand: one of the configuration, or with mailboxes here.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
         let classes = &self.installation.classes;
         let module = classes.parse_name(text)?.module();
         let known = self.installation.module(module).is_some() || module.class() == classes.tool();
-        if known || self.is_here(module)? {
+        if known || self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module) {
             return Ok(module);
         }
         let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
         Err(format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into())
     }
 
-    /// The module or face that a user names, if it has mailboxes on this node.
-    pub(super) fn present(&self, text: &str) -> Result<Name, Failure> {
-        let module = self.module(text)?;
-        if self.is_here(module)? { Ok(module) } else { Err(self.absent(module)) }
-    }
-
-    fn is_here(&self, module: Name) -> Result<bool, Failure> {
-        Ok(self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module))
-    }
-
-    /// A module that has no mailboxes here: why, and what to do.
+    /// A module that has no mailboxes where it should be: why, and what to do.
     pub(super) fn absent(&self, module: Name) -> Failure {
         let name = self.text(module);
         match self.installation.module(module) {
             Some(known) if known.node != self.node_name => {
                 format!(
-                    "{name} is a module of node {}, and this is {}; no router leads there yet",
-                    known.node, self.node_name
+                    "{name} does not run on node {0}; `rohrpost start {name}` starts it, or says why it cannot",
+                    known.node
                 )
             }
             Some(_) if self.node.launcher().is_some() => {
@@ -137,18 +174,32 @@ impl Running {
         .into()
     }
 
-    /// What the module offers, as it noted beside its mailboxes: nobody is asked.
-    pub(super) fn noted(&self, module: Name) -> Result<Description, Failure> {
-        Description::noted(&self.node, module).ok_or_else(|| self.absent(module))
-    }
-
     /// An error about a module, with its name as users write it: the lower layers know numbers only.
     pub(super) fn told(&self, module: Name, error: &dyn std::error::Error) -> Failure {
         let text = error.to_string();
-        if text.contains(&SendError::NoMailbox(module).to_string()) {
+        // Found by the sender, or by the router of the module's node.
+        let absences = [SendError::NoMailbox(module).to_string(), Fault::NoMailbox.to_string()];
+        if absences.iter().any(|absence| text.contains(absence)) {
             return self.absent(module);
         }
+        if let Some(router) = self.missing_router(&text) {
+            return router;
+        }
         text.replace(&module.to_string(), &self.text(module)).into()
+    }
+
+    /// An error about this node's own router, without which nothing goes to other nodes.
+    fn missing_router(&self, text: &str) -> Option<Failure> {
+        let router = self.installation.router_of(&self.node_name)?;
+        let transit = router.with_local(local::TRANSIT).to_string();
+        text.contains(&transit).then(|| {
+            let (router, node) = (self.text(router), &self.node_name);
+            format!(
+                "the router of this node, {router}, does not run, and without it nothing goes from {node} to other nodes; \
+                 `rohrpost start {router}` starts it, or says why it cannot"
+            )
+            .into()
+        })
     }
 
     /// A name as users write it.

@@ -1,8 +1,8 @@
-//! Counters watched over time: what `hz`, `bw` and `delay` have in common. Looking sends nothing and subscribes to nothing.
+//! Counters watched over time: what `hz`, `bw` and `delay` have in common. Looking subscribes to nothing, and sends modules nothing.
 
 use super::Failure;
 use super::units::{Stop, seconds};
-use rohrpost::mailbox::{FlowInfo, FlowSecond, monotonic_ns};
+use rohrpost::mailbox::{FlowInfo, FlowSecond};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
@@ -92,8 +92,11 @@ impl<T> Window<T> {
         Self { seen: VecDeque::new(), long }
     }
 
-    pub(super) fn push(&mut self, what: T) {
-        let at_ns = monotonic_ns();
+    /// Takes in what was seen at this time of the monotonic clock; if that began anew, all that was seen before is forgotten.
+    pub(super) fn push(&mut self, at_ns: u64, what: T) {
+        if self.seen.back().is_some_and(|last| at_ns < last.at_ns) {
+            self.seen.clear();
+        }
         self.seen.push_back(Seen { at_ns, what });
         let is_old = |seen: &Seen<T>| u128::from(at_ns.saturating_sub(seen.at_ns)) >= self.long.as_nanos();
         while self.seen.get(1).is_some_and(is_old) {
@@ -131,8 +134,9 @@ impl Tracks {
         self.long
     }
 
-    /// Takes in what the flows are now; those that are gone (their process ended) are forgotten.
-    pub(super) fn look(&mut self, flows: impl IntoIterator<Item = FlowInfo>) {
+    /// Takes in what the flows are at this time of their node's monotonic clock; those that are gone (their process ended) are
+    /// forgotten.
+    pub(super) fn look(&mut self, at_ns: u64, flows: impl IntoIterator<Item = FlowInfo>) {
         let mut here = Vec::new();
         for flow in flows {
             let known = self.tracks.iter().position(|track| track.last.is_same(&flow));
@@ -141,14 +145,14 @@ impl Tracks {
                 None => Track { window: Window::new(self.long), last: flow.clone(), seconds: BTreeMap::new() },
             };
             if known.is_none() && self.began {
-                track.window.push(None);
+                track.window.push(at_ns, None);
             }
             for second in &flow.seconds {
                 track.seconds.insert(second.second, *second);
             }
-            let oldest = monotonic_ns().saturating_sub(self.long.as_nanos() as u64) / 1_000_000_000;
+            let oldest = at_ns.saturating_sub(self.long.as_nanos() as u64) / 1_000_000_000;
             track.seconds.retain(|second, _| *second + 2 >= oldest);
-            track.window.push(Some(flow.clone()));
+            track.window.push(at_ns, Some(flow.clone()));
             track.last = flow;
             here.push(track);
         }

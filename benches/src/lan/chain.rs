@@ -1,29 +1,72 @@
-//! What a hop over two routers costs at least: from futex to UDP and from UDP to futex, and nothing looked at on the way.
+//! What a hop over two routers costs at least: from module to relay, by UDP to the other relay, from there to the module.
 //!
 //! ```text
-//!  ping ──futex──▶ relay ══UDP══▶ relay ──futex──▶ pong
-//!  ping ◀──futex── relay ◀══UDP══ relay ◀──futex── pong
+//!  ping ──▶ relay ══UDP══▶ relay ──▶ pong
+//!  ping ◀── relay ◀══UDP══ relay ◀── pong
 //! ```
-//! Each relay is a process and carries one direction, so that none ever waits for two things at once.
+//! Each relay is a process and carries one direction, so that none ever waits for two things at once. Nothing is looked at on
+//! the way. [`time_chain`] hands over by one slot and a futex, [`time_mailbox_chain`] by mailboxes: what a router adds to that is
+//! its own.
 
 use super::Wire;
 use super::udp::Datagrams;
 use crate::floors::{HandOver, Lanes, Wake};
-use crate::harness::{Cell, Child, End, Failure, Gate, Link, Shared, settle, time_two_processes};
+use crate::harness::{Cell, Child, End, Failure, Gate, Link, Meetings, Scratch, Shared, settle, time_two_processes};
+use crate::ours::Station;
+use rohrpost_mailbox::Name;
+use std::time::Instant;
 
 /// From the near end to the far one, and back.
 const PORTS: [u16; 2] = [20_118, 20_119];
 
-/// Times the chain; see [`time_two_processes`].
+/// Mailboxes of a node of the chain.
+const MODULE: Name = Name::new(1, 1, 0, 0);
+const RELAY: Name = Name::new(1, 2, 0, 0);
+
+/// Times the chain of futexes; see [`time_two_processes`].
 ///
 /// # Errors
 /// What a relay failed with, else an end.
 pub fn time_chain(wire: &Wire, cell: &Cell) -> Result<Vec<f64>, Failure> {
     let nodes = [Shared::<Lanes>::new()?, Shared::<Lanes>::new()?];
-    let at = |end| &nodes[usize::from(end == End::Pong)];
-    let mut relays = Relays::start(wire, cell, at)?;
-    // On its node the module is the near side of the lanes, the relays are the far one.
-    let timed = time_two_processes(cell, |end, _| Ok(HandOver::new(at(end), End::Ping, Wake::Futex)));
+    // On its node the module is the near side of the lanes, both relays together are the far one.
+    let side = |end, side| Ok(HandOver::new(&nodes[usize::from(end == End::Pong)], side, Wake::Futex));
+    time(wire, cell, |end, _| side(end, End::Pong), |end, _| side(end, End::Ping))
+}
+
+/// Times the chain of mailboxes.
+///
+/// # Errors
+/// As [`time_chain`].
+pub fn time_mailbox_chain(wire: &Wire, cell: &Cell) -> Result<Vec<f64>, Failure> {
+    let scratch = Scratch::new()?;
+    let station = |end, own, other| {
+        Station::open(&scratch.directory().join(if end == End::Ping { "near" } else { "far" }), own, other, cell.bytes)
+    };
+    let relay = |end, goes| match goes {
+        Goes::Out => station(end, Some(RELAY), MODULE),
+        Goes::In => station(end, None, MODULE),
+    };
+    time(wire, cell, relay, |end, _| station(end, Some(MODULE), RELAY))
+}
+
+/// What a relay does with the node it stands on.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Goes {
+    /// Carries from the module to the network.
+    Out,
+    /// Carries from the network to the module.
+    In,
+}
+
+fn time<R: Link, M: Link>(
+    wire: &Wire,
+    cell: &Cell,
+    relay: impl Fn(End, Goes) -> Result<R, Failure>,
+    module: impl Fn(End, &mut Meetings) -> Result<M, Failure>,
+) -> Result<Vec<f64>, Failure> {
+    let mut relays = Relays::start(wire, cell, relay)?;
+    let timed = time_two_processes(cell, module);
     relays.check()?;
     timed
 }
@@ -32,33 +75,33 @@ pub fn time_chain(wire: &Wire, cell: &Cell) -> Result<Vec<f64>, Failure> {
 struct Relays(Vec<Child>);
 
 impl Relays {
-    fn start<'a>(wire: &Wire, cell: &Cell, at: impl Fn(End) -> &'a Shared<Lanes>) -> Result<Self, Failure> {
+    fn start<R: Link>(
+        wire: &Wire,
+        cell: &Cell,
+        local: impl Fn(End, Goes) -> Result<R, Failure>,
+    ) -> Result<Self, Failure> {
         let gate = Shared::<Gate>::new()?;
         let mut relays = Self(Vec::new());
-        for (end, outgoing) in [(End::Ping, true), (End::Ping, false), (End::Pong, true), (End::Pong, false)] {
+        for (end, goes) in
+            [(End::Ping, Goes::Out), (End::Ping, Goes::In), (End::Pong, Goes::Out), (End::Pong, Goes::In)]
+        {
             let relay = Child::start(|| {
-                // Its own port for each direction: the one that only sends must not take what comes.
-                let there = outgoing == (end == End::Ping);
+                // A port for each direction: who only sends must not get what comes.
+                let there = (goes == Goes::Out) == (end == End::Ping);
                 let port = PORTS[usize::from(!there)];
                 let mut network = Datagrams::between(wire, end, [port, port])?;
-                let mut local = HandOver::new(at(end), End::Pong, Wake::Futex);
+                let mut local = local(end, goes)?;
                 settle(end, cell.placement, cell.scheduling)?;
-                gate.meet(5)?;
-                let mut message = vec![0; cell.bytes];
-                loop {
-                    if outgoing {
-                        local.receive(&mut message)?;
-                        network.send(&message)?;
-                    } else {
-                        network.receive(&mut message)?;
-                        local.send(&message)?;
-                    }
+                gate.meet(ALL)?;
+                match goes {
+                    Goes::Out => carry(&mut local, &mut network, cell.bytes),
+                    Goes::In => carry(&mut network, &mut local, cell.bytes),
                 }
             })?;
             relays.0.push(relay);
         }
         // One that fails before it meets says why in `check`.
-        if let Err(late) = gate.meet(5) {
+        if let Err(late) = gate.meet(ALL) {
             relays.check()?;
             return Err(late);
         }
@@ -69,9 +112,20 @@ impl Relays {
     fn check(&mut self) -> Result<(), Failure> {
         for mut relay in std::mem::take(&mut self.0) {
             if relay.has_ended()? {
-                relay.finish(std::time::Instant::now())?;
+                relay.finish(Instant::now())?;
             }
         }
         Ok(())
+    }
+}
+
+/// The relays, and who starts them.
+const ALL: u32 = 5;
+
+fn carry(from: &mut impl Link, to: &mut impl Link, bytes: usize) -> Result<(), Failure> {
+    let mut message = vec![0; bytes];
+    loop {
+        from.receive(&mut message)?;
+        to.send(&message)?;
     }
 }

@@ -2,11 +2,14 @@
 //!
 //! Launch takes the first instance of class `tool` on its node; this is the interface that it serves there.
 
+use super::look::{Look, LookError, LookPage};
 use crate::call::CallError;
 use crate::interface;
 use crate::interface::append;
 use crate::runtime::ToolLink;
 use postcard_schema::Schema;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::Name;
 use serde::{Deserialize, Serialize};
 
 /// Where launch stands with a module.
@@ -123,6 +126,15 @@ pub trait Launcher {
     /// Starts a module that has ended, was stopped, or waits to be started again. Answers as `restart` does.
     #[command(19)]
     fn start(&mut self, module: String) -> Result<u32, ControlError>;
+
+    /// Looks at its node, keeps what it saw for a while, and answers with the first page of it. `form` is that of the looks that
+    /// the reader knows; no page is longer than `bytes_max`.
+    #[command(20, idempotent)]
+    fn look(&mut self, what: Look, form: u32, bytes_max: u16) -> Result<LookPage, LookError>;
+
+    /// A further page of this look, from this byte on.
+    #[command(21, idempotent)]
+    fn look_on(&mut self, look: u32, from: u32, bytes_max: u16) -> Result<LookPage, LookError>;
 }
 
 /// The functions' numbers.
@@ -130,18 +142,26 @@ const CHILDREN: u16 = 16;
 const RESTART: u16 = 17;
 const STOP: u16 = 18;
 const START: u16 = 19;
+pub(crate) const LOOK: u16 = 20;
+pub(crate) const LOOK_ON: u16 = 21;
 
-/// Launch, asked by a tool.
+/// The name under which the launch of a node takes commands, if the configuration has this node.
+pub fn launcher_of(installation: &Installation, node: &str) -> Option<Name> {
+    let instance = installation.node(node)?.launch_instance();
+    Some(Name::new(installation.system.id, installation.classes.tool().0, instance, 0))
+}
+
+/// Launch of any node, asked by a tool. The first argument is the name of that launch ([`launcher_of`]).
 impl ToolLink {
     /// How it stands with all modules that launch watches over, in the order of the configuration.
     ///
     /// # Errors
-    /// See [`CallError`]; [`CallError::NotSent`] when no launch runs on this node.
-    pub fn children(&mut self) -> Result<Vec<ChildState>, CallError> {
+    /// See [`CallError`]; [`CallError::NotSent`] when no launch runs on that node, and this is it.
+    pub fn children(&mut self, launcher: Name) -> Result<Vec<ChildState>, CallError> {
         let mut states = Vec::new();
         loop {
             let first = states.len() as u16;
-            let page: Children = self.ask_launch(CHILDREN, &(first,))?;
+            let page: Children = self.ask_launch(launcher, CHILDREN, &(first,))?;
             let more = !page.states.is_empty();
             states.extend(page.states);
             if !more || states.len() >= usize::from(page.total) {
@@ -154,24 +174,24 @@ impl ToolLink {
     ///
     /// # Errors
     /// See [`CallError`] and [`ControlError`].
-    pub fn restart(&mut self, module: &str) -> Result<u32, CallError<ControlError>> {
-        self.order(RESTART, module)
+    pub fn restart(&mut self, launcher: Name, module: &str) -> Result<u32, CallError<ControlError>> {
+        self.order(launcher, RESTART, module)
     }
 
     /// Asks launch to stop a module.
     ///
     /// # Errors
     /// See [`CallError`] and [`ControlError`].
-    pub fn stop(&mut self, module: &str) -> Result<(), CallError<ControlError>> {
-        self.order(STOP, module)
+    pub fn stop(&mut self, launcher: Name, module: &str) -> Result<(), CallError<ControlError>> {
+        self.order(launcher, STOP, module)
     }
 
     /// Asks launch to start a module; which of its processes that will be ([`ChildState::lives`]).
     ///
     /// # Errors
     /// See [`CallError`] and [`ControlError`].
-    pub fn start(&mut self, module: &str) -> Result<u32, CallError<ControlError>> {
-        self.order(START, module)
+    pub fn start(&mut self, launcher: Name, module: &str) -> Result<u32, CallError<ControlError>> {
+        self.order(launcher, START, module)
     }
 
     /// Begins to ask for the states of the modules from this one on, and returns at once; [`Link::poll_as`] has the
@@ -181,8 +201,8 @@ impl ToolLink {
     /// See [`CallError`].
     ///
     /// [`Link::poll_as`]: crate::call::Link::poll_as
-    pub fn begin_children(&mut self, first: u16) -> Result<u32, CallError> {
-        self.begin_asking(CHILDREN, &(first,))
+    pub fn begin_children(&mut self, launcher: Name, first: u16) -> Result<u32, CallError> {
+        self.begin_asking(launcher, CHILDREN, &(first,))
     }
 
     /// Begins to have a module restarted, and returns at once; [`Link::poll_as`] has the answer, a `Result` of what
@@ -192,31 +212,34 @@ impl ToolLink {
     /// See [`CallError`].
     ///
     /// [`Link::poll_as`]: crate::call::Link::poll_as
-    pub fn begin_restart(&mut self, module: &str) -> Result<u32, CallError> {
-        self.begin_asking(RESTART, &(module,))
+    pub fn begin_restart(&mut self, launcher: Name, module: &str) -> Result<u32, CallError> {
+        self.begin_asking(launcher, RESTART, &(module,))
     }
 
     fn order<T: serde::de::DeserializeOwned>(
         &mut self,
+        launcher: Name,
         function: u16,
         module: &str,
     ) -> Result<T, CallError<ControlError>> {
-        let result: Result<T, ControlError> = self.ask_launch(function, &(module,)).map_err(CallError::widen)?;
-        result.map_err(|error| CallError::Module(self.launcher(), error))
+        let result: Result<T, ControlError> =
+            self.ask_launch(launcher, function, &(module,)).map_err(CallError::widen)?;
+        result.map_err(|error| CallError::Module(launcher, error))
     }
 
     fn ask_launch<T: serde::de::DeserializeOwned>(
         &mut self,
+        launcher: Name,
         function: u16,
         arguments: &impl Serialize,
     ) -> Result<T, CallError> {
-        let call = self.begin_asking(function, arguments)?;
+        let call = self.begin_asking(launcher, function, arguments)?;
         self.link.wait(call, |bytes| postcard::from_bytes(bytes))
     }
 
-    fn begin_asking(&mut self, function: u16, arguments: &impl Serialize) -> Result<u32, CallError> {
+    fn begin_asking(&mut self, launcher: Name, function: u16, arguments: &impl Serialize) -> Result<u32, CallError> {
         let write = |body: &mut Vec<u8>| append(body, arguments);
-        self.begin(self.launcher(), function, LauncherInterface::hash(), write)
+        self.begin(launcher, function, LauncherInterface::hash(), write)
     }
 }
 
@@ -229,6 +252,8 @@ mod tests {
     fn a_tool_calls_the_functions_by_their_numbers() {
         let functions = LauncherInterface::description().functions;
         let numbers: Vec<(&str, u16)> = functions.iter().map(|f| (f.name.as_str(), f.number)).collect();
-        assert_eq!(numbers, [("children", CHILDREN), ("restart", RESTART), ("stop", STOP), ("start", START)]);
+        let controls = [("children", CHILDREN), ("restart", RESTART), ("stop", STOP), ("start", START)];
+        assert_eq!(numbers[..4], controls);
+        assert_eq!(numbers[4..], [("look", LOOK), ("look_on", LOOK_ON)]);
     }
 }

@@ -21,15 +21,18 @@ mod end;
 mod error;
 mod events;
 mod leftovers;
+mod look;
 mod policy;
 mod printed;
 mod program;
 mod serve;
 
-pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase};
+pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase, launcher_of};
+pub(crate) use control::{LOOK, LOOK_ON};
 pub use error::LaunchError;
 pub use events::{Event, events};
 pub use leftovers::CONFIG_FILE;
+pub use look::{LOOK_BYTES_MAX, Look, LookError, LookPage};
 
 use crate::call::CallError;
 use crate::output::Relay;
@@ -38,6 +41,7 @@ use crate::survey::Survey;
 use child::Child;
 use end::Ending;
 use events::Bell;
+use look::Looks;
 use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as ConfiguredTime};
 use rohrpost_mailbox::{
     LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
@@ -62,6 +66,9 @@ const LET_GO: Duration = Duration::from_secs(1);
 /// Notes that are kept for who asks; the oldest go first.
 const NOTES_MAX: usize = 1000;
 
+/// A router that was started again so often, and is not ready, is not going to be.
+const ROUTER_RESTARTS_MAX: u32 = 5;
+
 /// A node that somebody else removes just now is taken at the next try, or the next but one.
 const TAKE_MAX: usize = 20;
 
@@ -76,6 +83,8 @@ pub struct Launch {
     switching: Vec<Option<u32>>,
     tool: ToolLink,
     counter: Counter,
+    /// What it saw for tools on other nodes.
+    looks: Looks,
     bell: Bell,
     lock: LaunchLock,
     _time: TimeKeeper,
@@ -134,8 +143,21 @@ impl Launch {
         drop(relay);
         let node_name = node_name.to_owned();
         let switching = vec![None; children.len()];
-        let mut launch =
-            Self { installation, node_name, node, children, switching, tool, counter, bell, lock, _time: time, notes };
+        let looks = Looks::default();
+        let mut launch = Self {
+            installation,
+            node_name,
+            node,
+            children,
+            switching,
+            tool,
+            counter,
+            looks,
+            bell,
+            lock,
+            _time: time,
+            notes,
+        };
         match launch.start_all() {
             Ok(()) => Ok(launch),
             Err(error) => Err(error.with(launch.stop())),
@@ -154,6 +176,7 @@ impl Launch {
                 let child = &self.children[index];
                 match child.phase() {
                     Phase::Failed => return Err(not_ready(child, child.last_end())),
+                    _ if self.never_ready(child) => return Err(not_ready(child, child.last_end())),
                     Phase::Starting | Phase::Waiting | Phase::Stopping => {}
                     Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => break,
                 }
@@ -173,6 +196,12 @@ impl Launch {
             }
         }
         Ok(())
+    }
+
+    /// A router is never given up, but a node on which it never was ready has not started: perhaps another one has its port.
+    fn never_ready(&self, child: &Child) -> bool {
+        let is_router = self.installation.module(child.name()).is_some_and(|module| !module.is_in_file());
+        is_router && child.restarts() > ROUTER_RESTARTS_MAX
     }
 
     /// Sleeps until something happens, then looks after those children that were started, and answers tools.
@@ -196,7 +225,9 @@ impl Launch {
     /// Answers tools, and removes what those leave that have ended, or were told to stay so.
     fn serve(&mut self, ending: bool) {
         let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
-        self.counter.serve(Orders { children, installation, node, ending }, &mut self.tool.link);
+        let orders =
+            Orders { children, installation, node, node_name: &self.node_name, looks: &mut self.looks, ending };
+        self.counter.serve(orders, &mut self.tool.link);
         // At the end all goes at once, with the node.
         if !ending {
             (0..self.children.len()).for_each(|index| self.remove_left_mailboxes(index));

@@ -2,6 +2,7 @@
 
 use super::child::{Child, Then};
 use super::control::{Children, ControlError, Launcher, LauncherInterface};
+use super::look::{Look, LookError, LookPage, Looks};
 use crate::call::{Fault, Link};
 use crate::common;
 use crate::description::Description;
@@ -58,6 +59,8 @@ pub(super) struct Orders<'a> {
     pub(super) children: &'a mut [Child],
     pub(super) installation: &'a Installation,
     pub(super) node: &'a Node,
+    pub(super) node_name: &'a str,
+    pub(super) looks: &'a mut Looks,
     /// Launch stops all.
     pub(super) ending: bool,
 }
@@ -144,5 +147,13 @@ impl Launcher for Orders<'_> {
         }
         child.tell_to_end(Then::Start, node, Instant::now());
         Ok(child.lives() + 1)
+    }
+
+    fn look(&mut self, what: Look, form: u32, bytes_max: u16) -> Result<LookPage, LookError> {
+        self.looks.take(what, form, bytes_max, self.node, self.installation, self.node_name)
+    }
+
+    fn look_on(&mut self, look: u32, from: u32, bytes_max: u16) -> Result<LookPage, LookError> {
+        self.looks.page(look, from, bytes_max)
     }
 }

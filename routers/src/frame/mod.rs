@@ -51,8 +51,8 @@ pub enum Kind {
     Refusal = 4,
     /// Time: the master says what time it is.
     Sync = 16,
-    /// Time: when the last such frame left.
-    FollowUp = 17,
+    /// Time: makes the way warm for the next, and says nothing.
+    WarmUp = 17,
     /// Time: a slave asks how long the way is.
     Request = 18,
     /// Time: the master's answer.
@@ -66,7 +66,7 @@ impl Kind {
         Self::Alive,
         Self::Refusal,
         Self::Sync,
-        Self::FollowUp,
+        Self::WarmUp,
         Self::Request,
         Self::Reply,
     ];
@@ -191,7 +191,7 @@ impl<'a> Frame<'a> {
             Kind::Fragment => Self::Fragment(Fragment::parse(rest)?),
             Kind::Alive => Self::Alive(Alive::parse(rest)?),
             Kind::Refusal => Self::Refusal(Refusal::parse(datagram[2], rest)?),
-            Kind::Sync | Kind::FollowUp | Kind::Request | Kind::Reply => Self::Time(rest),
+            Kind::Sync | Kind::WarmUp | Kind::Request | Kind::Reply => Self::Time(rest),
         };
         Ok((head, frame))
     }

@@ -1,1 +1,26 @@
-//! A network of up to 64 nodes from a seed, in virtual time, with whatever can go wrong in one.
+//! Networks of up to 64 simulated computers, from a seed, in virtual time: the same cores as under real sockets.
+//!
+//! ```text
+//!  Plan (from the seed) ─▶ World: events ─▶ Station: clocks, mailboxes, modules ─▶ Router: one Layer for each port
+//!                            │ Link: loss, delay, copies…   │ Calls: at most once               packages │ time │ …
+//!                            └──────────────▶ Book: every package, every broken Promise ◀──────────────────────┘
+//! ```
+//!
+//! A new protocol comes as one more [`station::Layer`]; what must hold of it as one more [`book::Promise`].
+
+pub mod book;
+pub mod calls;
+pub mod chance;
+pub mod clock;
+mod faults;
+pub mod host;
+pub mod link;
+mod modules;
+pub mod packages;
+pub mod plan;
+pub mod run;
+pub mod station;
+pub mod ticking;
+pub mod times;
+pub mod trace;
+pub mod world;

@@ -1,1 +1,108 @@
-//! One time for all nodes: synchronisation by a master, calibration, and an error bound that is kept (seed 002, 2.2.3).
+//! One time for all nodes: a master says it, slaves measure how far off they are, and each knows how sure it is (seed 002, 2.2.3).
+//!
+//! ```text
+//!  master   ──warm-up──Sync──────────────────────────Reply──▶        Sync: id, cycle, nominal time, epoch, term, error
+//!                       t1 ╲            t4 ╱╲                         Reply: t1, t4 as the kernel stamped them
+//!  slave                    t2 ──warm-up──t3  t1 ≤ system(t2), system(t3) ≤ t4: an interval that holds the truth
+//!
+//!  Exchange ─▶ history (narrowest of each half second; rate; interval) ─▶ line (pace of the page) ─▶ record of the node's page
+//! ```
+//!
+//! # What the error bound says
+//! *The time of a term* is what its master's page shows; when a master takes over, the time of the new term is the new master's,
+//! less what it was off just then, which its own bound states and all its followers add. So within an epoch the time of a term goes on
+//! from the one before. A reading's bound contains its distance from the time of the term that the node follows
+//! ([`Clock::term`]), provided that clocks keep what [`RATE_MAX_PPB`] and [`WANDER_PPB_S`] say of them, and that
+//! a frame never arrives before it leaves. Nothing is assumed of how long a way takes, nor that both ways take equally long.
+//! While a network is split, each part may have a master, and so two terms are two times.
+//!
+//! # Masters
+//! Masters are ordered. One that hears no master for [`TAKEOVER_INTERVALS`] (3.5) intervals, and one interval more for each that stands
+//! before it and is not the one that fell silent, takes over: same epoch, its own estimate of the time, the next term. One without
+//! time waits longer still, when it has heard of one that has time. So a router that starts listens first; if there is a master, it is
+//! its slave, and it stays so until that one fails: each change of master makes the bound a little larger, and none is made without need.
+//!
+//! A master that is heard but answers nobody hears nobody; it is replaced as if it were silent.
+//!
+//! Of two masters that hear each other, the one that nobody follows yields; if both or neither are followed, that of the lower term.
+//! Terms are never shared, since a term has its master's rank in it. Who yields is a slave with the next [`Sync`](message::Sync), so
+//! after a split is mended there is one master after at most two intervals. The nodes of the other part slew if they are off by
+//! at most [`STEP_MIN_NS`]; else they say so, and the master begins a new epoch, in which they step.
+//!
+//! Nothing here has a socket, a thread or a clock: `shell::clock` has.
+
+mod broken;
+mod clock;
+mod election;
+mod history;
+mod line;
+pub mod message;
+#[cfg(test)]
+mod tests;
+
+#[cfg(any(test, feature = "broken-variants"))]
+pub use broken::Broken;
+pub use clock::{Clock, Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
+pub use line::UNSYNCHRONISED_NS;
+
+use crate::frame::HEAD_BYTES;
+
+/// Bytes of each datagram of time.
+pub const TIME_BYTES: usize = HEAD_BYTES + message::MESSAGE_BYTES;
+/// How much faster or slower than system time a computer's clock may be, ns a second: two clocks of 100 ppm, and some room.
+pub const RATE_MAX_PPB: i64 = 250_000;
+/// How much that may change in a second, ns a second: measured clocks in a moving robot change by a tenth of it.
+pub const WANDER_PPB_S: i64 = 500;
+/// From so far on a node steps instead of slewing, which is a new epoch for all.
+pub const STEP_MIN_NS: u64 = 5_000_000;
+/// Pace may differ so much from the rate while slewing, ns a second: 5 ms take 5 s.
+pub const SLEW_MAX_PPB: i64 = 1_000_000;
+/// Silence of a master, in half intervals, until the first of the others takes over.
+pub const TAKEOVER_HALF_INTERVALS: u64 = 7;
+
+/// A moment of the local monotonic clock, and how far off it may be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Stamp {
+    /// Local monotonic ns.
+    pub ns: u64,
+    /// At most so far off, ns.
+    pub doubt_ns: u32,
+    /// Taken by the kernel where the frame left or came; else by us, before it was handed over or after it was read.
+    pub by_kernel: bool,
+}
+
+impl Stamp {
+    /// A stamp of our own. It makes the way look longer, never shorter, so it needs no doubt.
+    pub fn by_us(ns: u64) -> Self {
+        Self { ns, doubt_ns: 0, by_kernel: false }
+    }
+}
+
+/// The reign of one master: later ones are greater, and two masters never have the same.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
+pub struct Term(pub u64);
+
+impl Term {
+    /// Before the first.
+    pub const NONE: Self = Self(0);
+
+    /// Round 1 is the first; rank 0 stands first among the masters, and before the others of its round.
+    pub fn new(round: u64, rank: u8) -> Self {
+        Self(round << 8 | u64::from(u8::MAX - rank))
+    }
+
+    /// Raised by each master that takes over.
+    pub fn round(self) -> u64 {
+        self.0 >> 8
+    }
+
+    /// The master's place in the order.
+    pub fn rank(self) -> u8 {
+        u8::MAX - (self.0 & 0xFF) as u8
+    }
+
+    /// Nobody's.
+    pub fn is_none(self) -> bool {
+        self.round() == 0
+    }
+}

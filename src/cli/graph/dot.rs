@@ -1,22 +1,23 @@
 //! The graph for Graphviz.
 
+use super::super::summary::SILENT;
 use super::{Carries, Graph};
 use std::fmt::Write;
 
 pub(super) fn write(graph: &Graph, all: bool) -> String {
     let mut text = String::from("digraph rohrpost {\n");
-    let _ = writeln!(text, "    label = {:?}", format!("node {} of {}", graph.node, graph.installation));
+    let _ = writeln!(text, "    label = {:?}", graph.title());
     text.push_str("    rankdir = LR\n    node [shape = box, style = rounded, fontname = \"sans-serif\"]\n");
     text.push_str("    edge [fontname = \"sans-serif\", fontsize = 10]\n");
     for module in &graph.modules {
-        let faces = module.faces.iter().map(|face| format!("\\n+ {face}"));
-        let dead = if module.state == "dead" { ", style = \"rounded,dashed\"" } else { "" };
+        let below = graph.below(module).map(|line| format!("\\n{line}"));
+        let dead = if matches!(module.state.as_str(), "dead" | SILENT) { ", style = \"rounded,dashed\"" } else { "" };
         let _ = writeln!(
             text,
             "    {:?} [label = \"{}{}\"{dead}]",
             module.module,
             module.module,
-            faces.collect::<String>()
+            below.collect::<String>()
         );
     }
     for edge in graph.drawn(all) {

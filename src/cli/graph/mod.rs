@@ -3,6 +3,7 @@
 mod dot;
 mod svg;
 
+use super::sight::Silence;
 use super::table::table;
 use super::target::{Running, Target};
 use super::units::{Stop, bytes, seconds};
@@ -11,7 +12,7 @@ use super::{Failure, say};
 use rohrpost::Name;
 use rohrpost::description::Description;
 use rohrpost::mailbox::{FlowInfo, Kind, local};
-use rohrpost::survey::Survey;
+use rohrpost::survey::{Scope, Survey, is_hop};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -23,8 +24,9 @@ use std::time::{Duration, Instant};
   rohrpost graph                             a table: who, to whom, what, how often
   rohrpost graph --svg -o graph.svg          a drawing
   rohrpost graph --dot | dot -Tpdf > graph.pdf
-Rates are of the time that it looks. A drawing leaves out replies and the calls that every module has (such as the \
-renewing of subscriptions); --all draws them too. It reads counters in shared memory: nothing is sent.")]
+Rates are of the time that it looks. Of several nodes all are shown; --node shows one. A drawing leaves out replies and the calls that every module has (such as the \
+renewing of subscriptions); --all draws them too. It reads counters in shared memory, on other nodes by way \
+of their launches: modules are sent nothing.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
@@ -55,7 +57,12 @@ pub(super) struct Arguments {
 #[derive(Serialize)]
 struct Graph {
     installation: String,
+    /// The node that the tool looked from.
     node: String,
+    /// Those that are shown.
+    nodes: Vec<String>,
+    /// Those of them that do not answer.
+    silent: Vec<Silence>,
     /// What rates are measured over.
     interval_s: f64,
     modules: Vec<Module>,
@@ -65,6 +72,7 @@ struct Graph {
 #[derive(Serialize)]
 struct Module {
     module: String,
+    node: String,
     faces: Vec<String>,
     state: String,
     priority: u8,
@@ -126,20 +134,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 impl Graph {
     fn new(running: &Running, long: Duration, silent: bool) -> Result<Self, Failure> {
-        // The window is as long as the look at it.
-        let mut tracks = Tracks::new(Duration::MAX);
-        let look = || running.node.traffic().into_iter().filter(|flow| flow.to != Name::NONE);
+        // Each node has a clock of its own. The window is as long as the look at it.
+        let nodes = running.shown();
+        let mut tracks: Vec<Tracks> = nodes.iter().map(|_| Tracks::new(Duration::MAX)).collect();
         let stop = Stop::new()?;
-        tracks.look(look());
+        look(running, &nodes, &mut tracks)?;
         let began = Instant::now();
         // Ctrl-C ends it early: then it is a shorter look.
         stop.within(long);
-        tracks.look(look());
+        let (surveys, away) = look(running, &nodes, &mut tracks)?;
         let interval_s = began.elapsed().as_secs_f64();
-        let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
+        let away_names: Vec<&str> = away.iter().map(|silence| silence.node.as_str()).collect();
+        let survey = Survey::joined(surveys, &away_names, &running.installation);
         let mut names = Names { running, survey: &survey, descriptions: BTreeMap::new() };
         let mut edges: Vec<Edge> = Vec::new();
-        for (flow, figures) in tracks.figures() {
+        // What a router delivers for a node that is seen too is counted there.
+        let is_seen = |node: &str| nodes.contains(&node) && !away_names.contains(&node);
+        let counts = |flow: &FlowInfo| !is_hop(&running.installation, flow) || !is_seen(running.node_of(flow.from));
+        for (flow, figures) in tracks.iter().flat_map(Tracks::figures).filter(|(flow, _)| counts(flow)) {
             if !silent && figures.packages == 0 && figures.refused == 0 {
                 continue;
             }
@@ -169,6 +181,7 @@ impl Graph {
             .iter()
             .map(|module| Module {
                 module: classes.format(module.name),
+                node: module.node.clone(),
                 faces: module.faces.iter().map(|face| classes.format(*face)).collect(),
                 state: super::summary::state(module, None, &running.installation),
                 priority: module.name.class().0,
@@ -177,18 +190,48 @@ impl Graph {
         // Tools send too, and are in no configuration.
         for name in edges.iter().flat_map(|edge| [&edge.from, &edge.to]) {
             if modules.iter().all(|module| module.module != *name) {
-                let priority = running.module(name).map_or(0, |module| module.class().0);
-                modules.push(Module { module: name.clone(), faces: Vec::new(), state: "tool".into(), priority });
+                let found = running.module(name).ok();
+                let priority = found.map_or(0, |module| module.class().0);
+                let node = found.map_or(&*running.node_name, |module| running.node_of(module)).into();
+                modules.push(Module { module: name.clone(), node, faces: Vec::new(), state: "tool".into(), priority });
             }
         }
         let installation = running.installation.name.clone();
-        Ok(Self { installation, node: running.node_name.clone(), interval_s, modules, edges })
+        let nodes = nodes.into_iter().map(Into::into).collect();
+        Ok(Self { installation, node: running.node_name.clone(), nodes, silent: away, interval_s, modules, edges })
+    }
+
+    /// What a drawing is of.
+    fn title(&self) -> String {
+        let word = if self.nodes.len() == 1 { "node" } else { "nodes" };
+        format!("{word} {} of {}", self.nodes.join(", "), self.installation)
+    }
+
+    /// What stands below a module's name: its node if there are several, its faces.
+    fn below<'a>(&'a self, module: &'a Module) -> impl Iterator<Item = String> + use<'a> {
+        let node = (self.nodes.len() > 1).then(|| format!("on {}", module.node));
+        node.into_iter().chain(module.faces.iter().map(|face| format!("+ {face}")))
     }
 
     /// The edges that a drawing shows.
     fn drawn(&self, all: bool) -> impl Iterator<Item = &Edge> {
         self.edges.iter().filter(move |edge| all || !matches!(edge.carries, Carries::Reply | Carries::Common))
     }
+}
+
+/// Looks at all nodes, and takes in what everybody sends.
+fn look(running: &Running, nodes: &[&str], tracks: &mut [Tracks]) -> Result<(Vec<Survey>, Vec<Silence>), Failure> {
+    let (mut surveys, mut silent) = (Vec::new(), Vec::new());
+    for (seen, tracks) in running.look_at(nodes, Scope::All)?.into_iter().zip(tracks) {
+        match seen {
+            Ok(survey) => {
+                tracks.look(survey.at_ns, survey.flows.iter().filter(|flow| flow.to != Name::NONE).cloned());
+                surveys.push(survey);
+            }
+            Err(silence) => silent.push(silence),
+        }
+    }
+    Ok((surveys, silent))
 }
 
 impl Edge {
@@ -223,8 +266,8 @@ impl Names<'_> {
     }
 
     fn description(&mut self, module: Name) -> Option<&Description> {
-        let noted = || Description::noted(&self.running.node, module);
-        self.descriptions.entry(module).or_insert_with(noted).as_ref()
+        let ask = || self.running.describe(module).ok();
+        self.descriptions.entry(module).or_insert_with(ask).as_ref()
     }
 
     fn what(&mut self, flow: &FlowInfo) -> (Carries, String) {
@@ -270,12 +313,18 @@ fn common(number: u16) -> String {
         c::DESCRIBE => "describe",
         c::PARAMETERS => "param get",
         c::SET_PARAMETERS => "param set",
+        c::TIME => "time",
         other => return format!("number {other}"),
     };
     name.into()
 }
 
 fn in_text(graph: &Graph) -> String {
+    let silent: String = graph.silent.iter().map(|silence| format!("\n{}", silence.text())).collect();
+    edges_in_text(graph) + &silent
+}
+
+fn edges_in_text(graph: &Graph) -> String {
     if graph.edges.is_empty() {
         return format!("nobody sent anything within {:.1} s; --silent shows who did before", graph.interval_s);
     }

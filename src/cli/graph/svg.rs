@@ -1,5 +1,6 @@
 //! The graph as a drawing. The library `layout` says where things go; this says how they look.
 
+use super::super::summary::SILENT;
 use super::{Carries, Edge, Graph, Module};
 use layout::core::base::Orientation;
 use layout::core::color::Color;
@@ -30,7 +31,7 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
         module.state != "left out" && (module.state != "tool" || edges.iter().any(|edge| edge.touches(&module.module)))
     };
     let modules: Vec<&Module> = graph.modules.iter().filter(in_use).collect();
-    let boxes: Vec<_> = modules.iter().map(|module| plan.add_node(box_of(module))).collect();
+    let boxes: Vec<_> = modules.iter().map(|module| plan.add_node(box_of(graph, module))).collect();
     let place = |name: &str| modules.iter().position(|module| module.module == name).map(|at| boxes[at]);
     for edge in &edges {
         if let (Some(from), Some(to)) = (place(&edge.from), place(&edge.to)) {
@@ -42,7 +43,7 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
     if !modules.is_empty() {
         plan.do_it(false, false, false, &mut drawing);
     }
-    drawing.finish(&format!("node {} of {}", graph.node, graph.installation))
+    drawing.finish(&graph.title())
 }
 
 impl Edge {
@@ -51,10 +52,10 @@ impl Edge {
     }
 }
 
-fn box_of(module: &Module) -> Element {
-    let faces = module.faces.iter().map(|face| format!("\n+ {face}"));
-    let text = format!("{}{}", module.module, faces.collect::<String>());
-    let fill = if module.state == "dead" { 0xf4_d9_d3 } else { 0xf1_f4_f8 };
+fn box_of(graph: &Graph, module: &Module) -> Element {
+    let below: String = graph.below(module).map(|line| format!("\n{line}")).collect();
+    let text = format!("{}{below}", module.module);
+    let fill = if matches!(module.state.as_str(), "dead" | SILENT) { 0xf4_d9_d3 } else { 0xf1_f4_f8 };
     let look = StyleAttr::new(colour(0x33_3a_44), 1, Some(colour(fill)), 6, FONT);
     let size = get_size_for_str(&text, FONT);
     let size = Point::new(size.x * LETTER + 24.0, size.y * 1.2 + 14.0);
@@ -270,7 +271,13 @@ mod tests {
     use crate::cli::graph::Carries;
 
     fn graph(modules: usize, edges: &[(usize, usize)]) -> Graph {
-        let module = |n: usize| Module { module: format!("m.{n}"), faces: Vec::new(), state: "on".into(), priority: 9 };
+        let module = |n: usize| Module {
+            module: format!("m.{n}"),
+            node: "main".into(),
+            faces: Vec::new(),
+            state: "on".into(),
+            priority: 9,
+        };
         let edge = |(from, to): &(usize, usize)| Edge {
             from: format!("m.{from}"),
             to: format!("m.{to}"),
@@ -284,6 +291,8 @@ mod tests {
         Graph {
             installation: "test".into(),
             node: "main".into(),
+            nodes: vec!["main".into()],
+            silent: Vec::new(),
             interval_s: 2.0,
             modules: (0..modules).map(module).collect(),
             edges: edges.iter().map(edge).collect(),

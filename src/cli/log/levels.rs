@@ -1,18 +1,16 @@
 //! From which level on modules speak: listed, and set while they run.
 
-use super::super::summary::is_left_out;
 use super::super::table::table;
 use super::super::target::Running;
 use super::super::{Failure, call, say};
 use super::{Arguments, filter};
 use rohrpost::common::OutputLevel;
 use rohrpost::config::Module;
-use rohrpost::survey::Survey;
 use rohrpost::{Name, ToolLink};
 use serde::Serialize;
 use std::process::ExitCode;
 
-/// A level for some modules of this node.
+/// A level for some modules.
 pub(super) struct Setting {
     modules: Vec<Name>,
     level: OutputLevel,
@@ -27,10 +25,12 @@ impl Setting {
         }
         let class = filter::class(name, running)?;
         let of_class = |module: &&Module| module.names().any(|name| name.class() == class);
-        let here = running.installation.modules_on(&running.node_name);
-        let modules: Vec<Name> = here.filter(of_class).map(|module| module.name).collect();
+        let nodes = running.shown();
+        let meant = running.installation.modules.iter().filter(|module| nodes.contains(&module.node.as_str()));
+        let modules: Vec<Name> = meant.filter(of_class).map(|module| module.name).collect();
         if modules.is_empty() {
-            return Err(format!("node `{}` has no module of class `{name}`", running.node_name).into());
+            let word = if nodes.len() == 1 { "node" } else { "nodes" };
+            return Err(format!("{word} `{}` has no module of class `{name}`", nodes.join("`, `")).into());
         }
         Ok(Self { modules, level })
     }
@@ -89,18 +89,22 @@ struct Listed {
     failure: Option<String>,
 }
 
-/// Lists the levels of all modules of the node.
+/// Lists the levels of all modules.
 pub(super) fn list(running: &Running, json: bool, tool: &mut ToolLink) -> Result<ExitCode, Failure> {
-    let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
     let mut lines = Vec::new();
-    for module in survey.modules.iter().filter(|module| !is_left_out(module, &running.installation)) {
-        let status = tool.status(module.name);
-        let failure = status.as_ref().err().map(|error| running.told(module.name, error).to_string());
-        let status = status.ok();
+    for (module, silence) in running.modules_to_ask()? {
+        let status = match silence {
+            Some(silence) => Err(silence.text()),
+            None => tool.status(module).map_err(|error| running.told(module, &error).to_string()),
+        };
+        let (status, failure) = match status {
+            Ok(status) => (Some(status), None),
+            Err(why) => (None, Some(why)),
+        };
         lines.push(Listed {
-            module: names(module.name, running),
+            module: names(module, running),
             level: status.as_ref().and_then(|status| status.output_level).map(OutputLevel::name),
-            at_start: running.installation.output_level(module.name).as_str(),
+            at_start: running.installation.output_level(module).as_str(),
             suppressed: status.as_ref().map_or(0, |status| status.output_suppressed),
             lost: status.as_ref().map_or(0, |status| status.output_lost),
             failure,

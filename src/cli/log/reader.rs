@@ -34,7 +34,8 @@ pub(super) struct News {
 
 impl<'a> Reader<'a> {
     pub(super) fn new(running: &'a Running, collector: Name) -> Self {
-        let launched = running.node.launcher().is_some();
+        // Of a collector on another node it is not known: it is waited for.
+        let launched = running.is_own(collector) && running.node.launcher().is_some();
         Self { running, collector, launched, life: None, next: 0, waiting: false }
     }
 

@@ -22,9 +22,9 @@ pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> 
     }
     for module in modules {
         let name = session.running.text(module);
-        let elsewhere = session.running.installation.module(module).map(|module| module.node.clone());
-        if let Some(node) = elsewhere.filter(|node| *node != session.running.node_name) {
-            say(format_args!("{name} is on node {node}; load it there"));
+        let node = session.running.node_of(module);
+        if !session.running.shown().contains(&node) {
+            say(format_args!("{name} is on node {node}, which is not meant; leave --node out"));
             continue;
         }
         match load(session, &saved, module, dry_run) {

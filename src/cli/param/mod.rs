@@ -9,7 +9,6 @@ mod show;
 use super::target::{Running, Target};
 use super::{Failure, say};
 use rohrpost::parameter::{Parameter, Refusal};
-use rohrpost::survey::Survey;
 use rohrpost::{CallError, Fault, Name, ToolLink};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -148,12 +147,16 @@ impl Session {
         }
     }
 
-    /// All modules of the node, as the configuration has them.
+    /// All modules, as the configuration has them; what cannot be asked is told.
     fn modules(&self) -> Result<Vec<Name>, Failure> {
-        let survey = Survey::new(&self.running.node, &self.running.installation, &self.running.node_name)?;
-        let all = survey.modules.iter();
-        let asked = all.filter(|module| !super::summary::is_left_out(module, &self.running.installation));
-        Ok(asked.map(|module| module.name).collect())
+        let mut asked = Vec::new();
+        for (module, silence) in self.running.modules_to_ask()? {
+            match silence {
+                Some(silence) => eprintln!("{}: {}", self.running.text(module), silence.text()),
+                None => asked.push(module),
+            }
+        }
+        Ok(asked)
     }
 
     /// A refusal or failed call, with the module as people write it, and what to try.

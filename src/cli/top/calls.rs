@@ -1,12 +1,14 @@
 //! What `top` asks for: to switch modules on and off, what was said, why a module is in error. Nothing here waits:
 //! calls are begun, and looked after each time round, so that a module that hangs freezes no screen.
 
+use super::super::sight::{Silence, silence};
 use super::super::target::Running;
 use rohrpost::CallError;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::launch::{ChildState, Children, ControlError};
+use rohrpost::launch::{ChildState, Children, ControlError, Look, launcher_of};
 use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::survey::{Distant, Scope, Seen, Survey};
 use rohrpost::{Name, ToolLink};
 use std::time::Duration;
 
@@ -26,7 +28,7 @@ enum Wants {
     Lines,
     Why,
     Restart(Name),
-    /// All modules of launch; those it has told of so far.
+    /// All modules of a launch; those it has told of so far.
     Children(Vec<ChildState>),
 }
 
@@ -36,19 +38,24 @@ pub(super) enum Answer {
     Lines(Result<Page, String>),
     Why(Name, String),
     Restarted(Name, Result<(), String>),
-    Children(Vec<ChildState>),
+    /// Of the launch of this name.
+    Children(Name, Vec<ChildState>),
+    /// What another node shows, or why it does not.
+    Seen(String, Result<Survey, Silence>),
 }
 
 /// Top's place among those that call.
 pub(super) struct Calls {
     tool: ToolLink,
     under_way: Vec<Call>,
+    /// Looks at other nodes.
+    looks: Vec<(String, Distant)>,
 }
 
 impl Calls {
     /// Takes part as a tool.
     pub(super) fn join(running: &Running) -> Result<Self, super::Failure> {
-        Ok(Self { tool: running.join(PATIENCE)?, under_way: Vec::new() })
+        Ok(Self { tool: running.join(PATIENCE)?, under_way: Vec::new(), looks: Vec::new() })
     }
 
     /// Gives the place back.
@@ -74,17 +81,30 @@ impl Calls {
 
     /// Has launch restart a module.
     pub(super) fn restart(&mut self, running: &Running, module: Name) -> Option<Answer> {
-        let begun = self.tool.begin_restart(&running.text(module));
-        self.begun(running, self.tool.launcher(), Wants::Restart(module), begun)
+        let launcher = running.launcher_of(module).unwrap_or(self.tool.launcher());
+        let begun = self.tool.begin_restart(launcher, &running.text(module));
+        self.begun(running, launcher, Wants::Restart(module), begun)
     }
 
-    /// Asks launch how it stands with the modules that do not run.
-    pub(super) fn children(&mut self, running: &Running) -> Option<Answer> {
-        if self.under_way.iter().any(|call| matches!(call.wants, Wants::Children(_))) {
+    /// Asks a launch how it stands with the modules that do not run.
+    pub(super) fn children(&mut self, running: &Running, launcher: Name) -> Option<Answer> {
+        if self.under_way.iter().any(|call| call.to == launcher && matches!(call.wants, Wants::Children(_))) {
             return None;
         }
-        let begun = self.tool.begin_children(0);
-        self.begun(running, self.tool.launcher(), Wants::Children(Vec::new()), begun)
+        let begun = self.tool.begin_children(launcher, 0);
+        self.begun(running, launcher, Wants::Children(Vec::new()), begun)
+    }
+
+    /// Begins to look at other nodes, but for those that are being looked at.
+    pub(super) fn look(&mut self, running: &Running, nodes: &[&str]) {
+        for node in nodes {
+            let launcher = launcher_of(&running.installation, node);
+            let Some(launcher) = launcher.filter(|_| self.looks.iter().all(|(known, _)| known != node)) else {
+                continue;
+            };
+            let distant = Distant::new(launcher, Look::Survey(Scope::All), PATIENCE, nodes.len());
+            self.looks.push(((*node).into(), distant));
+        }
     }
 
     /// Asks a module in error why.
@@ -106,7 +126,7 @@ impl Calls {
 
     /// Whether answers are awaited.
     pub(super) fn waits(&self) -> bool {
-        !self.under_way.is_empty()
+        !self.under_way.is_empty() || !self.looks.is_empty()
     }
 
     /// The answers that have come, and the calls whose time is over.
@@ -122,6 +142,18 @@ impl Calls {
                 Ok(bytes) => self.answer(running, call.to, call.wants, &bytes),
                 Err(error) => failed(running, call.to, call.wants, &error),
             });
+        }
+        for (node, mut look) in std::mem::take(&mut self.looks) {
+            match look.poll(&mut self.tool.link) {
+                None => self.looks.push((node, look)),
+                Some(Ok(Seen::Survey(survey))) => answers.push(Answer::Seen(node, Ok(*survey))),
+                // It was not asked for one.
+                Some(Ok(Seen::Mailbox(_))) => {}
+                Some(Err(failure)) => {
+                    let silence = silence(&running.installation, &node, &failure);
+                    answers.push(Answer::Seen(node, Err(silence)));
+                }
+            }
         }
         answers
     }
@@ -144,9 +176,9 @@ impl Calls {
                 let last = page.states.is_empty() || known.len() + page.states.len() >= page.total.into();
                 known.extend(page.states);
                 if last {
-                    return Some(Answer::Children(known));
+                    return Some(Answer::Children(to, known));
                 }
-                let begun = self.tool.begin_children(known.len() as u16);
+                let begun = self.tool.begin_children(to, known.len() as u16);
                 self.begun(running, to, Wants::Children(known), begun)
             }
         }

@@ -8,6 +8,7 @@ use std::cmp::Ordering;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Column {
     Module,
+    Node,
     State,
     Class,
     Priority,
@@ -33,8 +34,9 @@ const NAME_MAX: u16 = 34;
 
 impl Column {
     /// From left to right.
-    pub(super) const ALL: [Self; 16] = [
+    pub(super) const ALL: [Self; 17] = [
         Self::Module,
+        Self::Node,
         Self::State,
         Self::Class,
         Self::Priority,
@@ -53,9 +55,10 @@ impl Column {
     ];
 
     /// As they are given room, the first always.
-    const BY_IMPORTANCE: [Self; 16] = [
+    const BY_IMPORTANCE: [Self; 17] = [
         Self::Module,
         Self::State,
+        Self::Node,
         Self::In,
         Self::Lost,
         Self::Waiting,
@@ -75,6 +78,7 @@ impl Column {
     pub(super) const fn head(self) -> &'static str {
         match self {
             Self::Module => "module",
+            Self::Node => "node",
             Self::State => "state",
             Self::Class => "class",
             Self::Priority => "prio",
@@ -97,7 +101,8 @@ impl Column {
     pub(super) const fn text(self) -> &'static str {
         match self {
             Self::Module => "name, and with + the number of its further names",
-            Self::State => "starting, off, on, error, stopping; dead: no process; left out: optional",
+            Self::Node => "where it runs; shown when there are several nodes",
+            Self::State => "starting, off, on, error, stopping; dead: no process; silent: its node; left out: optional",
             Self::Class => "class: who is of it, is as important",
             Self::Priority => "class id = priority of its commands, 255 most urgent",
             Self::Scheduling => "what the kernel says: fifo 1..99, or nice",
@@ -119,7 +124,7 @@ impl Column {
     const fn width(self) -> u16 {
         match self {
             Self::Module => NAME_MIN,
-            Self::State => 8,
+            Self::State | Self::Node => 8,
             Self::Class | Self::Pid => 7,
             Self::Priority | Self::Restarts => 4,
             Self::Scheduling => 7,
@@ -133,7 +138,7 @@ impl Column {
 
     /// Numbers stand to the right.
     pub(super) const fn is_number(self) -> bool {
-        !matches!(self, Self::Module | Self::State | Self::Class | Self::Scheduling | Self::Why)
+        !matches!(self, Self::Module | Self::Node | Self::State | Self::Class | Self::Scheduling | Self::Why)
     }
 
     /// What it says of a module.
@@ -142,6 +147,7 @@ impl Column {
         let waited = |seconds: Option<f64>| seconds.map_or("-".into(), units::short);
         match self {
             Self::Module => row.line.module.clone(),
+            Self::Node => row.line.node.clone(),
             Self::State => row.line.state.clone(),
             Self::Class => row.class.clone(),
             Self::Priority => row.line.priority.to_string(),
@@ -165,7 +171,7 @@ impl Column {
         let number = |of: fn(&Row) -> Option<f64>| of(b).unwrap_or(-1.0).total_cmp(&of(a).unwrap_or(-1.0));
         match self {
             Self::State => severity(&a.line.state).cmp(&severity(&b.line.state)),
-            Self::Module | Self::Class | Self::Scheduling | Self::Why => self.cell(a).cmp(&self.cell(b)),
+            Self::Module | Self::Node | Self::Class | Self::Scheduling | Self::Why => self.cell(a).cmp(&self.cell(b)),
             Self::Priority => b.line.priority.cmp(&a.line.priority),
             Self::In => number(|row| row.line.received_per_s),
             Self::Out => number(|row| row.sent_per_s),
@@ -183,7 +189,8 @@ impl Column {
 
 /// What needs a person first.
 pub(super) fn severity(state: &str) -> usize {
-    let order = ["failed", "dead", "error", "stopping", "waiting", "starting", "off", "ended", "on", "left out"];
+    let order =
+        ["failed", "dead", "silent", "error", "stopping", "waiting", "starting", "off", "ended", "on", "left out"];
     order.iter().position(|known| *known == state).unwrap_or(order.len())
 }
 
@@ -215,12 +222,13 @@ pub(super) fn memory(bytes: u64) -> String {
     }
 }
 
-/// The columns that have room in so many, with their widths, from left to right. `names` is what the longest name needs.
-pub(super) fn fit(room: u16, names: u16) -> Vec<(Column, u16)> {
+/// The columns that have room in so many, with their widths, from left to right. `names` is what the longest name needs;
+/// `nodes`: whether there are several.
+pub(super) fn fit(room: u16, names: u16, nodes: bool) -> Vec<(Column, u16)> {
     let names = names.clamp(NAME_MIN, NAME_MAX);
     let mut chosen = Vec::new();
     let mut used = 0;
-    for column in Column::BY_IMPORTANCE {
+    for column in Column::BY_IMPORTANCE.into_iter().filter(|column| nodes || *column != Column::Node) {
         let width = column.width() + if chosen.is_empty() { 0 } else { GAP };
         // The first that finds no room ends it: a less important one is not shown in the place of a more important one.
         if used + width > room && !chosen.is_empty() {
@@ -269,14 +277,15 @@ mod tests {
     #[test]
     fn narrow_terminals_keep_what_matters() {
         for room in 0..200 {
-            let columns = fit(room, 20);
+            let columns = fit(room, 20, true);
             let used: u16 = columns.iter().map(|(_, width)| width + GAP).sum::<u16>() - GAP;
             assert!(used <= room.max(1), "{used} in {room}: {columns:?}");
             let kept = columns.len();
             let most_important = &Column::BY_IMPORTANCE[..kept];
             assert!(columns.iter().all(|(column, _)| most_important.contains(column)), "{room}: {columns:?}");
         }
-        assert_eq!(fit(21, 20).iter().map(|(c, _)| *c).collect::<Vec<_>>(), [Column::Module, Column::State]);
-        assert_eq!(fit(160, 20).len(), Column::ALL.len());
+        assert_eq!(fit(21, 20, true).iter().map(|(c, _)| *c).collect::<Vec<_>>(), [Column::Module, Column::State]);
+        assert_eq!(fit(168, 20, true).len(), Column::ALL.len());
+        assert_eq!(fit(160, 20, false).len(), Column::ALL.len() - 1);
     }
 }

@@ -14,13 +14,13 @@ use rohrpost::survey::sum;
 use rohrpost::value::{describe_result, describe_type};
 use std::time::Duration;
 
-/// The page as lines; those that begin without a blank are headings. `noted` knows what modules say of themselves.
+/// The page as lines; those that begin without a blank are headings. `describe` knows what modules say of themselves.
 pub(super) fn page(
     installation: &Installation,
     sample: &Sample,
     model: &Model,
     name: Name,
-    noted: impl Fn(Name) -> Option<Description>,
+    mut describe: impl FnMut(Name) -> Option<Description>,
 ) -> Vec<String> {
     let Some(row) = model.row(name) else {
         return vec![format!("{} is not here any more", installation.classes.format(name))];
@@ -51,7 +51,7 @@ pub(super) fn page(
     lines.extend(peers("receives from", &row.receives_from));
     let names = module.into_iter().flat_map(|module| std::iter::once(&module.name).chain(&module.faces));
     for face in names {
-        lines.extend(noted(*face).into_iter().flat_map(|description| interface(installation, *face, &description)));
+        lines.extend(describe(*face).into_iter().flat_map(|description| interface(installation, *face, &description)));
     }
     lines
 }

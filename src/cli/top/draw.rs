@@ -188,7 +188,7 @@ fn put(to: &mut Buffer, place: Rect, text: &str, style: Style) {
 /// The columns that a table of this width has.
 pub(super) fn columns(model: &Model, width: u16) -> Vec<(Column, u16)> {
     let longest = model.modules.iter().map(|row| full_name(row).chars().count()).max().unwrap_or(0);
-    fit(width.saturating_sub(MARK), longest as u16)
+    fit(width.saturating_sub(MARK), longest as u16, model.nodes.len() > 1)
 }
 
 fn full_name(row: &Row) -> String {

@@ -1,5 +1,6 @@
 //! The loop at the terminal: looks, draws, takes keys, and looks after what was asked.
 
+use super::super::sight::Silence;
 use super::super::target::Running;
 use super::Failure;
 use super::app::{Action, App, Screen};
@@ -9,15 +10,16 @@ use super::draw::{OutputText, View, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
-use super::sample::{self, Children, by_name};
+use super::sample::{self, Children, Seen, by_name};
 use ratatui::DefaultTerminal;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
 use ratatui::crossterm::{cursor, execute};
 use rohrpost::Name;
+use rohrpost::description::Description;
 use rohrpost::launch::{Event as Told, events};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
@@ -92,6 +94,22 @@ fn give_back() {
     let _ = execute!(std::io::stdout(), LeaveAlternateScreen, cursor::Show);
 }
 
+/// The nodes that are meant, but for the own one.
+fn others(running: &Running) -> impl Iterator<Item = &str> {
+    running.shown().into_iter().filter(|node| *node != running.node_name)
+}
+
+fn not_seen_yet(running: &Running) -> Seen {
+    others(running).map(|node| Err(Silence { node: node.into(), why: "it was not heard yet".into() })).collect()
+}
+
+/// What all nodes that are meant show, in the order of the configuration.
+fn in_order(running: &Running, own: Seen, others: &Seen) -> Seen {
+    let (mut own, mut others) = (own.into_iter(), others.iter().cloned());
+    let next = |node: &str| if node == running.node_name { own.next() } else { others.next() };
+    running.shown().into_iter().filter_map(next).collect()
+}
+
 struct Live {
     running: Running,
     interval: Duration,
@@ -101,6 +119,12 @@ struct Live {
     earlier: Option<Sample>,
     now: Sample,
     model: Model,
+    /// What other nodes showed last, in the order of the configuration.
+    others: Seen,
+    /// Since when those are silent that are.
+    silent_since: HashMap<String, Instant>,
+    /// What modules of other nodes offer, as they said when they were asked once.
+    described: HashMap<Name, Option<Description>>,
     /// Our place among those that call; none when there is no room for one more.
     calls: Option<Calls>,
     output: Output,
@@ -114,8 +138,11 @@ struct Live {
 
 impl Live {
     fn new(running: Running, interval: Duration, palette: Palette) -> Result<Self, Failure> {
-        let now = sample::take(&running, None, &Children::new())?;
-        let model = Model::new(&running.installation, &running.node_name, &now, None, &HashMap::new());
+        let others = not_seen_yet(&running);
+        let seen = in_order(&running, sample::own(&running)?, &others);
+        let now = sample::put_together(&running, seen, None, &Children::new());
+        let model =
+            Model::new(&running.installation, &running.node_name, &running.shown(), &now, None, &HashMap::new());
         let output = Output::new(&running.installation);
         let mut live = Self {
             running,
@@ -125,6 +152,9 @@ impl Live {
             earlier: None,
             now,
             model,
+            others,
+            silent_since: HashMap::new(),
+            described: HashMap::new(),
             calls: None,
             output,
             errors: HashMap::new(),
@@ -176,7 +206,7 @@ impl Live {
 
     /// Looks at the node anew; rates are counted from the look before.
     fn look(&mut self) {
-        match sample::take(&self.running, Some(&self.now), &self.children) {
+        match self.sample(Some(&self.now)) {
             Ok(now) => self.earlier = Some(std::mem::replace(&mut self.now, now)),
             Err(_) => self.now.launched = false,
         }
@@ -189,25 +219,43 @@ impl Live {
 
     /// Looks for what has just changed; rates are counted from where they were.
     fn peek(&mut self) {
-        if let Ok(now) = sample::take(&self.running, self.earlier.as_ref(), &self.children) {
+        if let Ok(now) = self.sample(self.earlier.as_ref()) {
             self.now = now;
         }
         self.make_model();
     }
 
+    /// What there is now: of the own node anew, of the others what they showed last.
+    fn sample(&self, earlier: Option<&Sample>) -> Result<Sample, Failure> {
+        let mut others = self.others.clone();
+        for silence in others.iter_mut().filter_map(|seen| seen.as_mut().err()) {
+            if let Some(since) = self.silent_since.get(&silence.node) {
+                silence.why = format!("{}, for {} s", silence.why, since.elapsed().as_secs());
+            }
+        }
+        let seen = in_order(&self.running, sample::own(&self.running)?, &others);
+        Ok(sample::put_together(&self.running, seen, earlier, &self.children))
+    }
+
     fn make_model(&mut self) {
         let Self { running, now, earlier, errors, children, .. } = self;
         let why = sample::why(now, errors, children);
-        self.model = Model::new(&running.installation, &running.node_name, now, earlier.as_ref(), &why);
+        self.model =
+            Model::new(&running.installation, &running.node_name, &running.shown(), now, earlier.as_ref(), &why);
     }
 
     /// The node may have been launched again, and perhaps with another configuration.
     fn find_again(&mut self) {
         let Ok(running) = self.running.again() else { return };
-        let Ok(now) = sample::take(&running, None, &Children::new()) else { return };
+        let Ok(own) = sample::own(&running) else { return };
+        let others = not_seen_yet(&running);
+        let now = sample::put_together(&running, in_order(&running, own, &others), None, &Children::new());
         if !now.launched {
             return;
         }
+        self.others = others;
+        self.silent_since.clear();
+        self.described.clear();
         if let Some(calls) = self.calls.take() {
             calls.close();
         }
@@ -222,6 +270,8 @@ impl Live {
     fn ask(&mut self) {
         let Some(calls) = &mut self.calls else { return };
         let mut answers = Vec::new();
+        let others: Vec<&str> = others(&self.running).collect();
+        calls.look(&self.running, &others);
         if let Some((collector, from)) = self.output.wants() {
             answers.extend(calls.lines(&self.running, collector, from));
         }
@@ -233,8 +283,9 @@ impl Live {
         let absent: Vec<Name> = self.now.absent().collect();
         let tries = |name| self.children.get(name).is_some_and(|child| !child.phase.is_over());
         if absent != self.absent || absent.iter().any(tries) {
+            let launchers: BTreeSet<Name> = absent.iter().filter_map(|name| self.running.launcher_of(*name)).collect();
+            answers.extend(launchers.into_iter().filter_map(|launcher| calls.children(&self.running, launcher)));
             self.absent = absent;
-            answers.extend(calls.children(&self.running));
         }
         answers.into_iter().for_each(|answer| self.answer(answer));
     }
@@ -261,9 +312,30 @@ impl Live {
                 self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
                 self.peek();
             }
-            Answer::Children(children) => {
-                self.children = by_name(&self.running, children);
+            Answer::Children(launcher, children) => {
+                let running = &self.running;
+                self.children.retain(|name, _| running.launcher_of(*name) != Some(launcher));
+                self.children.extend(by_name(running, children));
                 self.peek();
+            }
+            Answer::Seen(node, seen) => {
+                match &seen {
+                    Ok(_) => {
+                        self.silent_since.remove(&node);
+                    }
+                    Err(_) => {
+                        self.silent_since.entry(node.clone()).or_insert_with(Instant::now);
+                    }
+                }
+                let at = others(&self.running).position(|other| other == node);
+                if let Some(known) = at.and_then(|at| self.others.get_mut(at)) {
+                    // What it shows first is not to wait for the next look.
+                    let first = known.is_err() && seen.is_ok();
+                    *known = seen;
+                    if first {
+                        self.peek();
+                    }
+                }
             }
             Answer::Lines(page) => {
                 if self.output.take(page) {
@@ -318,8 +390,14 @@ impl Live {
     fn draw(&mut self, terminal: &mut DefaultTerminal) -> Result<(), Failure> {
         let details = match self.app.screen {
             Screen::Details(name) => {
-                let noted = |face| self.running.noted(face).ok();
-                details::page(&self.running.installation, &self.now, &self.model, name, noted)
+                let Self { running, described, now, model, .. } = self;
+                let describe = |face| match running.is_own(face) {
+                    true => running.describe(face).ok(),
+                    // Asked once, and not if it would only be waited for.
+                    false if now.is_silent(name) => None,
+                    false => described.entry(face).or_insert_with(|| running.describe(face).ok()).clone(),
+                };
+                details::page(&running.installation, now, model, name, describe)
             }
             Screen::Table | Screen::Help => Vec::new(),
         };

@@ -1,9 +1,9 @@
-//! `rohrpost top`: the modules of a node, live (seed 002, 5.3: the module monitor).
+//! `rohrpost top`: the modules of all nodes, live (seed 002, 5.3: the module monitor).
 //!
 //! ```text
-//! shared memory, /proc ──sample──▶ Sample ─┐
-//!                                  Sample ─┴─▶ Model ──┐
-//! keys ──▶ App ──▶ Action ──▶ Calls ──answers──▶ Live ─┴──▶ View ──▶ screen
+//! shared memory, /proc ─────┬─sample──▶ Sample ─┐
+//! launches of other nodes ──┘           Sample ─┴─▶ Model ──┐
+//! keys ──▶ App ──▶ Action ──▶ Calls ──answers──▶ Live ──────┴──▶ View ──▶ screen
 //! ```
 //!
 //! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` touch the world.
@@ -17,7 +17,6 @@ mod live;
 mod model;
 mod output;
 mod palette;
-mod process;
 mod sample;
 #[cfg(test)]
 mod tests;
@@ -27,8 +26,9 @@ use super::target::{Running, Target};
 use super::{Failure, say};
 use model::Model;
 use rohrpost::Name;
+use rohrpost::survey::Scope;
 use sample::Children;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -38,7 +38,7 @@ use std::time::Duration;
   rohrpost top                  ? shows the keys, q ends it
   rohrpost top --once           one plain table
   rohrpost top --json           one object with everything, for programs
-Counters are read from shared memory: looking disturbs nobody.")]
+Counters are read from shared memory, of other nodes by way of their launches: looking disturbs nobody.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
@@ -78,20 +78,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 /// What there is to show after one interval. Whoever is in error is asked why, and launch about those that do not run.
 fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
-    let earlier = sample::take(running, None, &Children::new())?;
+    let look = || running.look_at(&running.shown(), Scope::All);
+    let earlier = sample::put_together(running, look()?, None, &Children::new());
     std::thread::sleep(interval);
-    let mut now = sample::take(running, Some(&earlier), &Children::new())?;
+    let seen = look()?;
+    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &Children::new());
     let (mut said, mut children) = (HashMap::new(), Children::new());
     let names: Vec<Name> = now.survey.modules.iter().map(|module| module.name).collect();
     let ails = now.absent().next().is_some() || names.iter().any(|name| now.in_error(*name));
     // What nobody answers stays unsaid; the counters are told all the same.
     if ails && let Ok(mut tool) = running.join(calls::PATIENCE) {
-        children = tool.children().map(|children| sample::by_name(running, children)).unwrap_or_default();
-        now = sample::take(running, Some(&earlier), &children)?;
+        let absent: Vec<Name> = now.absent().collect();
+        let launchers: BTreeSet<Name> = absent.iter().filter_map(|name| running.launcher_of(*name)).collect();
+        let told = launchers.into_iter().filter_map(|launcher| tool.children(launcher).ok()).flatten();
+        children = sample::by_name(running, told.collect());
+        now = sample::put_together(running, seen, Some(&earlier), &children);
         let status = |name| Some((name, tool.status(name).ok()?.error));
         said = names.into_iter().filter(|name| now.in_error(*name)).filter_map(status).collect();
         tool.close();
     }
     let why = sample::why(&now, &mut said, &children);
-    Ok(Model::new(&running.installation, &running.node_name, &now, Some(&earlier), &why))
+    Ok(Model::new(&running.installation, &running.node_name, &running.shown(), &now, Some(&earlier), &why))
 }

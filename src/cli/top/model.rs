@@ -1,8 +1,8 @@
 //! What `top` shows: two looks at a node, made into one table. Pure; also what `--json` prints.
 
 use super::super::list::{MailboxLine, mailbox_lines};
+use super::super::sight::Silence;
 use super::super::summary::{Losses, ModuleLine};
-use super::process::Usage;
 use rohrpost::Name;
 use rohrpost::config::Installation;
 use rohrpost::mailbox::{FlowInfo, Loss, ModuleState, saturating_sum};
@@ -11,17 +11,16 @@ use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
 
-/// A node at one moment, as far as it can be read without asking anybody.
+/// What is shown, at one moment.
 pub(super) struct Sample {
+    /// All nodes that are meant, as one.
     pub(super) survey: Survey,
+    /// Nodes that do not show themselves.
+    pub(super) silent: Vec<Silence>,
     /// What the table of `list` says, in the order of the survey's modules.
     pub(super) lines: Vec<ModuleLine>,
-    /// By process id.
-    pub(super) usage: HashMap<u32, Usage>,
     pub(super) time: TimeNow,
-    /// On the monotonic clock.
-    pub(super) at_ns: u64,
-    /// Whether a launch watches over the node.
+    /// Whether a launch watches over the node that is looked from.
     pub(super) launched: bool,
 }
 
@@ -32,9 +31,15 @@ impl Sample {
         process.is_some_and(|process| process.state == Some(ModuleState::Error))
     }
 
-    /// Modules that have no process.
+    /// Whether the module's node does not show itself.
+    pub(super) fn is_silent(&self, name: Name) -> bool {
+        self.survey.module(name).is_some_and(|module| module.at_ns.is_none())
+    }
+
+    /// Modules that have no process, on nodes that show themselves.
     pub(super) fn absent(&self) -> impl Iterator<Item = Name> {
-        self.survey.modules.iter().filter(|module| module.process.is_none()).map(|module| module.name)
+        let is_absent = |module: &&ModuleSurvey| module.process.is_none() && module.at_ns.is_some();
+        self.survey.modules.iter().filter(is_absent).map(|module| module.name)
     }
 }
 
@@ -53,7 +58,12 @@ pub(super) struct TimeNow {
 #[derive(Serialize)]
 pub(super) struct Model {
     pub(super) installation: String,
+    /// The node that is looked from.
     pub(super) node: String,
+    /// Those that are shown.
+    pub(super) nodes: Vec<String>,
+    /// Those of them that do not show themselves.
+    pub(super) silent: Vec<Silence>,
     #[serde(flatten)]
     pub(super) time: TimeNow,
     pub(super) launched: bool,
@@ -109,13 +119,14 @@ impl Model {
     pub(super) fn new(
         installation: &Installation,
         node: &str,
+        nodes: &[&str],
         now: &Sample,
         earlier: Option<&Sample>,
         errors: &HashMap<Name, String>,
     ) -> Self {
-        let interval = earlier.map(|earlier| now.survey.at.duration_since(earlier.survey.at));
+        let interval = earlier.map(|earlier| between(earlier.survey.at_ns, now.survey.at_ns));
         let rows = now.survey.modules.iter().zip(&now.lines).map(|(module, line)| {
-            let before = earlier.and_then(|earlier| earlier.survey.module(module.name)).zip(interval);
+            let before = earlier.and_then(|earlier| since(module, earlier));
             let waited = before.map(|(before, _)| module.waited.since(&before.waited));
             let quantile = |share| waited.as_ref()?.quantile(share).map(|waited| waited.as_secs_f64());
             Row {
@@ -130,9 +141,10 @@ impl Model {
                 uptime_s: module
                     .process
                     .as_ref()
-                    .map(|process| now.at_ns.saturating_sub(process.joined_ns) as f64 / 1e9),
-                cpu_percent: line.pid.zip(earlier).and_then(|(pid, earlier)| cpu_percent(pid, now, earlier)),
-                memory_bytes: line.pid.and_then(|pid| now.usage.get(&pid)).map(|usage| usage.memory_bytes),
+                    .zip(module.at_ns)
+                    .map(|(process, at_ns)| at_ns.saturating_sub(process.joined_ns) as f64 / 1e9),
+                cpu_percent: before.and_then(|(before, interval)| cpu_percent(module, before, interval)),
+                memory_bytes: module.usage.map(|usage| usage.memory_bytes),
                 sends_to: peers(installation, now, earlier, |flow| (flow.module == module.name).then_some(flow.to)),
                 receives_from: peers(installation, now, earlier, |flow| {
                     let to = flow.to.module();
@@ -154,6 +166,8 @@ impl Model {
         Self {
             installation: installation.name.clone(),
             node: node.into(),
+            nodes: nodes.iter().map(|node| (*node).into()).collect(),
+            silent: now.silent.clone(),
             time: now.time,
             launched: now.launched,
             interval_s: interval.map(|interval| interval.as_secs_f64()),
@@ -190,7 +204,7 @@ fn peers(
     earlier: Option<&Sample>,
     end: impl Fn(&FlowInfo) -> Option<Name>,
 ) -> Vec<Peer> {
-    let since = earlier.map(|earlier| (earlier, now.survey.at.duration_since(earlier.survey.at)));
+    let since = earlier.map(|earlier| (earlier, between(earlier.survey.at_ns, now.survey.at_ns)));
     let mut peers: Vec<Peer> = Vec::new();
     for flow in now.survey.flows.iter().filter(|flow| !flow.is_publication()) {
         let Some(name) = end(flow).filter(|name| *name != Name::NONE) else { continue };
@@ -216,9 +230,21 @@ fn per_s(now: u64, before: u64, interval: Duration) -> f64 {
     if interval.is_zero() { 0.0 } else { now.saturating_sub(before) as f64 / interval.as_secs_f64() }
 }
 
+/// From one moment of a clock to a later one.
+fn between(earlier_ns: u64, now_ns: u64) -> Duration {
+    Duration::from_nanos(now_ns.saturating_sub(earlier_ns))
+}
+
+/// The module at an earlier look, and how long ago that was on its own node's clock; none if that did not show itself anew.
+fn since<'a>(module: &ModuleSurvey, earlier: &'a Sample) -> Option<(&'a ModuleSurvey, Duration)> {
+    let before = earlier.survey.module(module.name)?;
+    let interval = between(before.at_ns?, module.at_ns?);
+    (!interval.is_zero()).then_some((before, interval))
+}
+
 /// Of one processor, in the time between two looks; none when the process is not the same any more.
-fn cpu_percent(pid: u32, now: &Sample, earlier: &Sample) -> Option<f64> {
-    let interval = now.survey.at.duration_since(earlier.survey.at).as_secs_f64();
-    let ran = now.usage.get(&pid)?.cpu.checked_sub(earlier.usage.get(&pid)?.cpu)?;
-    (interval > 0.0).then(|| ran.as_secs_f64() / interval * 100.0)
+fn cpu_percent(now: &ModuleSurvey, before: &ModuleSurvey, interval: Duration) -> Option<f64> {
+    let pid = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.pid);
+    let ran = now.usage?.cpu.checked_sub(before.usage?.cpu).filter(|_| pid(now) == pid(before))?;
+    Some(ran.as_secs_f64() / interval.as_secs_f64() * 100.0)
 }

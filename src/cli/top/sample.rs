@@ -1,30 +1,46 @@
-//! One look at a node: shared memory and /proc. It asks nobody and waits for nobody.
+//! One look at a node, and at those others that showed themselves: it waits for nobody.
 
 use super::super::Failure;
+use super::super::sight::Silence;
 use super::super::summary::module_lines;
 use super::super::target::Running;
 use super::model::{Sample, TimeNow};
-use super::process::Usage;
 use rohrpost::Name;
 use rohrpost::launch::ChildState;
-use rohrpost::mailbox::{SystemClock, monotonic_ns};
-use rohrpost::survey::Survey;
+use rohrpost::mailbox::SystemClock;
+use rohrpost::survey::{Scope, Survey};
 use std::collections::HashMap;
 
-/// What launch said of its modules, by name.
+/// What launches said of their modules, by name.
 pub(super) type Children = HashMap<Name, ChildState>;
 
-/// Looks at a node; `earlier` makes rates. Where a module does not run, launch may have said why.
-pub(super) fn take(running: &Running, earlier: Option<&Sample>, children: &Children) -> Result<Sample, Failure> {
-    let survey = Survey::new(&running.node, &running.installation, &running.node_name)?;
+/// What each of some nodes shows, or why it does not.
+pub(super) type Seen = Vec<Result<Survey, Silence>>;
+
+/// Looks at the own node, if it is meant.
+pub(super) fn own(running: &Running) -> Result<Seen, Failure> {
+    let is_own = |node: &&str| *node == running.node_name;
+    let own: Vec<&str> = running.shown().into_iter().filter(is_own).collect();
+    running.look_at(&own, Scope::All)
+}
+
+/// Puts together what nodes show; `earlier` makes rates. Where a module does not run, launch may have said why.
+pub(super) fn put_together(running: &Running, seen: Seen, earlier: Option<&Sample>, children: &Children) -> Sample {
+    let (mut surveys, mut silent) = (Vec::new(), Vec::new());
+    for seen in seen {
+        match seen {
+            Ok(survey) => surveys.push(survey),
+            Err(silence) => silent.push(silence),
+        }
+    }
+    let names: Vec<&str> = silent.iter().map(|silence| silence.node.as_str()).collect();
+    let survey = Survey::joined(surveys, &names, &running.installation);
     // What runs says more of itself than launch knew when it was asked.
     let absent = |name| survey.module(name).is_some_and(|module| module.process.is_none());
     let lines = module_lines(&running.installation, &survey, earlier.map(|sample| &sample.survey), |name| {
         let child = children.get(&name).filter(|_| absent(name));
         child.map_or((0, None), |child| (child.restarts, Some(child.phase)))
     });
-    let pids = lines.iter().filter_map(|line| line.pid);
-    let usage = pids.filter_map(|pid| Some((pid, Usage::of(pid)?))).collect();
     let clock = SystemClock::open(&running.node);
     let record = clock.record();
     let time = TimeNow {
@@ -33,10 +49,10 @@ pub(super) fn take(running: &Running, earlier: Option<&Sample>, children: &Child
         time_pace: record.map_or(1.0, |record| record.pace_ppb as f64 / 1e9),
     };
     let launched = running.node.launcher().is_some();
-    Ok(Sample { survey, lines, usage, time, at_ns: monotonic_ns(), launched })
+    Sample { survey, silent, lines, time, launched }
 }
 
-/// What launch said, by the names of its modules.
+/// What a launch said, by the names of its modules.
 pub(super) fn by_name(running: &Running, children: Vec<ChildState>) -> Children {
     let name = |child: &ChildState| running.module(&child.module).ok();
     children.into_iter().filter_map(|child| Some((name(&child)?, child))).collect()

@@ -39,20 +39,29 @@ pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
 
 /// Everything as plain text, for `--once`.
 pub(super) fn table(model: &Model) -> String {
-    let heads = Column::ALL.map(|column| format!("{}{}", if column.is_number() { ">" } else { "" }, column.head()));
-    let rows = model.modules.iter().map(|row| Column::ALL.map(|column| column.cell(row)));
-    let table = table::table(heads.each_ref().map(String::as_str), rows);
+    let several = model.nodes.len() > 1;
+    let columns = || Column::ALL.into_iter().filter(|column| several || *column != Column::Node);
+    let heads = columns().map(|column| format!("{}{}", if column.is_number() { ">" } else { "" }, column.head()));
+    let heads: Vec<String> = heads.collect();
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    let rows = model.modules.iter().map(|row| columns().map(|column| column.cell(row)).collect::<Vec<_>>());
+    let table = table::table_of(&heads, rows);
     format!("{}\n\n{}", head(model).join("\n"), table.trim_end())
 }
 
 /// The two lines above the table.
 pub(super) fn head(model: &Model) -> [String; 2] {
-    let mut first = vec![format!("{}.{}", model.installation, model.node), date(model.time.time_ns)];
+    let whole = match model.nodes.len() {
+        1 => format!("{}.{}", model.installation, model.nodes[0]),
+        several => format!("{}: {several} nodes", model.installation),
+    };
+    let mut first = vec![whole, date(model.time.time_ns)];
     let pace = if model.time.time_pace == 1.0 { String::new() } else { format!(" x {}", model.time.time_pace) };
     first.push(format!("{}{pace}", model.time.time_source));
     if !model.launched {
         first.push("NOT LAUNCHED".into());
     }
+    first.extend(model.silent.iter().map(|silence| format!("{} SILENT: {}", silence.node, silence.why)));
     let mut states: Vec<(&String, &usize)> = model.states.iter().collect();
     states.sort_by_key(|(state, _)| severity(state));
     let states: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
@@ -84,7 +93,7 @@ const KEYS: [(&str, &str); 12] = [
 ];
 
 const WHAT: &str = "  Rates and waiting times are those of the last interval. They are read from shared memory, which \
-    disturbs nobody. For its new lines the collector of output is asked once an interval.";
+    disturbs nobody; launches of other nodes show theirs. For its new lines the collector of output is asked once an interval.";
 
 /// All keys and all columns.
 pub(super) fn help() -> Vec<String> {

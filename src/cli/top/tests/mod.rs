@@ -87,7 +87,7 @@ fn json_says_what_the_screen_says() {
 #[test]
 fn the_first_look_has_no_rates() {
     let robot = Robot::new();
-    let model = super::Model::new(&robot.installation, "main", &robot.earlier, None, &Default::default());
+    let model = super::Model::new(&robot.installation, "main", &["main"], &robot.earlier, None, &Default::default());
     assert_eq!((model.interval_s, model.received_per_s), (None, None));
     assert!(model.modules.iter().all(|row| row.sent_per_s.is_none() && row.cpu_percent.is_none()));
     assert!(model.modules.iter().all(|row| row.waited_p99_s.is_none() && row.lost_per_s.is_none()));
@@ -136,6 +136,7 @@ fn sorting_brings_what_deserves_a_look_and_the_selection_stays() {
     press(&mut app, &robot, "v");
     for (column, first) in [
         (Column::Module, "gui.0"),
+        (Column::Node, "output.0"),
         (Column::State, "mapper.0"),
         (Column::Class, "gui.0"),
         (Column::Priority, "motor.0"),

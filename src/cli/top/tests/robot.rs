@@ -4,7 +4,6 @@ use super::super::details;
 use super::super::draw::{OutputText, View};
 use super::super::model::{Model, Sample, TimeNow};
 use super::super::palette::Palette;
-use super::super::process::Usage;
 use super::super::{app::App, output};
 use crate::cli::summary::{Losses, ModuleLine};
 use ratatui::Terminal;
@@ -18,10 +17,10 @@ use rohrpost::mailbox::{
     Class, ClassTraffic, FlowInfo, Full, Latency, Loss, MailboxInfo, ModuleState, ParticipantInfo, Shape, Type, local,
 };
 use rohrpost::output::OutputLine;
-use rohrpost::survey::{ModuleSurvey, Survey, sum};
+use rohrpost::survey::{ModuleSurvey, Survey, Usage, sum};
 use std::collections::HashMap;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 pub(super) struct Robot {
     pub(super) installation: Installation,
@@ -29,6 +28,9 @@ pub(super) struct Robot {
     pub(super) now: Sample,
     pub(super) model: Model,
 }
+
+/// When the newer look was taken, on the node's clock.
+const AT_NS: u64 = 3_725_000_000_000;
 
 /// The module whose mailbox keeps the newest package only.
 const LATEST: &str = "motor.0";
@@ -54,10 +56,9 @@ impl Robot {
         use ModuleState::{Error, Off, On};
         let text = include_str!("../../../../config/demo.toml");
         let installation = Installation::parse(text, Path::new("config/demo.toml")).unwrap();
-        let at = Instant::now();
         let earlier = sample(
             &installation,
-            at,
+            AT_NS - 1_000_000_000,
             &[
                 counts("output.0", Some(On), [17, 0, 0, 10], 0),
                 counts("motor.0", Some(On), [100, 0, 600, 500], 0),
@@ -68,7 +69,7 @@ impl Robot {
         );
         let now = sample(
             &installation,
-            at + Duration::from_secs(1),
+            AT_NS,
             &[
                 counts("output.0", Some(On), [18, 0, 0, 10], 0),
                 counts("motor.0", Some(Off), [125, 0, 660, 515], 1),
@@ -78,7 +79,7 @@ impl Robot {
             ],
         );
         let errors = HashMap::from([(name(&installation, "mapper.0"), "no scan has come for 5 s".to_owned())]);
-        let model = Model::new(&installation, "main", &now, Some(&earlier), &errors);
+        let model = Model::new(&installation, "main", &["main"], &now, Some(&earlier), &errors);
         Self { installation, earlier, now, model }
     }
 
@@ -146,8 +147,8 @@ fn name(installation: &Installation, module: &str) -> Name {
     installation.classes.parse_name(module).unwrap().module()
 }
 
-fn sample(installation: &Installation, at: Instant, counts: &[Counts]) -> Sample {
-    let modules: Vec<ModuleSurvey> = counts.iter().map(|counts| module(installation, counts)).collect();
+fn sample(installation: &Installation, at_ns: u64, counts: &[Counts]) -> Sample {
+    let modules: Vec<ModuleSurvey> = counts.iter().map(|counts| module(installation, at_ns, counts)).collect();
     let mailboxes: Vec<MailboxInfo> = modules.iter().filter(|m| m.process.is_some()).map(mailbox).collect();
     let flows = counts.iter().zip(&modules).filter(|(counts, _)| counts.sent > 0);
     let pilot = name(installation, "pilot.0");
@@ -157,19 +158,16 @@ fn sample(installation: &Installation, at: Instant, counts: &[Counts]) -> Sample
     };
     let flows = flows.map(flow).collect();
     let lines = counts.iter().zip(&modules).map(|(counts, module)| line(installation, counts, module)).collect();
-    let with_process = counts.iter().zip(&modules).filter_map(|(c, m)| Some((m.process.as_ref()?.pid, c)));
-    let usage = |counts: &Counts| Usage { cpu: Duration::from_millis(counts.cpu_ms), memory_bytes: 12_345_678 };
     Sample {
         lines,
-        usage: with_process.map(|(pid, counts)| (pid, usage(counts))).collect(),
         time: TimeNow { time_ns: 1_795_257_612_000_000_000, time_source: "simulation", time_pace: 2.0 },
-        at_ns: 3_725_000_000_000,
         launched: true,
-        survey: Survey { at, classes: sum(&mailboxes), modules, mailboxes, flows },
+        silent: Vec::new(),
+        survey: Survey { node: "main".into(), at_ns, classes: sum(&mailboxes), modules, mailboxes, flows },
     }
 }
 
-fn module(installation: &Installation, counts: &Counts) -> ModuleSurvey {
+fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSurvey {
     let name = name(installation, counts.module);
     let configured = installation.module(name).unwrap();
     let process = counts.state.map(|state| ParticipantInfo {
@@ -190,7 +188,12 @@ fn module(installation: &Installation, counts: &Counts) -> ModuleSurvey {
     if counts.module == LATEST {
         losses[Loss::Replaced as usize] = counts.received / 10;
     }
+    let usage = Usage { cpu: Duration::from_millis(counts.cpu_ms), memory_bytes: 12_345_678 };
     ModuleSurvey {
+        node: "main".into(),
+        at_ns: Some(at_ns),
+        usage: process.is_some().then_some(usage),
+        scheduling: None,
         name,
         faces: configured.faces.clone(),
         process,
@@ -249,6 +252,7 @@ fn line(installation: &Installation, counts: &Counts, module: &ModuleSurvey) -> 
     let running = module.process.is_some();
     ModuleLine {
         module: counts.module.into(),
+        node: "main".into(),
         faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
         state: counts.state.map_or("left out", ModuleState::name).into(),
         priority: module.name.class().0,

@@ -8,16 +8,16 @@ const TICKS_PER_S: u64 = 100;
 
 /// What a process has taken so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Usage {
+pub struct Usage {
     /// Time that its threads ran, those that have ended included; in steps of 10 ms.
-    pub(super) cpu: Duration,
+    pub cpu: Duration,
     /// Memory that is resident, its mailboxes included.
-    pub(super) memory_bytes: u64,
+    pub memory_bytes: u64,
 }
 
 impl Usage {
     /// Of this process; none when it has ended.
-    pub(super) fn of(pid: u32) -> Option<Self> {
+    pub fn of(pid: u32) -> Option<Self> {
         let read = |file| std::fs::read_to_string(format!("/proc/{pid}/{file}")).ok();
         Some(Self { cpu: cpu(&read("stat")?)?, memory_bytes: memory_bytes(&read("status")?)? })
     }

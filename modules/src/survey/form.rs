@@ -1,0 +1,426 @@
+//! A look at a node as it travels from that node's launch to a tool elsewhere: postcard of these structs.
+//!
+//! They are the types of `rohrpost-mailbox`, which know no serialization, field by field. What arrives is a claim of another
+//! process: whatever the bytes are, reading them gives a look or an error.
+
+mod detail;
+
+use super::{MailboxLook, ModuleSurvey, Survey, Usage};
+use detail::{DetailForm, detail, detail_form};
+use postcard_schema::Schema;
+use postcard_schema::schema::owned::OwnedNamedType;
+use rohrpost_mailbox::sys::Scheduling;
+use rohrpost_mailbox::{
+    Class, ClassTraffic, FlowInfo, FlowSecond, Full, LATENCY_BUCKETS, Latency, Loss, MailboxInfo, ModuleState, Name,
+    ParticipantInfo, Shape, Type,
+};
+use serde::{Deserialize, Serialize};
+use std::hash::Hasher;
+use std::time::Duration;
+
+/// What one look shows.
+#[derive(Clone, Debug)]
+pub enum Seen {
+    /// A node.
+    Survey(Box<Survey>),
+    /// One of its mailboxes; none when it has none of this name.
+    Mailbox(Option<Box<MailboxLook>>),
+}
+
+impl Seen {
+    /// As it travels.
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        let form = match self {
+            Self::Survey(survey) => SeenForm::Survey(survey_form(survey)),
+            Self::Mailbox(look) => SeenForm::Mailbox(look.as_ref().map(|look| detail_form(look))),
+        };
+        // Writing to a growing vector does not fail; what is empty is refused by whoever reads it.
+        postcard::to_stdvec(&form).unwrap_or_default()
+    }
+
+    /// Reads what [`Seen::to_bytes`] wrote.
+    ///
+    /// # Errors
+    /// When the bytes are of another kind.
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Self, postcard::Error> {
+        Ok(match postcard::from_bytes(bytes)? {
+            SeenForm::Survey(form) => Self::Survey(Box::new(survey(form))),
+            SeenForm::Mailbox(form) => Self::Mailbox(form.map(|form| Box::new(detail(form)))),
+        })
+    }
+
+    /// Tells the forms of different versions of this program apart: computed from the types below.
+    pub(crate) fn format() -> u32 {
+        let mut hasher = siphasher::sip::SipHasher13::new();
+        let schema = OwnedNamedType::from(SeenForm::SCHEMA);
+        hasher.write(&postcard::to_stdvec(&schema).unwrap_or_default());
+        hasher.finish() as u32
+    }
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+enum SeenForm {
+    Survey(SurveyForm),
+    Mailbox(Option<DetailForm>),
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct SurveyForm {
+    node: String,
+    at_ns: u64,
+    modules: Vec<ModuleForm>,
+    mailboxes: Vec<MailboxForm>,
+    classes: Vec<ClassForm>,
+    flows: Vec<FlowForm>,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct ModuleForm {
+    node: String,
+    at_ns: Option<u64>,
+    name: u32,
+    faces: Vec<u32>,
+    process: Option<ProcessForm>,
+    usage: Option<UsageForm>,
+    scheduling: Option<SchedulingForm>,
+    received: u64,
+    bytes_in: u64,
+    lost: u64,
+    losses: [u64; Loss::ALL.len()],
+    waited: LatencyForm,
+    sent: u64,
+    bytes_out: u64,
+    depth: u32,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct ProcessForm {
+    module: u32,
+    pid: u32,
+    incarnation: u32,
+    state: Option<StateForm>,
+    restarts: u32,
+    joined_ns: u64,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+enum StateForm {
+    Starting,
+    Off,
+    On,
+    Error,
+    Stopping,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct UsageForm {
+    cpu_ms: u64,
+    memory_bytes: u64,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+enum SchedulingForm {
+    Fifo(u8),
+    Normal(i8),
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct MailboxForm {
+    name: u32,
+    slots: u16,
+    body_bytes_max: u16,
+    full: FullForm,
+    max_age_ns: Option<u64>,
+    claims: u8,
+    owner: Option<u32>,
+    adoptions: u32,
+    depth: u32,
+    depth_max: u32,
+    sent: u64,
+    classes: Vec<ClassForm>,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+enum FullForm {
+    Displace,
+    Latest,
+    Reject,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct ClassForm {
+    class: Option<u8>,
+    received: u64,
+    body_bytes: u64,
+    losses: [u64; Loss::ALL.len()],
+    waited: LatencyForm,
+}
+
+/// Most buckets are empty: those that are not, with their numbers.
+#[derive(Serialize, Deserialize, Schema)]
+struct LatencyForm {
+    max_ns: u64,
+    sum_ns: u64,
+    buckets: Vec<(u8, u32)>,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct FlowForm {
+    pid: u32,
+    module: u32,
+    incarnation: u32,
+    from: u32,
+    to: u32,
+    kind: i16,
+    packages: u64,
+    bytes: u64,
+    refused: u64,
+    first_ns: u64,
+    last_ns: u64,
+    interval_squares_ns2: u128,
+    age_sum_ns: u64,
+    seconds: Vec<SecondForm>,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct SecondForm {
+    second: u64,
+    interval_ns: Option<(u64, u64)>,
+    bytes: (u32, u32),
+}
+
+fn survey_form(survey: &Survey) -> SurveyForm {
+    SurveyForm {
+        node: survey.node.clone(),
+        at_ns: survey.at_ns,
+        modules: survey.modules.iter().map(module_form).collect(),
+        mailboxes: survey.mailboxes.iter().map(mailbox_form).collect(),
+        classes: survey.classes.iter().map(class_form).collect(),
+        flows: survey.flows.iter().map(flow_form).collect(),
+    }
+}
+
+fn survey(form: SurveyForm) -> Survey {
+    Survey {
+        node: form.node,
+        at_ns: form.at_ns,
+        modules: form.modules.into_iter().map(module).collect(),
+        mailboxes: form.mailboxes.into_iter().map(mailbox).collect(),
+        classes: form.classes.into_iter().map(class).collect(),
+        flows: form.flows.into_iter().map(flow).collect(),
+    }
+}
+
+fn module_form(module: &ModuleSurvey) -> ModuleForm {
+    ModuleForm {
+        node: module.node.clone(),
+        at_ns: module.at_ns,
+        name: module.name.raw(),
+        faces: module.faces.iter().map(|face| face.raw()).collect(),
+        process: module.process.as_ref().map(process_form),
+        usage: module.usage.map(|usage| UsageForm {
+            cpu_ms: u64::try_from(usage.cpu.as_millis()).unwrap_or(u64::MAX),
+            memory_bytes: usage.memory_bytes,
+        }),
+        scheduling: module.scheduling.map(|scheduling| match scheduling {
+            Scheduling::Fifo(priority) => SchedulingForm::Fifo(priority),
+            Scheduling::Normal(nice) => SchedulingForm::Normal(nice),
+        }),
+        received: module.received,
+        bytes_in: module.bytes_in,
+        lost: module.lost,
+        losses: module.losses,
+        waited: latency_form(&module.waited),
+        sent: module.sent,
+        bytes_out: module.bytes_out,
+        depth: module.depth,
+    }
+}
+
+fn module(form: ModuleForm) -> ModuleSurvey {
+    ModuleSurvey {
+        node: form.node,
+        at_ns: form.at_ns,
+        name: Name::from_raw(form.name),
+        faces: form.faces.into_iter().map(Name::from_raw).collect(),
+        process: form.process.map(process),
+        usage: form
+            .usage
+            .map(|usage| Usage { cpu: Duration::from_millis(usage.cpu_ms), memory_bytes: usage.memory_bytes }),
+        scheduling: form.scheduling.map(|scheduling| match scheduling {
+            SchedulingForm::Fifo(priority) => Scheduling::Fifo(priority),
+            SchedulingForm::Normal(nice) => Scheduling::Normal(nice),
+        }),
+        received: form.received,
+        bytes_in: form.bytes_in,
+        lost: form.lost,
+        losses: form.losses,
+        waited: latency(form.waited),
+        sent: form.sent,
+        bytes_out: form.bytes_out,
+        depth: form.depth,
+    }
+}
+
+fn process_form(process: &ParticipantInfo) -> ProcessForm {
+    ProcessForm {
+        module: process.module.raw(),
+        pid: process.pid,
+        incarnation: process.incarnation,
+        state: process.state.map(|state| match state {
+            ModuleState::Starting => StateForm::Starting,
+            ModuleState::Off => StateForm::Off,
+            ModuleState::On => StateForm::On,
+            ModuleState::Error => StateForm::Error,
+            ModuleState::Stopping => StateForm::Stopping,
+        }),
+        restarts: process.restarts,
+        joined_ns: process.joined_ns,
+    }
+}
+
+fn process(form: ProcessForm) -> ParticipantInfo {
+    ParticipantInfo {
+        module: Name::from_raw(form.module),
+        pid: form.pid,
+        incarnation: form.incarnation,
+        state: form.state.map(|state| match state {
+            StateForm::Starting => ModuleState::Starting,
+            StateForm::Off => ModuleState::Off,
+            StateForm::On => ModuleState::On,
+            StateForm::Error => ModuleState::Error,
+            StateForm::Stopping => ModuleState::Stopping,
+        }),
+        restarts: form.restarts,
+        joined_ns: form.joined_ns,
+    }
+}
+
+fn mailbox_form(mailbox: &MailboxInfo) -> MailboxForm {
+    MailboxForm {
+        name: mailbox.name.raw(),
+        slots: mailbox.shape.slots,
+        body_bytes_max: mailbox.shape.body_bytes_max,
+        full: match mailbox.shape.full {
+            Full::Displace => FullForm::Displace,
+            Full::Latest => FullForm::Latest,
+            Full::Reject => FullForm::Reject,
+        },
+        max_age_ns: mailbox.shape.max_age.map(ns),
+        claims: mailbox.shape.claims,
+        owner: mailbox.owner,
+        adoptions: mailbox.adoptions,
+        depth: mailbox.depth,
+        depth_max: mailbox.depth_max,
+        sent: mailbox.sent,
+        classes: mailbox.classes.iter().map(class_form).collect(),
+    }
+}
+
+fn mailbox(form: MailboxForm) -> MailboxInfo {
+    MailboxInfo {
+        name: Name::from_raw(form.name),
+        shape: Shape {
+            slots: form.slots,
+            body_bytes_max: form.body_bytes_max,
+            full: match form.full {
+                FullForm::Displace => Full::Displace,
+                FullForm::Latest => Full::Latest,
+                FullForm::Reject => Full::Reject,
+            },
+            max_age: form.max_age_ns.map(Duration::from_nanos),
+            claims: form.claims,
+        },
+        owner: form.owner,
+        adoptions: form.adoptions,
+        depth: form.depth,
+        depth_max: form.depth_max,
+        sent: form.sent,
+        classes: form.classes.into_iter().map(class).collect(),
+    }
+}
+
+fn class_form(class: &ClassTraffic) -> ClassForm {
+    ClassForm {
+        class: class.class.map(|class| class.0),
+        received: class.received,
+        body_bytes: class.body_bytes,
+        losses: class.losses,
+        waited: latency_form(&class.latency),
+    }
+}
+
+fn class(form: ClassForm) -> ClassTraffic {
+    ClassTraffic {
+        class: form.class.map(Class),
+        received: form.received,
+        body_bytes: form.body_bytes,
+        losses: form.losses,
+        latency: latency(form.waited),
+    }
+}
+
+fn latency_form(latency: &Latency) -> LatencyForm {
+    let counted = (0u8..).zip(&latency.buckets).filter(|(_, count)| **count > 0);
+    let buckets = counted.map(|(at, count)| (at, *count)).collect();
+    LatencyForm { max_ns: ns(latency.max), sum_ns: ns(latency.sum), buckets }
+}
+
+fn latency(form: LatencyForm) -> Latency {
+    let mut buckets = [0; LATENCY_BUCKETS];
+    for (at, count) in form.buckets {
+        if let Some(bucket) = buckets.get_mut(usize::from(at)) {
+            *bucket = count;
+        }
+    }
+    Latency { max: Duration::from_nanos(form.max_ns), sum: Duration::from_nanos(form.sum_ns), buckets }
+}
+
+fn flow_form(flow: &FlowInfo) -> FlowForm {
+    let second = |second: &FlowSecond| SecondForm {
+        second: second.second,
+        interval_ns: second.interval_ns,
+        bytes: second.bytes,
+    };
+    FlowForm {
+        pid: flow.pid,
+        module: flow.module.raw(),
+        incarnation: flow.incarnation,
+        from: flow.from.raw(),
+        to: flow.to.raw(),
+        kind: flow.kind.0,
+        packages: flow.packages,
+        bytes: flow.bytes,
+        refused: flow.refused,
+        first_ns: flow.first_ns,
+        last_ns: flow.last_ns,
+        interval_squares_ns2: flow.interval_squares_ns2,
+        age_sum_ns: flow.age_sum_ns,
+        seconds: flow.seconds.iter().map(second).collect(),
+    }
+}
+
+fn flow(form: FlowForm) -> FlowInfo {
+    let second =
+        |form: SecondForm| FlowSecond { second: form.second, interval_ns: form.interval_ns, bytes: form.bytes };
+    FlowInfo {
+        pid: form.pid,
+        module: Name::from_raw(form.module),
+        incarnation: form.incarnation,
+        from: Name::from_raw(form.from),
+        to: Name::from_raw(form.to),
+        kind: Type(form.kind),
+        packages: form.packages,
+        bytes: form.bytes,
+        refused: form.refused,
+        first_ns: form.first_ns,
+        last_ns: form.last_ns,
+        interval_squares_ns2: form.interval_squares_ns2,
+        age_sum_ns: form.age_sum_ns,
+        seconds: form.seconds.into_iter().map(second).collect(),
+    }
+}
+
+fn ns(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,430 @@
+//! What happens in one simulated network, drawn from its seed before it begins: nodes, links, traffic and faults.
+//!
+//! ```text
+//!  0 ────────────── faults and floods ───────────────┬ mended ─── RECOVERY ───┬── all must be well ──┬ traffic ends ── DRAIN ──┬ accounts
+//! ```
+
+use super::chance::Chance;
+use super::link::Quality;
+use crate::frame::NodeIndex;
+use rohrpost_mailbox::Name;
+
+/// Microseconds, milliseconds and seconds in ns.
+pub const US: u64 = 1_000;
+/// See [`US`].
+pub const MS: u64 = 1_000_000;
+/// See [`US`].
+pub const S: u64 = 1_000_000_000;
+
+/// Nodes at most.
+pub const NODES_MAX: usize = 64;
+/// System of all nodes.
+pub const SYSTEM: u8 = 1;
+/// So long after the last fault everything must be as if there had been none: every call answered, nothing lost.
+pub const RECOVERY_NS: u64 = 3 * S;
+/// So long all must be well.
+pub const WELL_NS: u64 = 3 * S / 2;
+/// After the last package all has been delivered or counted within this time: what may wait, waits 2 s at most.
+pub const DRAIN_NS: u64 = 7 * S / 2;
+
+/// A datagram takes so long on the wire at most: with the longest waits in a router and in a socket, less than the 2 s that "at most
+/// once" relies on.
+pub const WIRE_NS_MAX: u64 = 100 * MS;
+
+/// So many intervals after the last fault, and one for each that may be master, all nodes follow one.
+pub const TIMED_INTERVALS: u64 = 12;
+
+/// Classes of the modules that may stand on a node; the first is not real time.
+const CLASSES: [u8; 6] = [10, 40, 90, 140, 200, 254];
+
+/// One computer.
+#[derive(Clone, Debug)]
+pub struct NodePlan {
+    /// CLOCK_MONOTONIC at the beginning, ns.
+    pub monotonic_ns: u64,
+    /// CLOCK_REALTIME at the beginning, ns.
+    pub realtime_ns: u64,
+    /// How much its clocks run fast, ns a second.
+    pub rate_ppb: i64,
+    /// By how much that changes each second, at most.
+    pub wander_ppb: i64,
+    /// When its router starts first, ns.
+    pub boot_ns: u64,
+    /// Modules, with the node's index as instance.
+    pub modules: Vec<Name>,
+}
+
+/// What the configuration says of the network.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    /// Bytes of a datagram at most.
+    pub datagram_bytes_max: usize,
+    /// Pacing, bytes a second.
+    pub rate_bytes_s: u64,
+    /// What one sender may have waiting, bytes.
+    pub quota_bytes: usize,
+    /// Classes below are not real time.
+    pub bulk_below: u8,
+    /// How often the master says what time it is, ns.
+    pub interval_ns: u64,
+}
+
+/// Data from one module to another, again and again.
+#[derive(Clone, Copy, Debug)]
+pub struct Flow {
+    /// Node it comes from.
+    pub node: usize,
+    /// Module that sends.
+    pub from: Name,
+    /// Mailbox it goes to.
+    pub to: Name,
+    /// Of all its packages.
+    pub priority: u8,
+    /// From one to the next, ns.
+    pub period_ns: u64,
+    /// Shortest and longest body.
+    pub bytes: (u64, u64),
+    /// Packages at once; a flood has more than one, and ends with the faults.
+    pub burst: u64,
+}
+
+/// A module that calls a function of another, again and again.
+#[derive(Clone, Copy, Debug)]
+pub struct Calls {
+    /// Node of the caller.
+    pub node: usize,
+    /// The module that calls.
+    pub from: Name,
+    /// Whose function it is.
+    pub to: Name,
+    /// From one call to the next, ns.
+    pub period_ns: u64,
+    /// How long a command is valid, ns.
+    pub valid_for_ns: u64,
+}
+
+/// What goes wrong.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Fault {
+    /// A node's router is stopped, and goes on afterwards; with `whole` all of the computer.
+    Freeze {
+        /// Which.
+        node: usize,
+        /// Its modules too.
+        whole: bool,
+    },
+    /// A node's router dies, and a new one comes.
+    Restart {
+        /// Which.
+        node: usize,
+    },
+    /// Nothing goes this way.
+    Cut {
+        /// From there.
+        from: usize,
+        /// To here.
+        to: usize,
+    },
+    /// Those whose bit is set, and the others, do not reach each other.
+    Split {
+        /// Bit of each node.
+        side: u64,
+    },
+    /// A link is bad.
+    Bad {
+        /// From there.
+        from: usize,
+        /// To here.
+        to: usize,
+        /// So bad.
+        quality: Quality,
+    },
+    /// A module has no mailboxes.
+    Absent {
+        /// Where it is.
+        node: usize,
+        /// Which.
+        module: Name,
+    },
+    /// The mailboxes of a module are full.
+    Full {
+        /// Where it is.
+        node: usize,
+        /// Which.
+        module: Name,
+    },
+    /// A module dies, with a command in its hand, and a new one comes.
+    ModuleRestart {
+        /// Where it is.
+        node: usize,
+        /// Which.
+        module: Name,
+    },
+    /// The socket of a router does not take every other datagram.
+    Unsendable {
+        /// Where.
+        node: usize,
+    },
+    /// Somebody sets CLOCK_REALTIME.
+    Step {
+        /// Where.
+        node: usize,
+        /// By how much, ns.
+        by_ns: i64,
+    },
+    /// Datagrams that no router of this installation sent.
+    Foreign {
+        /// To whom.
+        to: usize,
+        /// How many.
+        count: u64,
+    },
+    /// Datagrams that were sent long ago come once more.
+    Replay {
+        /// To whom.
+        to: usize,
+        /// How many.
+        count: u64,
+    },
+}
+
+/// A fault with its times.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Planned {
+    /// When it begins, true ns.
+    pub from_ns: u64,
+    /// When it is over, true ns.
+    pub until_ns: u64,
+    /// What it is.
+    pub fault: Fault,
+}
+
+/// All of it.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Where it came from.
+    pub seed: u64,
+    /// The configuration.
+    pub shape: Shape,
+    /// The computers.
+    pub nodes: Vec<NodePlan>,
+    /// Of all links, unless a fault says otherwise; after the faults only its delay and jitter are left.
+    pub quality: Quality,
+    /// Data.
+    pub flows: Vec<Flow>,
+    /// Commands.
+    pub calls: Vec<Calls>,
+    /// What goes wrong.
+    pub faults: Vec<Planned>,
+    /// Who may be master of time, in order.
+    pub masters: Vec<NodeIndex>,
+    /// Whether kernels stamp datagrams.
+    pub has_stamps: bool,
+    /// Whether damaged datagrams are dropped by the kernel, as UDP's checksum has it; else the routers get them.
+    pub checksum: bool,
+    /// No fault and no flood after this, ns.
+    pub mended_ns: u64,
+    /// From then on all nodes follow one master, ns.
+    pub timed_ns: u64,
+    /// No data and no call after this, ns.
+    pub traffic_end_ns: u64,
+    /// The end, ns.
+    pub end_ns: u64,
+}
+
+impl Plan {
+    /// Draws it.
+    pub fn new(seed: u64) -> Self {
+        let mut chance = Chance::new(seed);
+        let count = match chance.below(100) {
+            0 if seed.is_multiple_of(8) => chance.between(24, NODES_MAX as u64),
+            0..4 => chance.between(9, 16),
+            _ => chance.between(2, 8),
+        } as usize;
+        let shape = shape(&mut chance);
+        let nodes: Vec<NodePlan> = (0..count).map(|index| node(index, &mut chance)).collect();
+        let quality = quality(&mut chance);
+        let mended_ns = chance.between(2 * S, 6 * S);
+        let masters = masters(count, &mut chance);
+        let timed_ns = mended_ns + (TIMED_INTERVALS + masters.len() as u64) * shape.interval_ns;
+        let traffic_end_ns = mended_ns + RECOVERY_NS + WELL_NS;
+        let mut plan = Self {
+            seed,
+            shape,
+            quality,
+            flows: Vec::new(),
+            calls: Vec::new(),
+            faults: Vec::new(),
+            checksum: chance.percent(90),
+            mended_ns,
+            traffic_end_ns,
+            end_ns: (traffic_end_ns + DRAIN_NS).max(timed_ns + S),
+            timed_ns,
+            masters,
+            has_stamps: chance.percent(80),
+            nodes,
+        };
+        plan.draw_flows(&mut chance.fork());
+        plan.draw_calls(&mut chance.fork());
+        plan.draw_faults(&mut chance.fork());
+        plan
+    }
+
+    /// A network in which nothing goes wrong.
+    pub fn calm(seed: u64) -> Self {
+        let mut plan = Self::new(seed);
+        plan.faults.clear();
+        plan.flows.retain(|flow| flow.burst == 1);
+        plan.quality = mended(plan.quality);
+        plan.checksum = true;
+        plan
+    }
+
+    /// Two modules on different nodes.
+    fn pair(&self, chance: &mut Chance) -> (usize, Name, Name) {
+        let from = chance.below(self.nodes.len() as u64) as usize;
+        let to = (from + 1 + chance.below(self.nodes.len() as u64 - 1) as usize) % self.nodes.len();
+        (from, chance.pick(&self.nodes[from].modules), chance.pick(&self.nodes[to].modules))
+    }
+
+    fn draw_flows(&mut self, chance: &mut Chance) {
+        let count = self.nodes.len() as u64 + chance.below(5);
+        // All that a node sends steadily is well below what it may send, and what one sender may have waiting.
+        let share_bytes_s = self.shape.rate_bytes_s / (4 * count);
+        for _ in 0..count {
+            let (node, from, to) = self.pair(chance);
+            let large = chance.percent(15);
+            let most = if large { chance.between(2_000, 60_000) } else { chance.scale(16, 1400) };
+            let least_period_ns = (most + 100) * S / share_bytes_s;
+            let period_ns = least_period_ns.max(if large { 100 * MS } else { chance.scale(8 * MS, 200 * MS) });
+            let flood = chance.percent(20);
+            self.flows.push(Flow {
+                node,
+                from,
+                to: to.with_local(rohrpost_mailbox::local::DATA),
+                priority: if chance.percent(50) { from.class().0 } else { chance.below(256) as u8 },
+                period_ns: if flood { chance.between(50 * MS, 700 * MS) } else { period_ns },
+                bytes: (if large { most / 2 } else { 8 }, most),
+                burst: if flood { chance.scale(16, 256) } else { 1 },
+            });
+        }
+    }
+
+    fn draw_calls(&mut self, chance: &mut Chance) {
+        for _ in 0..1 + chance.below(self.nodes.len() as u64) {
+            let (node, from, to) = self.pair(chance);
+            let period_ns = chance.scale(20 * MS, 300 * MS);
+            let valid_for_ns = chance.between(30, 2500) * MS;
+            self.calls.push(Calls { node, from, to, period_ns, valid_for_ns });
+        }
+    }
+
+    fn draw_faults(&mut self, chance: &mut Chance) {
+        let count = if chance.percent(10) { 0 } else { chance.below(4 + self.nodes.len() as u64) };
+        for _ in 0..count {
+            let fault = self.fault(chance);
+            // A refusal is said up to a second later, and holds for three.
+            let is_strange = matches!(fault, Fault::Foreign { .. } | Fault::Replay { .. });
+            let from_ns = chance.below(self.mended_ns - if is_strange { 3 * S / 2 } else { S / 2 });
+            let longest_ns = self.mended_ns - from_ns;
+            let long_ns = chance.scale(5 * MS, 4 * S).min(longest_ns);
+            self.faults.push(Planned { from_ns, until_ns: from_ns + long_ns, fault });
+        }
+    }
+
+    fn fault(&self, chance: &mut Chance) -> Fault {
+        let node = chance.below(self.nodes.len() as u64) as usize;
+        let to = (node + 1 + chance.below(self.nodes.len() as u64 - 1) as usize) % self.nodes.len();
+        let module = chance.pick(&self.nodes[node].modules);
+        match chance.below(18) {
+            0 | 1 => Fault::Freeze { node, whole: chance.percent(30) },
+            2..5 => Fault::Restart { node },
+            5 => Fault::Cut { from: node, to },
+            6 => Fault::Split { side: chance.bits() },
+            7..9 => Fault::Bad { from: node, to, quality: bad(chance) },
+            9 => Fault::Absent { node, module },
+            10 => Fault::Full { node, module },
+            11..13 => Fault::ModuleRestart { node, module },
+            13 | 14 => Fault::Step { node, by_ns: chance.around(5 * S as i64) },
+            15 => Fault::Foreign { to, count: chance.scale(1, 200) },
+            16 => Fault::Unsendable { node },
+            _ => Fault::Replay { to, count: chance.scale(1, 64) },
+        }
+    }
+}
+
+/// What is left of a link's quality after the faults.
+pub fn mended(quality: Quality) -> Quality {
+    Quality { loss_ppm: 0, copy_ppm: 0, reorder_ppm: 0, damage_ppm: 0, rate_bytes_s: 0, ..quality }
+}
+
+fn shape(chance: &mut Chance) -> Shape {
+    let datagram_bytes_max = match chance.below(10) {
+        0 => 548,
+        1 => chance.between(548, 65_507),
+        2 | 3 => 8972,
+        4 => 65_507,
+        _ => 1472,
+    } as usize;
+    Shape {
+        datagram_bytes_max,
+        rate_bytes_s: chance.scale(1 << 20, 100 << 20),
+        quota_bytes: chance.between(128, 256) as usize * 1024,
+        bulk_below: 16,
+        interval_ns: if chance.percent(5) { S } else { chance.pick(&[100 * MS, 250 * MS, 250 * MS, 500 * MS]) },
+    }
+}
+
+fn node(index: usize, chance: &mut Chance) -> NodePlan {
+    let mut classes = CLASSES.to_vec();
+    let kept = 1 + chance.below(4) as usize;
+    while classes.len() > kept {
+        classes.remove(chance.below(classes.len() as u64) as usize);
+    }
+    NodePlan {
+        monotonic_ns: chance.scale(S, 1_000_000 * S),
+        realtime_ns: (1_790_000_000 * S).saturating_add_signed(chance.around(100 * S as i64)),
+        rate_ppb: chance.around(100_000),
+        wander_ppb: chance.below(200) as i64,
+        boot_ns: chance.below(300 * MS),
+        modules: classes.into_iter().map(|class| Name::new(SYSTEM, class, index as u8, 0)).collect(),
+    }
+}
+
+fn masters(nodes: usize, chance: &mut Chance) -> Vec<NodeIndex> {
+    let mut masters: Vec<NodeIndex> = (0..nodes as NodeIndex).collect();
+    if chance.percent(60) {
+        let kept = chance.between(1, 4) as usize;
+        while masters.len() > kept {
+            masters.remove(chance.below(masters.len() as u64) as usize);
+        }
+    }
+    masters
+}
+
+fn quality(chance: &mut Chance) -> Quality {
+    let delay_ns = chance.scale(5 * US, 5 * MS);
+    let some = |chance: &mut Chance, most: u64| if chance.percent(40) { chance.scale(10, most) as u32 } else { 0 };
+    Quality {
+        delay_ns,
+        jitter_ns: chance.below(delay_ns),
+        loss_ppm: some(chance, 50_000),
+        copy_ppm: some(chance, 20_000),
+        reorder_ppm: some(chance, 50_000),
+        damage_ppm: some(chance, 10_000),
+        rate_bytes_s: 0,
+    }
+}
+
+fn bad(chance: &mut Chance) -> Quality {
+    let most = 300_000;
+    Quality {
+        delay_ns: chance.scale(5 * US, 40 * MS),
+        jitter_ns: chance.scale(5 * US, 20 * MS),
+        loss_ppm: chance.below(most) as u32,
+        copy_ppm: chance.below(most) as u32,
+        reorder_ppm: chance.below(most) as u32,
+        damage_ppm: chance.below(most / 3) as u32,
+        rate_bytes_s: if chance.percent(30) { chance.scale(64 << 10, 4 << 20) } else { 0 },
+    }
+}

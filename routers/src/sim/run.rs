@@ -1,0 +1,43 @@
+//! One seed, from its plan to its verdict.
+
+use super::book::Problem;
+use super::calls::NewGuard;
+use super::packages::{Packages, settings};
+use super::plan::Plan;
+use super::station::Layer;
+use super::ticking::{self, Ticking};
+use super::world::{NewLayers, World};
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+/// What became of a seed.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    /// Promises that were broken; the first ends the run.
+    pub problems: Vec<Problem>,
+    /// What was seen, and how often.
+    pub seen: BTreeMap<&'static str, u64>,
+    /// Lines, if they were asked for.
+    pub trace: Vec<String>,
+}
+
+/// Runs a plan.
+pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
+    let plan = Rc::new(plan);
+    let layers = routers(&plan);
+    let mut world = World::new(plan, guard, layers, trace);
+    world.run();
+    Outcome { problems: world.book.problems, seen: world.book.seen, trace: world.trace.lines }
+}
+
+/// Routers as this version has them.
+fn routers(plan: &Rc<Plan>) -> NewLayers<'static> {
+    let plan = plan.clone();
+    Box::new(move |node, life, now, page| {
+        // Never the same again, and in no order.
+        let incarnation = (plan.seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let packages = Packages::new(&settings(&plan, node, incarnation), now.monotonic_ns);
+        let ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
+        vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]
+    })
+}

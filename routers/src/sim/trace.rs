@@ -1,0 +1,28 @@
+//! What happened in a simulated network, line by line, when one seed is looked at.
+
+/// Lines with their times; nothing, and at no cost, unless it was asked for.
+#[derive(Debug, Default)]
+pub struct Trace {
+    on: bool,
+    /// The lines.
+    pub lines: Vec<String>,
+}
+
+impl Trace {
+    /// One that keeps lines, or none.
+    pub fn new(on: bool) -> Self {
+        Self { on, lines: Vec::new() }
+    }
+
+    /// Whether lines are kept.
+    pub fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// Adds a line; `text` is only made when it is wanted.
+    pub fn line(&mut self, true_ns: u64, text: impl FnOnce() -> String) {
+        if self.on {
+            self.lines.push(format!("{:>12.6} ms  {}", true_ns as f64 / 1e6, text()));
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! Who is master: the order, the silence after which the next takes over, and which of two masters yields.
+
+use super::message::{Request, Sync};
+use super::{TAKEOVER_HALF_INTERVALS, Term};
+use crate::frame::NodeIndex;
+
+/// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
+const DEAF_NS_MIN: u64 = 200_000_000;
+
+/// A master that is heard.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Followed {
+    pub(super) node: NodeIndex,
+    pub(super) incarnation: u64,
+    pub(super) term: Term,
+    pub(super) began: Term,
+    pub(super) epoch: u64,
+    pub(super) error_ns: u64,
+    pub(super) heard_ns: u64,
+    /// When it last answered this node, or said that it is followed; at first when it was found.
+    answered_ns: u64,
+    followed: bool,
+    id: u64,
+}
+
+/// What a node is at the moment.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum State {
+    /// Hears no master.
+    Listening,
+    Slave(Followed),
+    /// Master of this term.
+    Master(Term),
+}
+
+/// What a Sync changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Heard {
+    /// Late, twice, or of a master that must yield.
+    Ignored,
+    /// Of the master that this node follows.
+    Followed,
+    /// Of another master, or another timeline of the same: what was measured before does not count any more.
+    Turned,
+}
+
+#[derive(Debug)]
+pub(super) struct Election {
+    own: NodeIndex,
+    masters: Vec<NodeIndex>,
+    interval_ns: u64,
+    state: State,
+    /// Since when no master is heard, and who was the last.
+    quiet_since_ns: u64,
+    lost: Option<NodeIndex>,
+    /// The highest term and epoch that anybody spoke of.
+    highest: Term,
+    highest_epoch: u64,
+    /// When somebody that has time said that it hears no master.
+    timed_heard_ns: Option<u64>,
+}
+
+impl Election {
+    pub(super) fn new(own: NodeIndex, masters: Vec<NodeIndex>, interval_ns: u64, now_ns: u64) -> Self {
+        Self {
+            own,
+            masters,
+            interval_ns,
+            state: State::Listening,
+            quiet_since_ns: now_ns,
+            lost: None,
+            highest: Term::NONE,
+            highest_epoch: 0,
+            timed_heard_ns: None,
+        }
+    }
+
+    pub(super) fn state(&self) -> State {
+        self.state
+    }
+
+    pub(super) fn masters(&self) -> &[NodeIndex] {
+        &self.masters
+    }
+
+    pub(super) fn highest_epoch(&self) -> u64 {
+        self.highest_epoch
+    }
+
+    fn rank(&self) -> Option<u8> {
+        let rank = self.masters.iter().position(|master| *master == self.own)?;
+        u8::try_from(rank).ok()
+    }
+
+    fn silence_ns(&self) -> u64 {
+        self.interval_ns.saturating_mul(TAKEOVER_HALF_INTERVALS) / 2
+    }
+
+    /// A master's Sync. `followed`: whether slaves answer this node, should it be a master itself.
+    pub(super) fn sync(
+        &mut self,
+        from: NodeIndex,
+        incarnation: u64,
+        sync: &Sync,
+        received_ns: u64,
+        followed: bool,
+    ) -> Heard {
+        self.speaks_of(sync.term, sync.epoch);
+        if self.masters.get(usize::from(sync.term.rank())) != Some(&from) {
+            return Heard::Ignored;
+        }
+        let (term, began, epoch) = (sync.term, sync.began, sync.epoch);
+        let (error_ns, id) = (sync.error_ns, sync.id);
+        let theirs = Followed {
+            node: from,
+            incarnation,
+            term,
+            began,
+            epoch,
+            error_ns,
+            heard_ns: received_ns,
+            answered_ns: received_ns,
+            followed: sync.followed,
+            id,
+        };
+        let heard = match self.state {
+            State::Listening => Heard::Turned,
+            State::Master(own) if theirs.claim() > (followed, own) => Heard::Turned,
+            State::Master(own) => {
+                // It will yield. So that nobody who heard it takes this term for an older one, this becomes the later.
+                if let (true, Some(rank)) = (theirs.term > own, self.rank()) {
+                    self.state = State::Master(self.next_term(rank));
+                }
+                Heard::Ignored
+            }
+            State::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
+                if id <= master.id || term < master.term {
+                    Heard::Ignored
+                } else if began != master.began {
+                    Heard::Turned
+                } else {
+                    Heard::Followed
+                }
+            }
+            State::Slave(master) if theirs.claim() > master.claim() => Heard::Turned,
+            State::Slave(_) => Heard::Ignored,
+        };
+        match (heard, self.state) {
+            (Heard::Ignored, _) => {}
+            (Heard::Followed, State::Slave(before)) if !sync.followed => {
+                self.state = State::Slave(Followed { answered_ns: before.answered_ns, ..theirs });
+            }
+            _ => self.state = State::Slave(theirs),
+        }
+        heard
+    }
+
+    /// The master's answer says more lately what its Sync said.
+    pub(super) fn reply(&mut self, epoch: u64, error_ns: u64, received_ns: u64) {
+        if let State::Slave(master) = &mut self.state {
+            (master.epoch, master.error_ns, master.answered_ns) = (master.epoch.max(epoch), error_ns, received_ns);
+        }
+    }
+
+    /// Somebody that hears no master. A master whose term is not the latest begins another, so that all take it for the latest.
+    pub(super) fn hello(&mut self, request: &Request, received_ns: u64) {
+        self.speaks_of(request.term, request.epoch);
+        if request.timed {
+            self.timed_heard_ns = Some(received_ns);
+        }
+        if let (State::Master(own), Some(rank)) = (self.state, self.rank())
+            && request.term > own
+        {
+            self.state = State::Master(self.next_term(rank));
+        }
+    }
+
+    pub(super) fn speaks_of(&mut self, term: Term, epoch: u64) {
+        self.highest = self.highest.max(term);
+        self.highest_epoch = self.highest_epoch.max(epoch);
+    }
+
+    fn next_term(&mut self, rank: u8) -> Term {
+        let own = if let State::Master(own) = self.state { own } else { Term::NONE };
+        let next = Term::new(self.highest.max(own).round().saturating_add(1), rank);
+        self.highest = next;
+        next
+    }
+
+    /// Whether the master that this node follows fell silent.
+    pub(super) fn falls_silent(&mut self, now_ns: u64) -> bool {
+        let State::Slave(master) = self.state else { return false };
+        let silent = now_ns.saturating_sub(master.heard_ns) >= self.silence_ns();
+        if silent {
+            self.state = State::Listening;
+            (self.quiet_since_ns, self.lost) = (master.heard_ns, Some(master.node));
+        }
+        silent
+    }
+
+    /// Takes over if it is this node's turn. `timed`: it has system time.
+    pub(super) fn takes_over(&mut self, now_ns: u64, timed: bool) -> Option<Term> {
+        if self.takeover_ns(now_ns, timed)? > now_ns {
+            return None;
+        }
+        let term = self.next_term(self.rank()?);
+        self.state = State::Master(term);
+        Some(term)
+    }
+
+    /// When something changes without a datagram.
+    pub(super) fn deadline_ns(&self, now_ns: u64, timed: bool) -> Option<u64> {
+        let takeover_ns = self.takeover_ns(now_ns, timed);
+        match self.state {
+            State::Slave(master) => {
+                let silent_ns = master.heard_ns.saturating_add(self.silence_ns());
+                Some(takeover_ns.map_or(silent_ns, |takeover_ns| takeover_ns.min(silent_ns)))
+            }
+            State::Listening | State::Master(_) => takeover_ns,
+        }
+    }
+
+    /// When it is this node's turn. A master that is heard, but answers nobody, hears nobody: it has to be replaced as well.
+    fn takeover_ns(&self, now_ns: u64, timed: bool) -> Option<u64> {
+        let rank = self.rank()?;
+        let (since_ns, patience_ns, last) = match self.state {
+            State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
+            State::Slave(master) => (master.answered_ns, self.silence_ns().max(DEAF_NS_MIN), Some(master.node)),
+            State::Master(_) => return None,
+        };
+        let before = self.masters[..usize::from(rank)].iter().filter(|master| Some(**master) != last).count();
+        // Who has no time leaves it to who has, as long as there is one.
+        let recently_ns = self.interval_ns.saturating_mul(4);
+        let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
+        let waits = before + if others_timed && !timed { self.masters.len() } else { 0 };
+        let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
+        Some(since_ns.saturating_add(patience_ns).saturating_add(staggered_ns))
+    }
+}
+
+impl Followed {
+    /// Who has the greater one is the master. A master that nobody follows may be one that hears nobody.
+    fn claim(&self) -> (bool, Term) {
+        (self.followed, self.term)
+    }
+}

@@ -1,0 +1,175 @@
+//! What a slave measured, and what follows from it: an interval that holds the truth, and the best guess within it.
+//!
+//! A sample is an interval for `system time − local time`: the frame to us cannot have arrived before it left, nor ours at the master.
+//! Of each *bucket* of time only the narrowest is kept: the one whose frames waited least. From these follow
+//! the rate and the guess (medians, so single bad ones do not matter), and an interval for both, which assumes nothing of delays.
+
+use super::{RATE_MAX_PPB, WANDER_PPB_S};
+
+/// Buckets that bound the truth, and how many of the newest the guess is made of.
+const BUCKETS: usize = 16;
+const GUESS_BUCKETS: usize = 8;
+const SLOPES: usize = GUESS_BUCKETS * (GUESS_BUCKETS - 1) / 2;
+const RATE_MAX: f64 = RATE_MAX_PPB as f64 * 1e-9;
+/// Per nanosecond, so that times a span in ns it is a rate.
+const WANDER: f64 = WANDER_PPB_S as f64 * 1e-18;
+
+/// One exchange: `system − local` lay between these when the local clock showed this.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(super) struct Sample {
+    pub(super) local_ns: u64,
+    pub(super) low_ns: i64,
+    pub(super) high_ns: i64,
+}
+
+impl Sample {
+    pub(super) fn width_ns(&self) -> i64 {
+        self.high_ns - self.low_ns
+    }
+
+    fn middle_ns(&self) -> i64 {
+        self.low_ns + self.width_ns() / 2
+    }
+}
+
+/// What is known of `system − local` at one moment.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Estimate {
+    /// The guess, and the interval that holds the truth, ns.
+    pub(super) offset_ns: i64,
+    pub(super) low_ns: i64,
+    pub(super) high_ns: i64,
+    /// How much system time is faster than the local clock: the guess, and its interval.
+    pub(super) rate: f64,
+    pub(super) rate_low: f64,
+    pub(super) rate_high: f64,
+}
+
+/// The samples of one timeline of one master.
+#[derive(Debug)]
+pub(super) struct History {
+    bucket_ns: u64,
+    /// Oldest first; the last is still being filled.
+    buckets: Vec<Sample>,
+    samples: u32,
+}
+
+impl History {
+    pub(super) fn new(bucket_ns: u64) -> Self {
+        Self { bucket_ns, buckets: Vec::with_capacity(BUCKETS), samples: 0 }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.buckets.clear();
+        self.samples = 0;
+    }
+
+    /// Samples since the last clearing.
+    pub(super) fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    pub(super) fn is_new(&self) -> bool {
+        self.samples == 0
+    }
+
+    /// Delay of both ways together in the best exchange that is kept, ns.
+    pub(super) fn delay_ns(&self) -> Option<u64> {
+        self.buckets.iter().map(|sample| sample.width_ns().unsigned_abs()).min()
+    }
+
+    pub(super) fn add(&mut self, sample: Sample) {
+        self.samples = self.samples.saturating_add(1);
+        let bucket = sample.local_ns / self.bucket_ns;
+        match self.buckets.last_mut() {
+            Some(last) if last.local_ns / self.bucket_ns >= bucket => {
+                if sample.width_ns() < last.width_ns() {
+                    *last = sample;
+                }
+            }
+            _ => {
+                if self.buckets.len() == BUCKETS {
+                    self.buckets.remove(0);
+                }
+                self.buckets.push(sample);
+            }
+        }
+    }
+
+    /// What is known at a moment that is not before the last sample. None without samples, or when they contradict each other: then a
+    /// clock did what [`RATE_MAX_PPB`] and [`WANDER_PPB_S`] exclude.
+    pub(super) fn estimate(&self, local_ns: u64, usual_rate: f64) -> Option<Estimate> {
+        let newest = self.buckets.last()?;
+        let (rate_low, rate_high) = self.rate_interval(local_ns)?;
+        let (low_ns, high_ns) = self.interval(local_ns, rate_low, rate_high)?;
+        let rate = self.slope().unwrap_or(usual_rate).clamp(rate_low, rate_high);
+        let mut guesses = [0.0; GUESS_BUCKETS];
+        let recent = self.recent();
+        for (guess, sample) in guesses.iter_mut().zip(recent) {
+            // Relative to the newest: as whole numbers these are larger than a double counts.
+            let middle = (sample.middle_ns() - newest.low_ns) as f64;
+            *guess = middle + rate * span_ns(sample.local_ns, local_ns);
+        }
+        let guess_ns = newest.low_ns + median(&mut guesses[..recent.len()]).round() as i64;
+        Some(Estimate { offset_ns: guess_ns.clamp(low_ns, high_ns), low_ns, high_ns, rate, rate_low, rate_high })
+    }
+
+    fn recent(&self) -> &[Sample] {
+        &self.buckets[self.buckets.len().saturating_sub(GUESS_BUCKETS)..]
+    }
+
+    /// Theil and Sen: the median of the slopes between all pairs.
+    fn slope(&self) -> Option<f64> {
+        let recent = self.recent();
+        let (mut slopes, mut count) = ([0.0; SLOPES], 0);
+        for (at, later) in recent.iter().enumerate() {
+            for earlier in &recent[..at] {
+                let span = span_ns(earlier.local_ns, later.local_ns);
+                // Two that lie at an edge between buckets say nothing of the rate.
+                if span >= self.bucket_ns as f64 / 2.0 {
+                    slopes[count] = (later.middle_ns() - earlier.middle_ns()) as f64 / span;
+                    count += 1;
+                }
+            }
+        }
+        (count > 0).then(|| median(&mut slopes[..count]))
+    }
+
+    /// Between which the rate lies now: what any two samples allow, and how much it may have changed since.
+    fn rate_interval(&self, local_ns: u64) -> Option<(f64, f64)> {
+        let (mut rate_low, mut rate_high) = (-RATE_MAX, RATE_MAX);
+        for (at, later) in self.buckets.iter().enumerate() {
+            for earlier in &self.buckets[..at] {
+                let span = span_ns(earlier.local_ns, later.local_ns);
+                if span >= 1.0 {
+                    let change = WANDER * (span / 2.0 + span_ns(later.local_ns, local_ns));
+                    rate_low = rate_low.max((later.low_ns - earlier.high_ns) as f64 / span - change);
+                    rate_high = rate_high.min((later.high_ns - earlier.low_ns) as f64 / span + change);
+                }
+            }
+        }
+        (rate_low <= rate_high).then_some((rate_low, rate_high))
+    }
+
+    /// Between which `system − local` lies now: what each sample allows, carried forward.
+    fn interval(&self, local_ns: u64, rate_low: f64, rate_high: f64) -> Option<(i64, i64)> {
+        let (mut low_ns, mut high_ns) = (i64::MIN, i64::MAX);
+        for sample in &self.buckets {
+            let age = span_ns(sample.local_ns, local_ns);
+            let change = WANDER * age / 2.0;
+            low_ns = low_ns.max(sample.low_ns + ((rate_low - change).max(-RATE_MAX) * age).floor() as i64);
+            high_ns = high_ns.min(sample.high_ns + ((rate_high + change).min(RATE_MAX) * age).ceil() as i64);
+        }
+        (low_ns <= high_ns).then_some((low_ns, high_ns))
+    }
+}
+
+fn span_ns(earlier_ns: u64, later_ns: u64) -> f64 {
+    later_ns.saturating_sub(earlier_ns) as f64
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let half = values.len() / 2;
+    if values.len().is_multiple_of(2) { f64::midpoint(values[half - 1], values[half]) } else { values[half] }
+}

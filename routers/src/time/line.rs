@@ -1,0 +1,156 @@
+//! The line that a node's system time follows: what stands in its page. It has no corner within an epoch, only bends.
+
+use super::SLEW_MAX_PPB;
+use rohrpost_mailbox::{SystemTime, TimeRecord, TimeSource};
+
+/// The bound of a node that does not know the time: 292 years.
+pub const UNSYNCHRONISED_NS: u64 = i64::MAX as u64;
+
+/// A slower line begins so far ahead: readers go by the old one until the new one is in the page.
+const SLOWER_LEAD_NS: u64 = 1_000_000;
+/// What lines may be off by being whole numbers, until the source is heard again.
+const ROUNDING_NS: u64 = 4;
+const BILLION: i128 = 1_000_000_000;
+/// As the local clock.
+pub(super) const EVEN_PPB: u64 = 1_000_000_000;
+
+/// The present record, and what it is about to become.
+#[derive(Debug)]
+pub(super) struct Line {
+    record: TimeRecord,
+    /// When slewing is over, and the pace from then on.
+    slew: Option<(u64, u64)>,
+}
+
+impl Line {
+    /// The wall clock, of which nothing is known.
+    pub(super) fn unsynchronised(now_ns: u64, wall_ns: u64, epoch: u64) -> Self {
+        let record = TimeRecord {
+            epoch,
+            source: TimeSource::Master,
+            monotonic_ns: now_ns,
+            system_ns: wall_ns,
+            pace_ppb: EVEN_PPB,
+            error_ns: UNSYNCHRONISED_NS,
+            drift_ns_s: 0,
+        };
+        Self { record, slew: None }
+    }
+
+    /// What an earlier life of this router left.
+    pub(super) fn adopted(record: TimeRecord) -> Self {
+        Self { record, slew: None }
+    }
+
+    pub(super) fn record(&self) -> &TimeRecord {
+        &self.record
+    }
+
+    pub(super) fn at(&self, now_ns: u64) -> SystemTime {
+        self.record.at(now_ns)
+    }
+
+    pub(super) fn is_synchronised(&self) -> bool {
+        self.record.error_ns < UNSYNCHRONISED_NS
+    }
+
+    pub(super) fn slew_end_ns(&self) -> Option<u64> {
+        self.slew.map(|(end_ns, _)| end_ns)
+    }
+
+    /// The bound just now, ns.
+    pub(super) fn error_ns(&self, now_ns: u64) -> u64 {
+        u64::try_from(self.at(now_ns).error.as_nanos()).unwrap_or(u64::MAX)
+    }
+
+    /// Another epoch, at another time.
+    pub(super) fn step(
+        &mut self,
+        now_ns: u64,
+        epoch: u64,
+        system_ns: u64,
+        pace_ppb: u64,
+        error_ns: u64,
+        drift_ns_s: u64,
+    ) {
+        let source = TimeSource::Master;
+        self.record = TimeRecord { epoch, source, monotonic_ns: now_ns, system_ns, pace_ppb, error_ns, drift_ns_s };
+        self.slew = None;
+    }
+
+    /// Another epoch, at the same time.
+    pub(super) fn rename(&mut self, epoch: u64) {
+        self.record.epoch = epoch;
+    }
+
+    /// The source was heard. Bends the line so that it has moved by `by_ns` against `pace_ppb` after about `within_ns`, and goes on with
+    /// that pace. The bound holds for where it is and for where it goes.
+    pub(super) fn bend(
+        &mut self,
+        now_ns: u64,
+        by_ns: i64,
+        within_ns: u64,
+        pace_ppb: u64,
+        error_ns: u64,
+        drift_ns_s: u64,
+    ) {
+        let slew_ppb = i128::from(by_ns) * BILLION / i128::from(within_ns.max(1));
+        let slew_ppb = slew_ppb.clamp(-i128::from(SLEW_MAX_PPB), i128::from(SLEW_MAX_PPB)) as i64;
+        // It begins late by a lead, and may end late by one.
+        let overshoot_ns =
+            (u128::from(slew_ppb.unsigned_abs()) * 2 * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128);
+        let error_ns = error_ns.saturating_add(overshoot_ns as u64).saturating_add(ROUNDING_NS);
+        self.turn(now_ns, now_ns, pace_ppb.saturating_add_signed(slew_ppb));
+        self.record = TimeRecord { error_ns: error_ns.min(UNSYNCHRONISED_NS), drift_ns_s, ..self.record };
+        self.slew = (slew_ppb != 0).then(|| {
+            let takes_ns = i128::from(by_ns) * BILLION / i128::from(slew_ppb);
+            (now_ns.saturating_add(takes_ns as u64), pace_ppb)
+        });
+    }
+
+    /// Straightens the line when slewing is over.
+    pub(super) fn end_slew(&mut self, now_ns: u64) {
+        if let Some((_, pace_ppb)) = self.slew.take_if(|(end_ns, _)| *end_ns <= now_ns) {
+            self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
+        }
+    }
+
+    /// Stops slewing, however far it came.
+    pub(super) fn stop_slew(&mut self, now_ns: u64) {
+        if let Some((_, pace_ppb)) = self.slew.take() {
+            self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
+        }
+    }
+
+    /// From now on it is the line by which the others go: it cannot drift from itself.
+    pub(super) fn become_reference(&mut self, now_ns: u64) {
+        let error_ns = self.error_ns(now_ns).saturating_add(ROUNDING_NS).min(UNSYNCHRONISED_NS - 1);
+        self.turn(now_ns, now_ns, self.record.pace_ppb);
+        self.restate(error_ns, 0);
+    }
+
+    /// States from now on another growth of the bound.
+    pub(super) fn restate(&mut self, error_ns: u64, drift_ns_s: u64) {
+        self.record = TimeRecord { error_ns, drift_ns_s, ..self.record };
+    }
+
+    /// The page was not written in time, and still says this: the line goes on from there.
+    pub(super) fn go_on_from(&mut self, now_ns: u64, page: &TimeRecord) {
+        let wanted = self.record;
+        if page.epoch == wanted.epoch {
+            self.record = TimeRecord { error_ns: wanted.error_ns, drift_ns_s: wanted.drift_ns_s, ..*page };
+            self.turn(now_ns, wanted.monotonic_ns, wanted.pace_ppb);
+        }
+    }
+
+    /// Another pace, where the present line is just now. Written as if it had been so since `base_ns`, when the source was heard.
+    fn turn(&mut self, now_ns: u64, base_ns: u64, pace_ppb: u64) {
+        let lead_ns = if pace_ppb < self.record.pace_ppb { SLOWER_LEAD_NS } else { 0 };
+        let meet_ns = now_ns.max(base_ns) + lead_ns;
+        let since_base_ns = i128::from(meet_ns - base_ns) * i128::from(pace_ppb) / BILLION;
+        // Two lines that meet are rounded differently: one more, and it is never one less.
+        let system_ns = i128::from(self.at(meet_ns).ns) + 1 - since_base_ns;
+        let system_ns = u64::try_from(system_ns).unwrap_or(0);
+        self.record = TimeRecord { monotonic_ns: base_ns, system_ns, pace_ppb, ..self.record };
+    }
+}
