@@ -1,5 +1,6 @@
 //! The router at work: threads, sockets, mailboxes.
 
+pub mod clock;
 mod failure;
 mod socket;
 mod ways;
