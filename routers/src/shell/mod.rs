@@ -16,6 +16,7 @@
 mod ages;
 mod answers;
 mod arrivals;
+pub mod clock;
 mod departures;
 mod failure;
 mod news;
