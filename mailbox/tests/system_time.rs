@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Ground, tell};
-use rohrpost_mailbox::{SystemClock, TimeKeeper, TimeSource, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{SystemClock, TimeKeeper, TimeRecord, TimeSource, monotonic_ns, realtime_ns};
 use std::time::{Duration, Instant};
 
 /// The killed writer's mark: an epoch of pace p begins at p times this.
@@ -81,6 +81,40 @@ fn another_pace_never_takes_time_back() {
         last = now;
     }
     assert!(steps > 100);
+}
+
+#[test]
+fn a_successor_goes_on_and_writes_nothing_that_goes_back() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let mut first = TimeKeeper::resume(&node).unwrap();
+    assert_eq!(first.record(), None);
+    let line = |monotonic_ns, system_ns, pace_ppb, epoch| TimeRecord {
+        epoch,
+        source: TimeSource::Master,
+        monotonic_ns,
+        system_ns,
+        pace_ppb,
+        error_ns: 5,
+        drift_ns_s: 7,
+    };
+    let even = line(monotonic_ns(), MARK_NS, 1_000_000_000, 3);
+    assert!(first.write(&even));
+    drop(first);
+    let mut second = TimeKeeper::resume(&node).unwrap();
+    assert_eq!(second.record(), Some(even));
+    let now_ns = monotonic_ns();
+    for (record, is_written, why) in [
+        (line(now_ns, even.at(now_ns).ns - 1_000_000, 1_000_000_000, 3), false, "it would go back"),
+        (line(now_ns, even.at(now_ns).ns, 900_000_000, 3), false, "slower, and its beginning is over"),
+        (line(now_ns + 1_000_000_000, even.at(now_ns + 1_000_000_000).ns, 900_000_000, 3), true, "slower, and in time"),
+        (line(now_ns, even.at(now_ns).ns + 500_000_000, 1_000_000_000, 3), true, "forward"),
+        (line(now_ns, 1_000, 1_000_000_000, 4), true, "another epoch may begin anywhere"),
+    ] {
+        let before = second.record();
+        assert_eq!(second.write(&record), is_written, "{why}");
+        assert_eq!(SystemClock::open(&node).record(), if is_written { Some(record) } else { before }, "{why}");
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@
 
 mod answers;
 mod arrivals;
+pub mod clock;
 mod departures;
 mod failure;
 mod news;

@@ -374,6 +374,11 @@ impl Clock {
         self.offset_ns
     }
 
+    /// How much faster than this node's clock system time runs, as last known, ns a second.
+    pub fn rate_ppb(&self) -> i64 {
+        (self.usual_rate * 1e9).round() as i64
+    }
+
     /// Delay of both ways together in the best exchange that counts, ns.
     pub fn delay_ns(&self) -> Option<u64> {
         self.history.delay_ns()
