@@ -2,8 +2,10 @@
 //! what is told when it does not.
 
 use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait};
+use crate::probe::ProbingInterface;
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::{CallError, Fault};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -78,8 +80,9 @@ impl Lan {
     /// What counting at `arm` brings, called from `base`.
     fn count(&self, number: u32) -> Result<u64, CallError> {
         let mut tool = self.base().tool(Duration::from_secs(1));
-        let call = self.base().begin(&mut tool, "probe.1", crate::probe::COUNT, &(number,));
-        let counted = tool.link.wait(call, |bytes| rohrpost::macro_support::from_bytes(bytes));
+        let write = |body: &mut Vec<u8>| append(body, &(number,));
+        let (probe, hash) = (self.base().name("probe.1"), ProbingInterface::hash());
+        let counted = tool.call(probe, crate::probe::COUNT, hash, write, |bytes| from_bytes(bytes));
         tool.close();
         counted
     }

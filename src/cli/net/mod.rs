@@ -100,8 +100,7 @@ fn look(running: &Running, tool: &mut ToolLink) -> Vec<Told> {
 }
 
 fn ask(running: &Running, tool: &mut ToolLink, node: &str) -> Told {
-    let mut told =
-        Told { node: node.into(), time_ns: 0, links: None, clock: None, rates: Vec::new(), failure: None };
+    let mut told = Told { node: node.into(), time_ns: 0, links: None, clock: None, rates: Vec::new(), failure: None };
     let Some(router) = running.installation.router_of(node) else { return told };
     match newest(tool, router, RouterInterface::LINKS) {
         Ok((time_ns, links)) => {

@@ -11,9 +11,11 @@ use std::time::Duration;
 /// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
 pub(super) fn text(running: &Running, all: &[Told]) -> String {
     let mut parts = vec![links(all)];
-    parts.extend(all.iter().filter_map(|told| told.failure.as_ref().map(|why| (told, why))).map(|(told, why)| {
-        format!("node {}: {why}\n", told.node)
-    }));
+    parts.extend(
+        all.iter()
+            .filter_map(|told| told.failure.as_ref().map(|why| (told, why)))
+            .map(|(told, why)| format!("node {}: {why}\n", told.node)),
+    );
     let refused = |peer: &&PeerLink| !peer.why.is_empty();
     for told in all {
         for peer in told.links.iter().flat_map(|links| &links.peers).filter(refused) {
@@ -53,8 +55,8 @@ fn links(all: &[Told]) -> String {
         return String::new();
     }
     let heads = [
-        "node", "peer", "state", ">heard", ">out/s", ">B/s", ">in/s", ">B/s", ">lost", ">missed", ">copies", ">damaged",
-        ">unsent",
+        "node", "peer", "state", ">heard", ">out/s", ">B/s", ">in/s", ">B/s", ">lost", ">missed", ">copies",
+        ">damaged", ">unsent",
     ];
     table(heads, rows)
 }
@@ -86,8 +88,7 @@ fn losses(running: &Running, all: &[Told]) -> String {
     for links in all.iter().filter_map(|told| told.links.as_ref()) {
         for class in links.classes.iter().filter(|class| !class.lost.is_empty()) {
             let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
-            let lost: Vec<String> =
-                class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
+            let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
             rows.push([
                 links.node.clone(),
                 name.unwrap_or_else(|| class.class.to_string()),
