@@ -490,7 +490,7 @@ impl Book {
         }
         let last = self.last.entry((head.from, head.to, head.priority.0, life)).or_default();
         let before = *last;
-        *last = before.max(place);
+        *last = if has_place { before.max(place) } else { before };
         if place <= before && has_place {
             let text = format!("package {number}, the {place}th of {head:?}, was delivered after the {before}th");
             self.broken(now, Promise::Order, text);

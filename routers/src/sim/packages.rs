@@ -184,7 +184,7 @@ impl Packages {
     }
 
     fn check_well(&mut self, io: &mut Io<'_>) {
-        for node in (0..io.nodes).filter(|node| *node != io.node) {
+        for node in (0..io.plan.nodes.len()).filter(|node| *node != io.node) {
             let state = self.stats.state(node as NodeIndex, io.now.monotonic_ns);
             if state != State::Alive {
                 io.book.broken(io.now, Promise::Recovery, format!("for node {}, node {node} is {state:?}", io.node));
@@ -241,7 +241,7 @@ impl Layer for Packages {
             let mut watch = Watch { io, is_out: false, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 inbound::Output::Refuse { to, bytes } => {
-                    let node = (0..io.nodes).find(|node| address(*node) == to);
+                    let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
                     if let Some(to) = node {
                         io.book.saw("refused");
                         io.sent.push(Sent { port: PORT, to, bytes: Rc::from(&self.buffer[..bytes]) });

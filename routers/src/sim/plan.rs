@@ -34,6 +34,9 @@ pub const WIRE_NS_MAX: u64 = 100 * MS;
 /// So many intervals after the last fault, and one for each that may be master, all nodes follow one.
 pub const TIMED_INTERVALS: u64 = 12;
 
+/// Nodes of two parts that were far off each other step, but a master begins an epoch only after such a pause.
+pub const EPOCH_PAUSE_NS: u64 = 10 * S;
+
 /// Classes of the modules that may stand on a node; the first is not real time.
 const CLASSES: [u8; 6] = [10, 40, 90, 140, 200, 254];
 
@@ -226,6 +229,8 @@ pub struct Plan {
     pub mended_ns: u64,
     /// From then on all nodes follow one master, ns.
     pub timed_ns: u64,
+    /// From then on they also have its time, ns; may be after the end.
+    pub stepped_ns: u64,
     /// No data and no call after this, ns.
     pub traffic_end_ns: u64,
     /// The end, ns.
@@ -247,6 +252,7 @@ impl Plan {
         let mended_ns = chance.between(2 * S, 6 * S);
         let masters = masters(count, &mut chance);
         let timed_ns = mended_ns + (TIMED_INTERVALS + masters.len() as u64) * shape.interval_ns;
+        let stepped_ns = timed_ns + EPOCH_PAUSE_NS;
         let traffic_end_ns = mended_ns + RECOVERY_NS + WELL_NS;
         let mut plan = Self {
             seed,
@@ -258,8 +264,13 @@ impl Plan {
             checksum: chance.percent(90),
             mended_ns,
             traffic_end_ns,
-            end_ns: (traffic_end_ns + DRAIN_NS).max(timed_ns + S),
+            end_ns: (traffic_end_ns + DRAIN_NS).max(timed_ns + S).max(if chance.percent(10) {
+                stepped_ns + S
+            } else {
+                0
+            }),
             timed_ns,
+            stepped_ns,
             masters,
             has_stamps: chance.percent(80),
             nodes,

@@ -221,8 +221,7 @@ impl<'a> World<'a> {
         let now = station.clock.at(self.now_ns);
         let Some(router) = station.router.as_mut().filter(|router| router.life == life) else { return };
         let mut io = Io {
-            nodes: self.plan.nodes.len(),
-            timed_ns: self.plan.timed_ns,
+            plan: &self.plan,
             now,
             node,
             life,
