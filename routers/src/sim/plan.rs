@@ -87,6 +87,8 @@ pub struct Flow {
     pub period_ns: u64,
     /// Shortest and longest body.
     pub bytes: (u64, u64),
+    /// Each package has any priority and one of several mailboxes.
+    pub is_mixed: bool,
     /// Packages at once; a flood has more than one, and ends with the faults.
     pub burst: u64,
 }
@@ -104,6 +106,8 @@ pub struct Calls {
     pub period_ns: u64,
     /// How long a command is valid, ns.
     pub valid_for_ns: u64,
+    /// With what priority its commands are posted; they leave with the caller's class at most.
+    pub priority: u8,
 }
 
 /// What goes wrong.
@@ -304,17 +308,18 @@ impl Plan {
         let share_bytes_s = self.shape.rate_bytes_s / (4 * count);
         for _ in 0..count {
             let (node, from, to) = self.pair(chance);
-            let large = chance.percent(15);
+            let large = chance.percent(25);
             let most = if large { chance.between(2_000, 60_000) } else { chance.scale(16, 1400) };
             let least_period_ns = (most + 100) * S / share_bytes_s;
             let period_ns = least_period_ns.max(if large { 100 * MS } else { chance.scale(8 * MS, 200 * MS) });
-            let flood = chance.percent(20);
+            let flood = chance.percent(30);
             self.flows.push(Flow {
                 node,
                 from,
                 to: to.with_local(rohrpost_mailbox::local::DATA),
                 priority: if chance.percent(50) { from.class().0 } else { chance.below(256) as u8 },
                 period_ns: if flood { chance.between(50 * MS, 700 * MS) } else { period_ns },
+                is_mixed: chance.percent(20),
                 bytes: (if large { most / 2 } else { 8 }, most),
                 burst: if flood { chance.scale(16, 256) } else { 1 },
             });
@@ -326,12 +331,13 @@ impl Plan {
             let (node, from, to) = self.pair(chance);
             let period_ns = chance.scale(20 * MS, 300 * MS);
             let valid_for_ns = chance.between(30, 2500) * MS;
-            self.calls.push(Calls { node, from, to, period_ns, valid_for_ns });
+            let priority = if chance.percent(20) { u8::MAX } else { from.class().0 };
+            self.calls.push(Calls { node, from, to, period_ns, valid_for_ns, priority });
         }
     }
 
     fn draw_faults(&mut self, chance: &mut Chance) {
-        let count = if chance.percent(10) { 0 } else { chance.below(4 + self.nodes.len() as u64) };
+        let count = if chance.percent(10) { 0 } else { chance.below(6 + 2 * self.nodes.len() as u64) };
         for _ in 0..count {
             let fault = self.fault(chance);
             // A refusal is said up to a second later, and holds for three.
@@ -347,10 +353,10 @@ impl Plan {
         let node = chance.below(self.nodes.len() as u64) as usize;
         let to = (node + 1 + chance.below(self.nodes.len() as u64 - 1) as usize) % self.nodes.len();
         let module = chance.pick(&self.nodes[node].modules);
-        match chance.below(18) {
-            0 | 1 => Fault::Freeze { node, whole: chance.percent(30) },
+        match chance.below(20) {
+            0 | 1 | 18 => Fault::Freeze { node, whole: chance.percent(30) },
             2..5 => Fault::Restart { node },
-            5 => Fault::Cut { from: node, to },
+            5 | 19 => Fault::Cut { from: node, to },
             6 => Fault::Split { side: chance.bits() },
             7..9 => Fault::Bad { from: node, to, quality: bad(chance) },
             9 => Fault::Absent { node, module },

@@ -29,6 +29,8 @@ pub struct Io<'a> {
     pub plan: &'a Plan,
     /// Counts the router's lives, over all nodes.
     pub life: u32,
+    /// The life of each node's router; 0: none.
+    pub lives: &'a [u32],
     /// Its computer.
     pub host: &'a mut Host,
     /// The books.
