@@ -60,7 +60,10 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Local(run) => measure(&run, &cases::all()),
         #[cfg(feature = "lan")]
-        Command::Lan(run) => measure(&run, &cases::lan::all()),
+        Command::Lan(run) => {
+            rohrpost_bench::lan::prepare();
+            measure(&run, &cases::lan::all())
+        }
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

@@ -66,14 +66,18 @@ impl Receiver {
     /// The most important package, if there is one.
     pub fn try_receive(&mut self) -> Option<Package<'_>> {
         let in_hand = self.next()?;
-        Some(Package { segment: &self.segment, in_hand })
+        Some(self.hand_out(in_hand))
+    }
+
+    fn hand_out(&self, in_hand: InHand) -> Package<'_> {
+        Package { segment: &self.segment, queue: &self.queue, in_hand }
     }
 
     /// The most important package; sleeps until there is one.
     pub fn receive(&mut self) -> Package<'_> {
         loop {
             if let Some(in_hand) = self.next() {
-                return Package { segment: &self.segment, in_hand };
+                return self.hand_out(in_hand);
             }
             self.wait(Waiting::default());
         }
@@ -84,7 +88,7 @@ impl Receiver {
         let waiting = waiting.into();
         loop {
             if let Some(in_hand) = self.next() {
-                return Some(Package { segment: &self.segment, in_hand });
+                return Some(self.hand_out(in_hand));
             }
             if waiting.is_over() {
                 return None;
@@ -217,6 +221,7 @@ struct InHand {
 /// A package in hand, read where it lies. Dropped, its slot is free.
 pub struct Package<'a> {
     segment: &'a Segment,
+    queue: &'a Queue,
     in_hand: InHand,
 }
 
@@ -230,6 +235,11 @@ impl Package<'_> {
     pub fn body(&self) -> &[u8] {
         // SAFETY: taken, and freed only when `self` drops.
         unsafe { self.segment.body(self.in_hand.taken.slot, self.in_hand.head.len) }
+    }
+
+    /// Whether others seem to wait behind it, as far as can be seen without looking at their slots.
+    pub fn is_followed(&self) -> bool {
+        self.queue.may_have_more(&self.segment.slots())
     }
 
     /// When it was published, on the monotonic clock.

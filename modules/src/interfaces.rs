@@ -1,6 +1,13 @@
 //! Interfaces behind which hardware, simulation and logs are interchangeable (seed 002, 5.2), and those of the built-in
 //! modules.
 
+mod router;
+
+pub use router::{
+    Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
+    RouterInterface, RouterProxy,
+};
+
 use crate::interface;
 use crate::output::OutputLine;
 use crate::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};

@@ -23,6 +23,7 @@ mod new;
 mod param;
 mod ping;
 mod published;
+mod router;
 mod run;
 mod send;
 mod sight;
@@ -107,6 +108,8 @@ enum Command {
     Version(version::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
+    /// Carry packages between this node and the others.
+    Router(router::Arguments),
 }
 
 /// Runs the command that was typed.
@@ -141,6 +144,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
+        Command::Router(arguments) => router::run(arguments),
     };
     result.unwrap_or_else(|error| {
         // Who would read it may be gone, too.

@@ -12,7 +12,8 @@ pub mod chain;
 pub mod ends;
 pub mod flow;
 pub mod nodes;
+pub mod rtnet;
 pub mod udp;
 pub mod wire;
 
-pub use wire::Wire;
+pub use wire::{Wire, prepare};

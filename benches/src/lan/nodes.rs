@@ -1,10 +1,10 @@
 //! Two nodes with real routers between them, as launch would start them.
 
-use super::Wire;
+use super::wire::{Wire, address, name_of};
 use crate::Failure;
 use crate::harness::{Child, End, Placement, Scheduling, Scratch, settle};
 use nix::sys::signal::Signal;
-use rohrpost_mailbox::{Class, Name, Node, node_directory};
+use rohrpost_mailbox::{Class, Name, Node, local, node_directory};
 use std::fs;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -17,8 +17,6 @@ const SYSTEM: u8 = 1;
 const BENCH: Class = Class(200);
 const FLOOD: Class = Class(100);
 const ROUTER: Class = Class(250);
-/// Local id of the mailbox that takes what is for other nodes.
-const TRANSIT: u8 = 3;
 /// Reading a configuration and making a mailbox takes milliseconds, on a busy computer a second.
 const READY_WITHIN: Duration = Duration::from_secs(20);
 /// Within this a router that is told to end has told its peers.
@@ -54,7 +52,7 @@ impl Nodes {
         let command = command?;
         let mut nodes = Self { scratch: Scratch::new()?, routers: Vec::new() };
         let config = nodes.scratch.directory().join("bench-lan.toml");
-        let text = configuration(wire, network);
+        let text = configuration(network);
         fs::write(&config, text).map_err(|error| Failure::of("configuration", error))?;
         for end in [End::Ping, End::Pong] {
             let router = Child::start(|| {
@@ -94,7 +92,7 @@ impl Nodes {
     fn await_ready(&mut self) -> Result<(), Failure> {
         let give_up = Instant::now() + READY_WITHIN;
         for end in [End::Ping, End::Pong] {
-            let transit = Name::new(SYSTEM, ROUTER.0, index(end), TRANSIT);
+            let transit = Name::new(SYSTEM, ROUTER.0, index(end), local::TRANSIT);
             while !has_mailbox(&self.directory(end), transit) {
                 if self.routers[usize::from(index(end))].has_ended()? || Instant::now() > give_up {
                     let said = fs::read_to_string(self.log(end)).unwrap_or_default();
@@ -130,10 +128,6 @@ fn index(end: End) -> u8 {
     u8::from(end == End::Pong)
 }
 
-fn name_of(end: End) -> &'static str {
-    if end == End::Ping { "near" } else { "far" }
-}
-
 /// The mailbox of a timed module at this end. Each turn has one of its own, so that nothing of the last one is in it.
 pub fn bench(end: End, turn: u8) -> Name {
     Name::new(SYSTEM, BENCH.0, index(end), turn)
@@ -144,9 +138,9 @@ pub fn flood(end: End, turn: u8) -> Name {
     Name::new(SYSTEM, FLOOD.0, index(end), turn)
 }
 
-fn configuration(wire: &Wire, network: &Network) -> String {
+fn configuration(network: &Network) -> String {
     let Network { mtu, rate, quota } = network;
-    let [near, far] = [End::Ping, End::Pong].map(|end| wire.address(end));
+    let [near, far] = [End::Ping, End::Pong].map(address);
     let modules = [("bench", End::Ping), ("bench", End::Pong), ("flood", End::Ping), ("flood", End::Pong)];
     let modules = modules.map(|(class, end)| {
         let (instance, node) = (index(end), name_of(end));

@@ -1,7 +1,7 @@
 //! Datagrams from socket to socket, as the kernel carries them: one system call to send, one to receive.
 
-use super::Wire;
 use super::flow::{Inlet, Outlet};
+use super::wire::{Wire, address};
 use crate::harness::{End, Failure, Link};
 use nix::sys::socket::{setsockopt, sockopt};
 use std::io;
@@ -31,12 +31,12 @@ impl Datagrams {
         let (own, other) = if end == End::Ping { (0, 1) } else { (1, 0) };
         let other_end = if end == End::Ping { End::Pong } else { End::Ping };
         let opened = || -> io::Result<UdpSocket> {
-            let socket = UdpSocket::bind((wire.address(end), ports[own]))?;
+            let socket = UdpSocket::bind((address(end), ports[own]))?;
             // Only root may have more than the system's limit; who is refused keeps what that gives.
             if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
                 setsockopt(&socket, sockopt::RcvBuf, &RECEIVE_BYTES)?;
             }
-            socket.connect((wire.address(other_end), ports[other]))?;
+            socket.connect((address(other_end), ports[other]))?;
             Ok(socket)
         };
         opened().map(Self).map_err(|error| Failure::of("udp socket", error))

@@ -1,32 +1,57 @@
-//! The network between the two ends of a case.
+//! The network between the two ends of a case: a namespace for each, joined by a bridge.
 
 use crate::harness::{End, Failure};
+use rohrpost_routers::lab::{Lab, LabError, NodeSpec, become_able};
 use std::net::{IpAddr, Ipv4Addr};
 
-/// Where each end has its address.
+/// Largest packet of its links: a datagram as large as any goes in one.
+const MTU: u16 = u16::MAX;
+
+/// Where each end has its address. Gone with the last process that has it.
 pub struct Wire {
-    addresses: [IpAddr; 2],
+    lab: Lab,
 }
 
 impl Wire {
     /// Makes it.
     ///
     /// # Errors
-    /// When it cannot be made here.
+    /// [`Failure::Skipped`] when the system lets nobody make namespaces.
     pub fn new() -> Result<Self, Failure> {
-        Ok(Self { addresses: [1, 2].map(|host| Ipv4Addr::new(127, 0, 0, host).into()) })
+        let node = |end| NodeSpec { name: name_of(end).into(), address: address(end) };
+        Lab::new(&[node(End::Ping), node(End::Pong)], MTU).map(|lab| Self { lab }).map_err(failure)
     }
 
-    /// The address of an end.
-    pub fn address(&self, end: End) -> IpAddr {
-        self.addresses[usize::from(end == End::Pong)]
-    }
-
-    /// The calling process goes to this end; what it opens from now on is there.
+    /// The calling process goes to this end, and stays: what it opens and starts from now on is there.
     ///
     /// # Errors
     /// When it may not.
-    pub fn enter(&self, _end: End) -> Result<(), Failure> {
+    pub fn enter(&self, end: End) -> Result<(), Failure> {
+        let inside = self.lab.enter(name_of(end)).map_err(failure)?;
+        // Dropped, it would lead out again.
+        std::mem::forget(inside);
         Ok(())
     }
+}
+
+/// Lets this process make such networks, also if it is not root's. First thing in `main`; where it is refused, the cases say so.
+pub fn prepare() {
+    let _ = become_able();
+}
+
+fn failure(error: LabError) -> Failure {
+    match error {
+        LabError::NotAllowed(_) => Failure::Skipped(format!("no namespaces here: {error}")),
+        error => Failure::of("network", error),
+    }
+}
+
+/// Of an end's node.
+pub fn name_of(end: End) -> &'static str {
+    if end == End::Ping { "near" } else { "far" }
+}
+
+/// Of an end.
+pub fn address(end: End) -> IpAddr {
+    Ipv4Addr::new(10, 117, 0, if end == End::Ping { 1 } else { 2 }).into()
 }

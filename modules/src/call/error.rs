@@ -1,5 +1,7 @@
 //! What may go wrong with a call, and who says so.
 
+use super::{CallEnvelope, ReplyEnvelope};
+use crate::interface::append;
 use postcard_schema::Schema;
 use rohrpost_mailbox::{Name, SendError};
 use serde::{Deserialize, Serialize};
@@ -96,6 +98,19 @@ pub enum Fault {
 }
 
 impl Fault {
+    /// Appends the body of a reply that says this to a command, of which `command` is the body or at least its envelope; false when it
+    /// is none that can be answered.
+    pub fn answer(&self, command: &[u8], reply: &mut Vec<u8>) -> bool {
+        let Ok((call, _)) = CallEnvelope::split(command) else { return false };
+        let before = reply.len();
+        reply.extend_from_slice(&ReplyEnvelope { incarnation: call.incarnation, sequence: call.sequence }.to_bytes());
+        let written = append(reply, self).is_ok();
+        if !written {
+            reply.truncate(before);
+        }
+        written
+    }
+
     /// Whether it speaks of one try of a command alone: another try of the same may be run, or have been.
     pub const fn is_of_this_try(&self) -> bool {
         match self {

@@ -40,6 +40,11 @@ impl Failure {
         }
     }
 
+    /// Whether the datagram was not sent.
+    pub const fn is_loss(self) -> bool {
+        !matches!(self, Self::NobodyThere)
+    }
+
     /// What happened, and what to do.
     pub const fn words(self) -> &'static str {
         match self {

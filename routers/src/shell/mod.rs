@@ -1,8 +1,189 @@
-//! The router at work: threads, sockets, mailboxes.
+//! The router at work: its mailbox, its sockets and its two threads.
+//!
+//! ```text
+//!                              ┌──────────────── departures ────────────────┐
+//!  modules ─▶ router.I.3 ─────▶│ Outbound: at once, or by levels and pace   │─▶ a socket to each peer ═▶
+//!                              └─────────────▲──────────────────────────────┘
+//!                     errors, by the mailbox │ Stats: who is there, what was heard (atomics)
+//!                              ┌─────────────┴── arrivals ──────────────────┐
+//!  modules ◀─ their mailboxes ◀│ Inbound: gaps, copies, parts, order        │◀─ one socket for all ◀═
+//!                              └────────────────────────────────────────────┘
+//! ```
+//!
+//! Each thread is a participant of its own, since a participant has one bell. Neither waits for the other, takes from the heap for a
+//! package, or makes a system call but for the datagram, for sleep, and to wake whom it brings a package.
 
+mod answers;
+mod arrivals;
+mod departures;
 mod failure;
+mod news;
 mod socket;
+mod threads;
+mod transit;
 mod ways;
 
+pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
+pub use news::difference;
 pub use socket::SocketError;
+
+use crate::impair;
+use crate::inbound::Inbound;
+use crate::outbound::Outbound;
+use crate::settings::Settings;
+use crate::stats::Stats;
+use answers::Answers;
+use arrivals::{Arrivals, Desk};
+use departures::{Departures, Wire};
+use news::News;
+use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
+use socket::InSocket;
+use std::io;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use threads::Shared;
+use ways::{Reach, Ways};
+
+/// Why a router did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum ShellError {
+    /// Its address.
+    #[error(transparent)]
+    Socket(#[from] SocketError),
+    /// The node's memory.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// Its mailbox.
+    #[error(transparent)]
+    Mailbox(#[from] CreateError),
+    /// The system has no thread for it.
+    #[error("a thread of the router: {0}; is the limit of processes reached (ulimit -u)?")]
+    Thread(io::Error),
+}
+
+/// What a router is made of.
+pub struct Parts<'a> {
+    /// The node that it serves.
+    pub node: &'a Arc<Node>,
+    /// Its name, `router.I`.
+    pub name: Name,
+    /// Who it is, who the others are.
+    pub settings: Settings,
+    /// How commands are answered that cannot be delivered.
+    pub faults: Arc<dyn Faults>,
+    /// A bad network between it and its sockets.
+    pub impair: Option<impair::Settings>,
+}
+
+/// A router at work; dropped, it ends. What waits in its mailbox stays there.
+pub struct Shell {
+    settings: Arc<Settings>,
+    stats: Arc<Stats>,
+    failures: Arc<Failures>,
+    shared: Arc<Shared>,
+    socket: Arc<InSocket>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Shell {
+    /// Binds the address, makes the mailbox, tells the node what is elsewhere, and starts both threads.
+    ///
+    /// # Errors
+    /// [`ShellError`]
+    pub fn start(parts: Parts<'_>) -> Result<Self, ShellError> {
+        let Parts { node, name, settings, faults, impair } = parts;
+        let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
+        let socket = Arc::new(InSocket::open(own)?);
+        if socket.receive_bytes < InSocket::WANTED_BYTES {
+            tracing::debug!(
+                "{} bytes may wait in the socket; raise net.core.rmem_max to {} for bursts (`sysctl`)",
+                socket.receive_bytes,
+                InSocket::WANTED_BYTES
+            );
+        }
+        let settings = Arc::new(settings);
+        let stats = Stats::new(&settings, monotonic_ns());
+        let failures = Arc::new(Failures::default());
+        let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
+        let via = transit::name(name);
+        let mailbox = sender.receiver(via, transit::shape())?;
+        node.set_routes(via, &transit::ranges(&settings.routes))?;
+        let shared = Arc::new(Shared::new(&sender));
+        let answers = |participant| Answers::new(&settings, &stats, &faults, participant);
+        let departures = Departures {
+            shared: shared.clone(),
+            transit: mailbox,
+            outbound: Outbound::new(&settings, stats.clone()),
+            answers: answers(&sender),
+            wire: Wire::new(&settings, impair, &failures),
+            datagram: vec![0; settings.network.datagram_bytes_max].into(),
+        };
+        let arrivals = Arrivals {
+            shared: shared.clone(),
+            socket: socket.clone(),
+            inbound: Inbound::new(&settings, stats.clone()),
+            desk: Desk {
+                ways: Ways::new(&receiver, Reach::Here),
+                answers: answers(&receiver),
+                news: News::new(&settings),
+                takes_bytes: None,
+            },
+        };
+        // From here on, whatever fails ends what has begun.
+        let mut shell = Self { settings, stats, failures, shared, socket, threads: Vec::new() };
+        shell.begin("departures", move || {
+            if let Err(error) = threads::schedule() {
+                tracing::warn!(
+                    "the router's threads run as modules do, and not before them: {error}; allow it with a limit `rtprio` of {} \
+                     for this user (limits.conf) or CAP_SYS_NICE",
+                    threads::FIFO
+                );
+            }
+            departures.run();
+        })?;
+        shell.begin("arrivals", move || {
+            // A refusal was told by the other.
+            let _ = threads::schedule();
+            arrivals.run();
+        })?;
+        Ok(shell)
+    }
+
+    fn begin(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), ShellError> {
+        let begun = std::thread::Builder::new().name(name.into()).spawn(run);
+        self.threads.push(begun.map_err(ShellError::Thread)?);
+        Ok(())
+    }
+
+    /// Who it is, who the others are.
+    pub fn settings(&self) -> &Arc<Settings> {
+        &self.settings
+    }
+
+    /// What it counts.
+    pub fn stats(&self) -> &Arc<Stats> {
+        &self.stats
+    }
+
+    /// How often datagrams could not be sent.
+    pub fn failures(&self) -> &Arc<Failures> {
+        &self.failures
+    }
+
+    /// Whether both threads still run: if one has panicked, the process should end and be started again.
+    pub fn is_well(&self) -> bool {
+        self.threads.iter().all(|thread| !thread.is_finished())
+    }
+}
+
+impl Drop for Shell {
+    fn drop(&mut self) {
+        self.shared.end();
+        self.socket.close();
+        for thread in self.threads.drain(..) {
+            // One that panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}

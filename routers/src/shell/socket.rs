@@ -4,10 +4,14 @@
 //! node is its address.
 
 use super::failure::Failure;
-use nix::sys::socket::{setsockopt, sockopt};
+use nix::errno::Errno;
+use nix::sys::socket::{ControlMessageOwned, MsgFlags, SockaddrStorage, recvmsg, setsockopt, sockopt};
+use nix::sys::time::TimeValLike;
+use rohrpost_mailbox::realtime_ns;
 use socket2::{Domain, Protocol, SockRef, Socket, Type};
-use std::io::{self, IoSlice};
+use std::io::{self, IoSlice, IoSliceMut};
 use std::net::{IpAddr, Shutdown, SocketAddr, UdpSocket};
+use std::os::fd::AsRawFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -18,6 +22,11 @@ const RECEIVE_BYTES: usize = 8 << 20;
 /// that needs no rights.
 const TRAFFIC_CLASS: u32 = 46 << 2;
 const PRIORITY: u32 = 6;
+/// Reading ends after so long without a datagram. The kernel counts it in ticks of its slow timers, which costs less than it
+/// does to sleep.
+pub(super) const LISTEN: Duration = Duration::from_millis(100);
+/// Room for a stamp, and what the kernel puts around it.
+const CONTROL_BYTES: usize = 64;
 /// When reading fails.
 const PAUSE: Duration = Duration::from_millis(1);
 
@@ -41,18 +50,40 @@ pub enum SocketError {
     Io(SocketAddr, &'static str, io::Error),
 }
 
-/// Takes datagrams from all peers. Reading blocks, until [`InSocket::close`].
+/// What reading a socket brought.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Received {
+    /// A datagram.
+    Datagram {
+        /// How long it is.
+        bytes: usize,
+        /// Who sent it.
+        source: IpAddr,
+        /// How long it has waited in the kernel until now, ns; 0 if the kernel did not say.
+        waited_ns: u64,
+    },
+    /// Nothing came for [`LISTEN`].
+    Nothing,
+    /// The socket was closed.
+    Closed,
+}
+
+/// Takes datagrams from all peers.
 pub(super) struct InSocket {
     socket: UdpSocket,
+    port: u16,
     closed: AtomicBool,
     /// What may wait in the kernel, bytes; less than asked for if the system's limit is lower.
     pub(super) receive_bytes: usize,
 }
 
 impl InSocket {
+    /// What should be able to wait in the kernel.
+    pub(super) const WANTED_BYTES: usize = RECEIVE_BYTES;
+
     /// Binds the node's own address and port. Not shared with anybody: two routers of one node would each get some datagrams.
     pub(super) fn open(own: SocketAddr) -> Result<Self, SocketError> {
-        let failed = |what| move |error| SocketError::Io(own, what, error);
+        let failed = |what| move |error: io::Error| SocketError::Io(own, what, error);
         let socket = new_socket(own).map_err(failed("making a socket"))?;
         if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
             // Without the right to go beyond the limit, up to the limit.
@@ -60,21 +91,45 @@ impl InSocket {
         }
         // The kernel tells twice what was asked for: it counts what it needs itself.
         let receive_bytes = socket.recv_buffer_size().map_err(failed("SO_RCVBUF"))? / 2;
+        setsockopt(&socket, sockopt::ReceiveTimestampns, &true).map_err(|e| failed("SO_TIMESTAMPNS")(e.into()))?;
+        socket.set_read_timeout(Some(LISTEN)).map_err(failed("SO_RCVTIMEO"))?;
         bind(&socket, own)?;
-        Ok(Self { socket: socket.into(), closed: AtomicBool::new(false), receive_bytes })
+        Ok(Self { socket: socket.into(), port: own.port(), closed: AtomicBool::new(false), receive_bytes })
     }
 
-    /// The next datagram: how long it is and where it came from; none when the socket was closed.
-    pub(super) fn receive(&self, datagram: &mut [u8]) -> Option<(usize, IpAddr)> {
-        while !self.closed.load(Ordering::Acquire) {
-            match self.socket.recv_from(datagram) {
-                Ok((bytes, source)) => return Some((bytes, source.ip())),
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                // Closed; or the kernel lacks memory, and a real-time thread must not ask it again and again.
-                Err(_) => std::thread::sleep(PAUSE),
-            }
+    /// Reads the next datagram; blocks until there is one, or for [`LISTEN`].
+    pub(super) fn receive(&self, datagram: &mut [u8]) -> Received {
+        if self.closed.load(Ordering::Acquire) {
+            return Received::Closed;
         }
-        None
+        let (mut parts, mut control) = ([IoSliceMut::new(datagram)], [0; CONTROL_BYTES]);
+        let read =
+            recvmsg::<SockaddrStorage>(self.socket.as_raw_fd(), &mut parts, Some(&mut control), MsgFlags::empty());
+        let message = match read {
+            Ok(message) => message,
+            Err(Errno::EAGAIN | Errno::EINTR) => return Received::Nothing,
+            Err(_) => {
+                // The kernel lacks memory, and a real-time thread must not ask it again and again.
+                std::thread::sleep(PAUSE);
+                return Received::Nothing;
+            }
+        };
+        let source = message.address.as_ref().and_then(address);
+        // Closed meanwhile: then nobody sent what was read.
+        let Some(source) = source else { return Received::Nothing };
+        let stamps = message.cmsgs().into_iter().flatten();
+        let arrived_ns = stamps.filter_map(|control| match control {
+            ControlMessageOwned::ScmTimestampns(stamp) => u64::try_from(stamp.num_nanoseconds()).ok(),
+            _ => None,
+        });
+        let waited_ns = arrived_ns.last().map_or(0, |arrived_ns| realtime_ns().saturating_sub(arrived_ns));
+        Received::Datagram { bytes: message.bytes, source, waited_ns }
+    }
+
+    /// Sends a datagram to the router at an address.
+    pub(super) fn answer(&self, to: IpAddr, datagram: &[u8]) {
+        // A refusal that does not leave is as good as one that was lost: the next one comes a second later.
+        let _ = self.socket.send_to(datagram, (to, self.port));
     }
 
     /// Ends the reading, also of a thread that blocks in it.
@@ -132,6 +187,11 @@ impl OutSocket {
     }
 }
 
+fn address(of: &SockaddrStorage) -> Option<IpAddr> {
+    let v4 = of.as_sockaddr_in().map(|of| IpAddr::V4(of.ip()));
+    v4.or_else(|| of.as_sockaddr_in6().map(|of| IpAddr::V6(of.ip())))
+}
+
 fn connect(own: IpAddr, peer: SocketAddr) -> io::Result<Socket> {
     let socket = new_socket(peer)?;
     socket.bind(&SocketAddr::new(own, 0).into())?;
@@ -186,8 +246,10 @@ mod tests {
             let (inside, mut outside) = pair(address);
             outside.send(&[IoSlice::new(b"head"), IoSlice::new(b""), IoSlice::new(b"body")]).unwrap();
             let mut datagram = [0; 100];
-            assert_eq!(inside.receive(&mut datagram), Some((8, address)));
-            assert_eq!(&datagram[..8], b"headbody");
+            let Received::Datagram { bytes: 8, source, waited_ns } = inside.receive(&mut datagram) else { panic!() };
+            assert_eq!((source, &datagram[..8]), (address, &b"headbody"[..]));
+            assert!((1..1_000_000_000).contains(&waited_ns), "the kernel stamped it: {waited_ns}");
+            assert_eq!(inside.receive(&mut datagram), Received::Nothing);
             assert!(inside.receive_bytes >= 100_000, "{}", inside.receive_bytes);
         }
     }
@@ -198,11 +260,11 @@ mod tests {
         let inside = Arc::new(inside);
         let reader = std::thread::spawn({
             let inside = inside.clone();
-            move || inside.receive(&mut [0; 10])
+            move || while inside.receive(&mut [0; 10]) != Received::Closed {}
         });
         inside.close();
-        assert_eq!(reader.join().unwrap(), None);
-        assert_eq!(inside.receive(&mut [0; 10]), None, "and any other");
+        reader.join().unwrap();
+        assert_eq!(inside.receive(&mut [0; 10]), Received::Closed, "and any other");
     }
 
     #[test]
@@ -234,6 +296,10 @@ mod tests {
         let there = InSocket::open(at).unwrap();
         let _ = sender.send(&[IoSlice::new(b"here")]);
         let mut datagram = [0; 10];
-        assert_eq!(there.receive(&mut datagram), Some((4, ONE)), "sent although an earlier one had failed");
+        let received = there.receive(&mut datagram);
+        assert!(
+            matches!(received, Received::Datagram { bytes: 4, source: ONE, .. }),
+            "although an earlier one had failed"
+        );
     }
 }

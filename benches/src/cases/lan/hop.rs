@@ -47,7 +47,7 @@ impl Case for Hop {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = Ground::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB" })?;
+        let ground = Ground::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB" });
         let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { MESSAGES });
         let cell = Cell {
             bytes: self.bytes,
@@ -63,9 +63,9 @@ impl Case for Hop {
                 let (nodes, turn) = ground.turn()?;
                 time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, self.bytes, meetings))
             }),
-            Contender::sampled("chain", || time_chain(&ground.wire, &cell)),
-            Contender::sampled("chain of mailboxes", || time_mailbox_chain(&ground.wire, &cell)),
-            Contender::sampled("udp", || time_two_processes(&cell, |end, _| Datagrams::open(&ground.wire, end))),
+            Contender::sampled("chain", || time_chain(ground.wire()?, &cell)),
+            Contender::sampled("chain of mailboxes", || time_mailbox_chain(ground.wire()?, &cell)),
+            Contender::sampled("udp", || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end))),
         ];
         let target = |bound| self.judged.then_some(Target::AtMost(bound));
         let versus = [

@@ -1,5 +1,6 @@
 //! Two nodes on a network of their own: how long a package takes over two routers, how many go, what is urgent past a flood.
 
+mod clock;
 mod hop;
 mod rates;
 mod urgent;
@@ -13,7 +14,7 @@ use std::cell::Cell as Counter;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [hop::cases(), rates::cases(), urgent::cases()].into_iter().flatten().collect()
+    [hop::cases(), rates::cases(), urgent::cases(), clock::cases()].into_iter().flatten().collect()
 }
 
 /// As large as a datagram can be, so that none is parted.
@@ -21,7 +22,8 @@ const WHOLE: usize = 65_535;
 
 /// What all turns of a case happen on.
 struct Ground {
-    wire: Wire,
+    /// None where there may be no namespaces.
+    wire: Result<Wire, Failure>,
     /// None where there is no command, or it does not start: then ours has no figure, and the floors still have.
     nodes: Result<Nodes, Failure>,
     turns: Counter<u8>,
@@ -29,10 +31,15 @@ struct Ground {
 
 impl Ground {
     /// Makes the network and starts the routers.
-    fn new(settings: &Settings, network: &Network) -> Result<Self, Failure> {
-        let wire = Wire::new()?;
-        let nodes = Nodes::start(&wire, network, settings.command());
-        Ok(Self { wire, nodes, turns: Counter::new(0) })
+    fn new(settings: &Settings, network: &Network) -> Self {
+        let wire = Wire::new();
+        let nodes =
+            wire.as_ref().map_err(Clone::clone).and_then(|wire| Nodes::start(wire, network, settings.command()));
+        Self { wire, nodes, turns: Counter::new(0) }
+    }
+
+    fn wire(&self) -> Result<&Wire, Failure> {
+        self.wire.as_ref().map_err(Clone::clone)
     }
 
     /// For a turn of ours: the nodes, and its number.

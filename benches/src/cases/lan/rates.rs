@@ -14,6 +14,7 @@ use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::{Summary, median};
 use rohrpost_mailbox::HEAD_BYTES;
+use rohrpost_routers::frame;
 use std::cell::RefCell;
 use std::time::Duration;
 
@@ -22,7 +23,7 @@ const TURN: Duration = Duration::from_millis(500);
 /// Below the slots of a router's mailbox.
 const WINDOW: u64 = 48;
 /// IPv4 and UDP, and the head of a router's frame, before the packages.
-const BEFORE_PACKAGES: usize = 28 + 32;
+const BEFORE_PACKAGES: usize = 28 + frame::HEAD_BYTES;
 /// Least that a network's largest packet may be.
 const MTU_MIN: usize = 576;
 /// Of messages a second that seed 001 (CBWare, 2006, table 1) reached on a network of 1 Gbit/s, at most 3 MB/s.
@@ -53,7 +54,7 @@ impl Case for Rate {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
         let mtu = if self.packs { WHOLE } else { one };
-        let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" })?;
+        let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" });
         let losses = Losses::default();
         let raw = Flow { bytes: self.bytes, messages: messages(settings), window: None, cap: TURN };
         let ours = Flow { window: Some(WINDOW), ..raw };
@@ -64,7 +65,7 @@ impl Case for Rate {
                 flow(&ours, || Source::open(nodes, from, to), || Sink::open(nodes, to, self.bytes))
             }),
             losses.rated("udp", || {
-                let open = |end| Datagrams::open(&ground.wire, end);
+                let open = |end| Datagrams::open(ground.wire()?, end);
                 flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(SILENCE))
             }),
         ];

@@ -48,7 +48,7 @@ impl Case for Urgent {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = Ground::new(settings, &USUAL)?;
+        let ground = Ground::new(settings, &USUAL);
         let messages = settings.count(MESSAGES);
         let cell = Cell {
             bytes: BYTES,

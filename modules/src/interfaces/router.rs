@@ -1,0 +1,176 @@
+//! The router, seen by tools: its links to other nodes, and the common time.
+
+use crate::interface;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Whether packages reach another node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
+pub enum LinkState {
+    /// The router has just begun, and has heard nothing yet.
+    Unknown,
+    /// It is heard, and hears this one.
+    Alive,
+    /// Nothing came for a second.
+    Silent,
+    /// It is heard, but does not hear this one.
+    Unheard,
+    /// One of both takes nothing from the other.
+    Refused,
+}
+
+/// What went one way between two routers, since the counting one began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Carried {
+    /// Packages, whole.
+    pub packages: u64,
+    /// Datagrams, with those that only say "still there".
+    pub datagrams: u64,
+    /// Bytes of the datagrams, as UDP's payload.
+    pub bytes: u64,
+    /// Parts of packages that are larger than a datagram.
+    pub parts: u64,
+}
+
+/// Another node, as a router sees it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct PeerLink {
+    /// Its name.
+    pub node: String,
+    /// Its address.
+    pub address: String,
+    /// Whether packages reach it.
+    pub state: LinkState,
+    /// What differs, if one refuses the other; else empty.
+    pub why: String,
+    /// Time since the last datagram of it, ms; none: never.
+    pub heard_ms: Option<u64>,
+    /// To it.
+    pub sent: Carried,
+    /// From it.
+    pub received: Carried,
+    /// Datagrams to it that this computer did not send.
+    pub unsent: u64,
+    /// Datagrams from it that never came.
+    pub lost: u64,
+    /// Datagrams to it that never came there, as it says.
+    pub missed: u64,
+    /// Datagrams from it that came twice.
+    pub copies: u64,
+    /// Datagrams from it that were changed on the way.
+    pub damaged: u64,
+    /// Datagrams from it that came after later ones.
+    pub overtaken: u64,
+    /// Times that its router was started anew.
+    pub restarts: u64,
+}
+
+/// What a class did in a router; the packages that went with its priority.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct ClassCarried {
+    /// The class.
+    pub class: u8,
+    /// Packages taken from modules of this node.
+    pub taken: u64,
+    /// Of these, sent.
+    pub sent: u64,
+    /// Packages come from other nodes.
+    pub came: u64,
+    /// Of these, put into mailboxes.
+    pub delivered: u64,
+    /// Lost, and why.
+    pub lost: Vec<CarriedLoss>,
+}
+
+/// Packages lost for one cause.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct CarriedLoss {
+    /// The cause, in a word: `quota`, `silent`, `mailbox-full`, …
+    pub cause: String,
+    /// How many.
+    pub packages: u64,
+}
+
+/// Packages that wait on one level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct LevelWaiting {
+    /// 0 goes first, 30 is the last of real time, 31 is what is not real time.
+    pub level: u8,
+    /// How many.
+    pub packages: u64,
+}
+
+/// A router's view of all other nodes, and what it did. Counts are since it began, and only grow.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Links {
+    /// Its node.
+    pub node: String,
+    /// Digest that all nodes must share, of the configuration that it runs.
+    pub digest: u64,
+    /// Time since it began, ms.
+    pub uptime_ms: u64,
+    /// The other nodes, in the order of the configuration.
+    pub peers: Vec<PeerLink>,
+    /// Levels on which packages wait.
+    pub waiting: Vec<LevelWaiting>,
+    /// Bytes of memory that they take.
+    pub waiting_bytes: u64,
+    /// Classes that did something, the most urgent first.
+    pub classes: Vec<ClassCarried>,
+    /// Datagrams from addresses of no node, or that are nothing of Rohrpost's.
+    pub foreign: u64,
+}
+
+/// What a node does for the common time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[serde(rename_all = "lowercase")] // in JSON; postcard knows numbers only
+pub enum ClockRole {
+    /// It hears no master; if it has time, it goes on by its own clock.
+    Listening,
+    /// It follows the master.
+    Slave,
+    /// Its time is everyone's.
+    Master,
+}
+
+/// System time on a node.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct ClockState {
+    /// The node.
+    pub node: String,
+    /// What it does for the common time.
+    pub role: ClockRole,
+    /// The master that it follows, or is; empty if there is none yet.
+    pub master: String,
+    /// Tells the reigns of masters apart; later ones are greater.
+    pub term: u64,
+    /// Raised with each step of time.
+    pub epoch: u64,
+    /// System time when this was said, ns since 1970.
+    pub now_ns: u64,
+    /// How far off it may be then, ns: the distance to the time of the term is not larger; none: nobody knows.
+    pub error_ns: Option<u64>,
+    /// How far off it seemed at the last exchange, ns; positive: it was ahead.
+    pub offset_ns: i64,
+    /// How much faster than the master's its own clock runs, ns a second.
+    pub rate_ppb: i64,
+    /// Shortest way there and back of late, ns; none: not measured.
+    pub round_trip_ns: Option<u64>,
+    /// Exchanges with the master so far.
+    pub exchanges: u64,
+    /// Whether the kernel stamps the frames; else they are stamped by the router, and the error is larger.
+    pub by_kernel: bool,
+}
+
+/// Carries packages between nodes; it does so also while it is off.
+#[interface(class = "router", crate = crate::macro_support)]
+pub trait Router {
+    /// How it stands with the other nodes.
+    #[data(1)]
+    fn links() -> Links;
+
+    /// How it stands with system time.
+    #[data(2)]
+    fn clock() -> ClockState;
+}

@@ -1,0 +1,90 @@
+//! The thread that reads the socket and puts what came from other nodes into the mailboxes of this one.
+
+use super::answers::Answers;
+use super::news::News;
+use super::socket::{InSocket, Received};
+use super::threads::{Awake, Shared};
+use super::ways::Ways;
+use crate::frame::NodeIndex;
+use crate::inbound::{Datagram, Inbound, Output};
+use crate::report::{Deliver, Event, NotDelivered, Report};
+use crate::stats::Cause;
+use rohrpost_mailbox::{Head, SendError, monotonic_ns};
+use std::sync::Arc;
+
+/// Room for the largest that UDP carries.
+const DATAGRAM_BYTES: usize = 1 << 16;
+
+/// The other thread is rung this often at most.
+const RING_EVERY_NS: u64 = 20_000_000;
+
+/// What the receiving thread has.
+pub(super) struct Arrivals {
+    pub(super) shared: Arc<Shared>,
+    pub(super) socket: Arc<InSocket>,
+    pub(super) inbound: Inbound,
+    pub(super) desk: Desk,
+}
+
+impl Arrivals {
+    /// Until the socket is closed.
+    pub(super) fn run(mut self) {
+        let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; 128]);
+        let (mut awake, mut ring_ns) = (Awake::default(), 0);
+        loop {
+            let (received, now_ns) = (self.socket.receive(&mut datagram), monotonic_ns());
+            match received {
+                Received::Closed => return,
+                Received::Nothing => {}
+                Received::Datagram { bytes, source, waited_ns } => {
+                    let bytes = &datagram[..bytes];
+                    let datagram = Datagram { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
+                    self.inbound.handle(now_ns, &datagram, &mut self.desk);
+                }
+            }
+            while let Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.desk) {
+                self.socket.answer(to, &refusal[..bytes]);
+            }
+            if now_ns >= ring_ns {
+                ring_ns = now_ns + RING_EVERY_NS;
+                self.shared.ring_if_due(now_ns);
+            }
+            awake.pause_if_long(now_ns);
+        }
+    }
+}
+
+/// Hands packages out, and answers for those that nobody takes.
+pub(super) struct Desk {
+    pub(super) ways: Ways,
+    pub(super) answers: Answers,
+    pub(super) news: News,
+    /// Bytes that the mailbox takes which refused the last one.
+    pub(super) takes_bytes: Option<usize>,
+}
+
+impl Report for Desk {
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
+        self.answers.answer(peer, head, body, cause, self.takes_bytes.take());
+    }
+}
+
+impl Deliver for Desk {
+    fn deliver(&mut self, _from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
+        let Err(error) = self.ways.send(head, body) else { return Ok(()) };
+        Err(match error {
+            SendError::Full(_) | SendError::InUse(_) => NotDelivered::MailboxFull,
+            SendError::TooLarge { max, .. } => {
+                self.takes_bytes = Some(max);
+                NotDelivered::TooLarge
+            }
+            SendError::NoMailbox(_) | SendError::NoRouter { .. } | SendError::Reclaimed(_) | SendError::Bad(..) => {
+                NotDelivered::NoMailbox
+            }
+        })
+    }
+
+    fn event(&mut self, event: Event) {
+        self.news.event(event);
+    }
+}

@@ -1,0 +1,173 @@
+//! The thread that reads the router's mailbox and sends to other nodes.
+//!
+//! ```text
+//!  transit mailbox ─▶ accept ─┬─ at once: head of the frame + body where it lies ─▶ one sendmsg
+//!                             └─ queue ─▶ poll ─▶ datagram ─▶ socket of the peer      between any two, the mailbox is looked at
+//! ```
+
+use super::answers::Answers;
+use super::failure::{Failure, Failures};
+use super::news::News;
+use super::socket::OutSocket;
+use super::threads::{Awake, Shared};
+use crate::frame::NodeIndex;
+use crate::impair::{self, Impairment};
+use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
+use crate::report::Report;
+use crate::settings::Settings;
+use crate::stats::Cause;
+use rohrpost_mailbox::{Head, Receiver, monotonic_ns, wait_any};
+use std::io::IoSlice;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
+const BURST: usize = 64;
+/// To wait for less than this, it sleeps with a timeout, which is exact but costs a timer of the kernel; for longer waits the thread
+/// that receives rings, within its own patience.
+const EXACT: Duration = Duration::from_millis(10);
+
+/// What the sending thread has.
+pub(super) struct Departures {
+    pub(super) shared: Arc<Shared>,
+    pub(super) transit: Receiver,
+    pub(super) outbound: Outbound,
+    pub(super) answers: Answers,
+    pub(super) wire: Wire,
+    /// Room for the largest datagram.
+    pub(super) datagram: Box<[u8]>,
+}
+
+impl Report for Answers {
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
+        self.answer(peer, head, body, cause, None);
+    }
+}
+
+impl Departures {
+    /// Until the router ends.
+    pub(super) fn run(mut self) {
+        let mut awake = Awake::default();
+        while !self.shared.ends() {
+            let taken = self.take();
+            let now_ns = monotonic_ns();
+            match self.outbound.poll(now_ns, &mut self.datagram, &mut self.answers) {
+                Output::Send { to, bytes } => self.send(to, bytes),
+                Output::Wait { .. } if taken == BURST => {}
+                Output::Wait { until_ns } => {
+                    let until_ns = until_ns.min(self.wire.deliver(now_ns));
+                    self.sleep(now_ns, until_ns);
+                }
+            }
+            awake.pause_if_long(now_ns);
+        }
+    }
+
+    /// Takes what waits in the mailbox, most important first; how many.
+    fn take(&mut self) -> usize {
+        let Self { transit, outbound, answers, wire, .. } = self;
+        for taken in 0..BURST {
+            let Some(waiting) = transit.try_receive() else { return taken };
+            let (now_ns, body) = (monotonic_ns(), waiting.body());
+            let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body };
+            let alone = taken == 0 && !waiting.is_followed();
+            if let Accepted::Send { to, head } = outbound.accept(now_ns, &package, alone, answers)
+                && let Err(failure) = wire.send(now_ns, to, &[IoSlice::new(&head), IoSlice::new(body)])
+                && failure.is_loss()
+            {
+                outbound.unsent(&head, body, answers);
+            }
+        }
+        BURST
+    }
+
+    fn send(&mut self, to: NodeIndex, bytes: usize) {
+        let datagram = &self.datagram[..bytes];
+        let sent = self.wire.send(monotonic_ns(), to, &[IoSlice::new(datagram)]);
+        if sent.is_err_and(Failure::is_loss) {
+            self.outbound.unsent(datagram, &[], &mut self.answers);
+        }
+    }
+
+    /// Sleeps until a package comes, or until then.
+    fn sleep(&mut self, now_ns: u64, until_ns: u64) {
+        let wait = Duration::from_nanos(until_ns.saturating_sub(now_ns));
+        let deadline = if wait < EXACT { Some(Instant::now() + wait) } else { None };
+        // Before the look at the mailbox: who rings because of this time changes the bell that is slept on.
+        self.shared.departures_due_ns.store(until_ns, Ordering::Release);
+        wait_any(&mut [&mut self.transit], deadline, || self.shared.ends());
+    }
+}
+
+/// The sockets to all peers, and what goes wrong with them.
+pub(super) struct Wire {
+    /// By node; none for the own one.
+    sockets: Box<[Option<OutSocket>]>,
+    impairment: Option<Impairment<NodeIndex>>,
+    failures: Arc<Failures>,
+    news: News,
+    /// A datagram in one piece, for the impairment.
+    whole: Vec<u8>,
+}
+
+impl Wire {
+    pub(super) fn new(settings: &Arc<Settings>, impair: Option<impair::Settings>, failures: &Arc<Failures>) -> Self {
+        let own = settings.nodes[usize::from(settings.own)].address;
+        let socket = |node: NodeIndex| {
+            let peer = settings.nodes[usize::from(node)].address;
+            (node != settings.own).then(|| OutSocket::new(own, (peer, settings.network.port).into()))
+        };
+        Self {
+            sockets: (0..settings.nodes.len() as NodeIndex).map(socket).collect(),
+            // Each node's own stream of the seed.
+            impairment: impair.map(|impair| Impairment::new(impair, settings.own.into())),
+            failures: failures.clone(),
+            news: News::new(settings),
+            whole: Vec::new(),
+        }
+    }
+
+    /// Sends a datagram, or has the impairment keep it for a while.
+    fn send(&mut self, now_ns: u64, to: NodeIndex, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
+        let Some(impairment) = &mut self.impairment else { return self.send_now(to, parts) };
+        self.whole.clear();
+        parts.iter().for_each(|part| self.whole.extend_from_slice(part));
+        impairment.push(now_ns, to, &self.whole);
+        self.deliver(now_ns);
+        Ok(())
+    }
+
+    /// Sends what the impairment has kept for long enough; when it has more.
+    fn deliver(&mut self, now_ns: u64) -> u64 {
+        loop {
+            let Some(impairment) = &mut self.impairment else { return u64::MAX };
+            match impairment.poll(now_ns) {
+                impair::Output::Wait { until_ns } => return until_ns,
+                impair::Output::Send { to, datagram } => {
+                    self.whole.clear();
+                    self.whole.extend_from_slice(datagram);
+                    let whole = std::mem::take(&mut self.whole);
+                    // As far as anybody knows, the network has lost it.
+                    let _ = self.send_now(to, &[IoSlice::new(&whole)]);
+                    self.whole = whole;
+                }
+            }
+        }
+    }
+
+    fn send_now(&mut self, to: NodeIndex, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
+        let Some(Some(socket)) = self.sockets.get_mut(usize::from(to)) else { return Ok(()) };
+        let sent = socket.send(parts);
+        match sent {
+            Ok(()) => self.news.works(to),
+            Err(failure) => {
+                self.failures.count(failure);
+                self.news.fails(to, failure);
+            }
+        }
+        sent
+    }
+}
+
+const _: () = assert!(DIRECT_HEAD_BYTES < 128);

@@ -1,0 +1,115 @@
+//! What a router says of its peers, in words: each once, until it is over.
+
+use super::failure::Failure;
+use crate::frame::{self, NodeIndex, Reason};
+use crate::report::{Event, Mismatch};
+use crate::settings::Settings;
+use std::sync::Arc;
+
+/// What is the matter between two nodes that refuse each other, and what would be right. `digest` is this node's.
+pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
+    match (mismatch.reason, mismatch.digest) {
+        (Reason::Version, _) => format!(
+            "it speaks wire format {}, this one {}; run the same version of Rohrpost on all nodes (`rohrpost version`)",
+            mismatch.version,
+            frame::VERSION
+        ),
+        (Reason::Digest, Some(theirs)) => format!(
+            "its configuration has the digest {theirs:016x}, this node's {digest:016x}; launch all nodes from the same file \
+             (`rohrpost check`, on both)"
+        ),
+        (Reason::Digest, None) => {
+            format!("its configuration is another than this node's, {digest:016x}; launch all nodes from the same file")
+        }
+        (Reason::Stranger, _) => {
+            "its packages come from another address than the configuration has for it, or are for another \
+             node; correct `address` in the configuration, and launch all nodes from it"
+                .into()
+        }
+    }
+}
+
+/// Speaks of peers by their names.
+pub(super) struct News {
+    settings: Arc<Settings>,
+    /// Of each peer: why nothing could be sent there.
+    failing: Box<[Option<Failure>]>,
+}
+
+impl News {
+    pub(super) fn new(settings: &Arc<Settings>) -> Self {
+        Self { settings: settings.clone(), failing: settings.nodes.iter().map(|_| None).collect() }
+    }
+
+    /// Something happened that the receiving half has noticed.
+    pub(super) fn event(&self, event: Event) {
+        let digest = self.settings.digest;
+        match event {
+            Event::Heard { peer } => tracing::info!("{} is heard", self.node(peer)),
+            Event::Restarted { peer } => tracing::info!("the router of {} was started anew", self.node(peer)),
+            Event::Silent { peer } => tracing::warn!(
+                "{} is silent: nothing came for a second; is it on, does its router run, and does the network reach it?",
+                self.node(peer)
+            ),
+            Event::Unheard { peer } => tracing::warn!(
+                "{} is heard, but does not hear this node; is a firewall in between, or a cable half broken?",
+                self.node(peer)
+            ),
+            Event::Refused { source, peer: None, .. } => {
+                tracing::warn!("takes nothing from {source}: the configuration has no node with this address");
+            }
+            Event::Refused { peer: Some(peer), mismatch, .. } => {
+                tracing::warn!("takes nothing from {}: {}", self.node(peer), difference(&mismatch, digest));
+            }
+            Event::Refuses { peer, mismatch } => {
+                tracing::warn!("{} takes nothing from this node: {}", self.node(peer), difference(&mismatch, digest));
+            }
+            Event::Twice { peer } => tracing::error!(
+                "two routers send as {}: its address is used twice, or an old router there did not end; end one of them",
+                self.node(peer)
+            ),
+        }
+    }
+
+    /// A datagram could not be sent.
+    #[cold]
+    pub(super) fn fails(&mut self, to: NodeIndex, failure: Failure) {
+        // That nobody listens is no news: a peer that does not run is silent, and that is told.
+        if failure.is_loss() && self.failing[usize::from(to)].replace(failure) != Some(failure) {
+            tracing::warn!("cannot send to {}: {}", self.node(to), failure.words());
+        }
+    }
+
+    /// One could.
+    pub(super) fn works(&mut self, to: NodeIndex) {
+        if self.failing[usize::from(to)].take().is_some() {
+            tracing::info!("sends to {} again", self.node(to));
+        }
+    }
+
+    fn node(&self, peer: NodeIndex) -> String {
+        match self.settings.nodes.get(usize::from(peer)) {
+            Some(node) => format!("node {} ({})", node.name, node.address),
+            None => format!("node number {peer}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_names_both_sides_and_the_remedy() {
+        let mismatch = |reason, digest| Mismatch { reason, version: 9, digest };
+        for (mismatch, words) in [
+            (mismatch(Reason::Version, None), ["wire format 9", "this one 1", "same version of Rohrpost"]),
+            (mismatch(Reason::Digest, Some(0xab)), ["00000000000000ab", "0000000000001234", "from the same file"]),
+            (mismatch(Reason::Digest, None), ["another", "0000000000001234", "from the same file"]),
+            (mismatch(Reason::Stranger, Some(1)), ["another address", "for it", "correct `address`"]),
+        ] {
+            let text = difference(&mismatch, 0x1234);
+            assert!(words.iter().all(|word| text.contains(word)), "{text}");
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What the threads of a router share, and how they are scheduled.
+
+use rohrpost_config::FIFO_MAX;
+use rohrpost_mailbox::{Participant, sys};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Above every module: a router that waits for a module's work keeps others' packages waiting.
+pub(super) const FIFO: u8 = FIFO_MAX + 10;
+/// A thread that has not slept for so long is made to, for this short time: the kernel ends a real-time process that works without
+/// pause (RLIMIT_RTTIME), and a flood is no reason to be ended.
+const AWAKE_MAX_NS: u64 = 250_000_000;
+const PAUSE_NS: u64 = 50_000;
+
+/// What both threads see.
+pub(super) struct Shared {
+    ends: AtomicBool,
+    /// When the sending thread wants to be woken, ns; it sleeps without a timeout, since that costs less.
+    pub(super) departures_due_ns: AtomicU64,
+    /// Of the sending thread, whose bell wakes it.
+    departures: Arc<Participant>,
+}
+
+impl Shared {
+    pub(super) fn new(departures: &Arc<Participant>) -> Self {
+        Self {
+            ends: AtomicBool::new(false),
+            departures_due_ns: AtomicU64::new(u64::MAX),
+            departures: departures.clone(),
+        }
+    }
+
+    /// Whether the router ends.
+    pub(super) fn ends(&self) -> bool {
+        self.ends.load(Ordering::Acquire)
+    }
+
+    /// From now on it does.
+    pub(super) fn end(&self) {
+        self.ends.store(true, Ordering::Release);
+        self.departures.ring();
+    }
+
+    /// Wakes the sending thread if its time has come. Said again until that sleeps anew: who is about to sleep may not hear it.
+    pub(super) fn ring_if_due(&self, now_ns: u64) {
+        if self.departures_due_ns.load(Ordering::Acquire) <= now_ns {
+            self.departures.ring();
+        }
+    }
+}
+
+/// Sees to it that a thread sleeps now and then.
+#[derive(Default)]
+pub(super) struct Awake {
+    since_ns: u64,
+    last_ns: u64,
+}
+
+impl Awake {
+    /// Called again and again, with the time; pauses if the thread has not slept for long. Between two calls that are far apart it
+    /// has slept.
+    pub(super) fn pause_if_long(&mut self, now_ns: u64) {
+        if now_ns.saturating_sub(self.last_ns) > PAUSE_NS {
+            self.since_ns = now_ns;
+        }
+        self.last_ns = now_ns;
+        if now_ns.saturating_sub(self.since_ns) > AWAKE_MAX_NS {
+            std::thread::sleep(Duration::from_nanos(PAUSE_NS));
+        }
+    }
+}
+
+/// Schedules the calling thread above all modules. If that is not allowed, it runs as the rest of its process does.
+///
+/// # Errors
+/// What the system said.
+pub(super) fn schedule() -> std::io::Result<()> {
+    sys::schedule(sys::Scheduling::Fifo(FIFO))
+}

@@ -1,0 +1,49 @@
+//! The router's mailbox: its name, its shape, and the names for which packages go there.
+
+use rohrpost_config::{Route, TRANSIT};
+use rohrpost_mailbox::{Name, Shape, local};
+
+/// Slots of the router's mailbox that one participant may be filling: as many mailboxes of other nodes as it may send to.
+const CLAIMS: u8 = u8::MAX;
+
+/// The ranges of names that lie on other nodes, as the mailboxes of a node want them; neighbours become one.
+pub(super) fn ranges(routes: &[Route]) -> Vec<(Name, Name)> {
+    let mut ranges: Vec<(Name, Name)> = Vec::new();
+    for route in routes {
+        match ranges.last_mut() {
+            Some(last) if last.1.raw().checked_add(1) == Some(route.first.raw()) => last.1 = route.last,
+            _ => ranges.push((route.first, route.last)),
+        }
+    }
+    ranges
+}
+
+/// The mailbox of a router, by the router's name.
+pub(super) fn name(router: Name) -> Name {
+    router.with_local(local::TRANSIT)
+}
+
+/// What that mailbox is made as: the same in each life of the router, so that what waits there outlives it.
+pub(super) fn shape() -> Shape {
+    Shape {
+        slots: TRANSIT.slots,
+        body_bytes_max: TRANSIT.size.min(u16::MAX.into()) as u16,
+        full: TRANSIT.full,
+        max_age: TRANSIT.max_age,
+        claims: CLAIMS,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbouring_ranges_become_one() {
+        let name = |instance, local| Name::new(1, 9, instance, local);
+        let route = |instance, node| Route { first: name(instance, 0), last: name(instance, 255), node };
+        let routes = [route(0, 1), route(1, 2), route(3, 1)];
+        assert_eq!(ranges(&routes), [(name(0, 0), name(1, 255)), (name(3, 0), name(3, 255))]);
+        assert_eq!(ranges(&[]), []);
+    }
+}

@@ -1,0 +1,83 @@
+//! `rohrpost router`: carries packages between this node and the others of its system. Launch starts one on each node.
+
+mod faults;
+mod links;
+
+use super::Failure;
+use rohrpost::config::Network;
+use rohrpost::interfaces::{Router, RouterInterface};
+use rohrpost::mailbox::realtime_ns;
+use rohrpost::{Context, Module, ModuleError, Start};
+use rohrpost_modules::runtime::{exit, run_started};
+use rohrpost_routers::impair;
+use rohrpost_routers::settings::Settings;
+use rohrpost_routers::shell::{Parts, Shell};
+use serde::Deserialize;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How often it tells how it is.
+const PERIOD: Duration = Duration::from_millis(500);
+
+#[derive(clap::Args)]
+#[command(after_help = "Example, on the first node of robot.toml: rohrpost router --config robot.toml --name router.0
+Launch starts it by itself on each node of a system with several; by hand it is of use where modules are started by hand.")]
+pub(super) struct Arguments {
+    /// What every module takes: --config FILE --name router.I [--off]; I is the place of its node in the configuration, from 0.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(run_started::<RouterModule>)))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NoSettings {}
+
+struct RouterModule {
+    shell: Shell,
+}
+
+impl Router for RouterModule {}
+
+impl Module for RouterModule {
+    type Settings = NoSettings;
+    type Interfaces = RouterInterface;
+
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
+        let installation = context.installation();
+        let impair = impairment()?;
+        let node = installation.node_of(context.me()).unwrap_or_default();
+        let settings = Settings::new(installation, node, realtime_ns())?;
+        tracing::warn!("{}", Network::UNPROTECTED);
+        if let Some(impair) = impair {
+            tracing::warn!("makes the network worse, as {} says: {impair}", impair::ENVIRONMENT);
+        }
+        let faults = Arc::new(faults::Encoded::new(settings.digest));
+        let node = context.link().borrow().participant().node().clone();
+        let shell = Shell::start(Parts { node: &node, name: context.me(), settings, faults, impair })?;
+        context.set_period(PERIOD);
+        Ok(Self { shell })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        // Without one of its threads it is of no use; started again, it is.
+        assert!(self.shell.is_well(), "a thread of the router has ended");
+        context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
+        Ok(())
+    }
+}
+
+/// The bad network that a test wants.
+fn impairment() -> Result<Option<impair::Settings>, ModuleError> {
+    let text = std::env::var(impair::ENVIRONMENT).unwrap_or_default();
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let parsed = text.parse().map_err(|error| ModuleError::new(format!("{}: {error}", impair::ENVIRONMENT)));
+    parsed.map(Some)
+}
