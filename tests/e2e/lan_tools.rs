@@ -143,7 +143,8 @@ fn figures_of_another_node_are_as_those_of_ones_own() {
     let beats: Vec<&Value> = edges.iter().filter(|edge| edge["what"] == "beat" && edge["carries"] == "data").collect();
     assert_eq!((beats.len(), &beats[0]["from"], &beats[0]["to"]), (1, &"probe.1".into(), &"probe.0".into()), "{graph}");
     let per_s = beats[0]["packages_per_s"].as_f64().unwrap();
-    assert!((60.0..130.0).contains(&per_s), "{per_s}");
+    // Into its data mailbox; what goes to one of its own is no data of which a graph knows the name.
+    assert!((35.0..65.0).contains(&per_s), "{per_s}");
     assert_eq!(module(&graph, "probe.1")["node"], "arm");
     assert!(two.say(&["graph", "--seconds", "0.2", "--svg"]).ok().contains("on arm"));
     two.stop();
@@ -152,7 +153,7 @@ fn figures_of_another_node_are_as_those_of_ones_own() {
 #[test]
 fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
     let two = Two::launched();
-    for (node, count) in [("base", 1), ("arm", 2)] {
+    for (node, count) in [("base", 1), ("arm", 5)] {
         let called = two.say_at(node, &["call", "probe.1", "count", "7"]).ok();
         assert_eq!(called, format!("{count}\n"));
         assert_eq!(two.say_at(node, &["echo", "probe.1", "beat", "--count", "2"]).ok().lines().count(), 2);
@@ -185,7 +186,7 @@ fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
     );
     assert!(two.say_at("base", &["stop", "probe.1"]).ok().starts_with("probe.1 is stopped"));
     let told = two.say_at("base", &["call", "probe.1", "count", "1"]).fails();
-    assert!(told.contains("probe.1") && told.contains("no such mailbox"), "{told}");
+    assert!(told.contains("probe.1 does not run on node arm"), "{told}");
     let told = two.say_at("base", &["hz", "probe.1"]).fails();
     assert!(told.contains("probe.1"), "{told}");
     let told = two.say_at("base", &["bw", "probe.1"]).fails();
@@ -213,7 +214,8 @@ fn a_silent_node_is_told_and_nobody_waits_for_it() {
     });
     let far = module(&silent, "probe.1");
     assert_eq!((&far["state"], &far["node"], &far["pid"]), (&"silent".into(), &"arm".into(), &Value::Null));
-    assert!(two.say(&["list"]).ok().contains("node arm is silent since "), "its router knows since when");
+    // It tells so twice a second.
+    wait("its router knows since when", || two.say(&["list"]).ok().contains("node arm is silent since ").then_some(()));
     let once = two.say(&["top", "--once", "--interval", "0.1"]).ok();
     assert!(once.contains("arm SILENT") && once.contains("silent"), "{once}");
     for arguments in [
