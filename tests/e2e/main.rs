@@ -16,6 +16,7 @@ mod demo;
 mod doctor;
 mod harness;
 mod lan;
+mod lan_tools;
 mod launch;
 mod looks;
 mod mailbox;
