@@ -5,7 +5,7 @@ use crate::value::meta::{field, itself, list, structure, text};
 use crate::value::{Data, Described};
 use postcard_schema::Schema;
 use postcard_schema::schema::owned::OwnedNamedType;
-use rohrpost_mailbox::ModuleState;
+use rohrpost_mailbox::{ModuleState, SystemClock, TimeSource};
 use serde::{Deserialize, Serialize};
 
 /// Switches the module on. No arguments, no result.
@@ -28,6 +28,8 @@ pub const DESCRIBE: u16 = 8;
 pub const PARAMETERS: u16 = 9;
 /// Sets parameters: [`SetParameters`]. Returns `Result<Vec<Change>, Refusal>`.
 pub const SET_PARAMETERS: u16 = 10;
+/// Asks for system time as the module's node has it: [`TimeReport`], made when the command is run.
+pub const TIME: u16 = 11;
 /// Numbers from here on are the interfaces' own.
 pub const FIRST_OWN: u16 = 16;
 
@@ -115,6 +117,29 @@ pub struct Unsubscribe {
     pub id: u16,
     /// Likewise.
     pub mailbox: u8,
+}
+
+/// System time at a module, when it ran the command that asks for it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TimeReport {
+    /// Nanoseconds since 1970.
+    pub ns: u64,
+    /// Times of different epochs cannot be subtracted.
+    pub epoch: u64,
+    /// How far off it is at most, ns.
+    pub error_ns: u64,
+    /// Where it comes from: `local`, `master`, `simulation`, `log`. Of several nodes, those have one clock that have the master's.
+    pub source: String,
+}
+
+impl TimeReport {
+    /// What a clock says now.
+    pub fn of(clock: &SystemClock) -> Self {
+        let (now, record) = (clock.now(), clock.record());
+        let source = record.map_or(TimeSource::Local, |record| record.source).name().into();
+        let error_ns = u64::try_from(now.error.as_nanos()).unwrap_or(u64::MAX);
+        Self { ns: now.ns, epoch: now.epoch, error_ns, source }
+    }
 }
 
 /// Which output lines a module sends.
@@ -228,6 +253,7 @@ const fn _all_common_types_are_data() {
     data::<Status>();
     data::<Subscribe>();
     data::<Unsubscribe>();
+    data::<TimeReport>();
     data::<OutputLevel>();
     data::<DescriptionPart>();
     data::<SetParameters>();

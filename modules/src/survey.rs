@@ -19,18 +19,13 @@ pub use form::Seen;
 pub use usage::Usage;
 
 use postcard_schema::Schema;
-use rohrpost_config::Installation;
+use rohrpost_config::{Installation, ROUTER};
 use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
 use rohrpost_mailbox::{
     ClassTraffic, FlowInfo, InspectError, Latency, Loss, MailboxDetail, MailboxInfo, Name, Node, NodeError,
     ParticipantInfo, SlotInfo, local, monotonic_ns, saturating_sum,
 };
 use serde::{Deserialize, Serialize};
-
-/// Class of the modules that carry packages between nodes.
-pub const ROUTER_CLASS: &str = "router";
-/// Local id of their mailboxes for packages to other nodes.
-const TRANSIT: u8 = 3;
 
 /// How much of a node is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -274,9 +269,9 @@ pub fn node_of(installation: &Installation, name: Name) -> Option<&str> {
 
 /// The same, but of packages in transit only those that were lost there: the others are received once more where they go.
 fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<ClassTraffic> {
-    let router = installation.classes.id(ROUTER_CLASS);
+    let router = installation.classes.id(ROUTER);
     let mut mailboxes = mailboxes.to_vec();
-    let is_transit = |name: Name| Some(name.class()) == router && name.local() == TRANSIT;
+    let is_transit = |name: Name| Some(name.class()) == router && name.local() == local::TRANSIT;
     for class in
         mailboxes.iter_mut().filter(|mailbox| is_transit(mailbox.name)).flat_map(|mailbox| &mut mailbox.classes)
     {
@@ -288,7 +283,7 @@ fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<Cl
 /// Whether a flow is the last part of the way of packages that came from another node: a router sends them under the name of
 /// their sender, which counts them itself.
 pub fn is_hop(installation: &Installation, flow: &FlowInfo) -> bool {
-    let router = installation.classes.id(ROUTER_CLASS);
+    let router = installation.classes.id(ROUTER);
     flow.module != Name::NONE && Some(flow.module.class()) == router && flow.from.module() != flow.module
 }
 

@@ -1,9 +1,127 @@
-//! Mistakes that can be switched on, one at a time: tests and the simulation must notice each of them.
+//! Mistakes that can be switched on, one at a time and for one thread: tests and the simulation must notice each of them.
+//!
+//! In a build without the feature `broken-variants` nothing of this is there.
 
-/// What a core does wrong.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
-pub enum Broken {
-    /// Nothing.
-    #[default]
-    Nothing,
+#[cfg(any(test, feature = "broken-variants"))]
+pub use variants::{Broken, with};
+
+/// Whether a mistake is switched on.
+#[cfg(any(test, feature = "broken-variants"))]
+macro_rules! broken {
+    ($variant:ident) => {
+        $crate::broken::is($crate::broken::Broken::$variant)
+    };
+}
+
+/// No mistake is switched on.
+#[cfg(not(any(test, feature = "broken-variants")))]
+macro_rules! broken {
+    ($variant:ident) => {
+        false
+    };
+}
+
+pub(crate) use broken;
+#[cfg(any(test, feature = "broken-variants"))]
+pub(crate) use variants::is;
+
+#[cfg(any(test, feature = "broken-variants"))]
+mod variants {
+    use std::cell::Cell;
+
+    thread_local! {
+        static BROKEN: Cell<Broken> = const { Cell::new(Broken::Nothing) };
+    }
+
+    /// What a core does wrong.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+    pub enum Broken {
+        /// Nothing.
+        #[default]
+        Nothing,
+        /// Frame: the check is not looked at.
+        SkipsCheck,
+        /// Queue: what has waited longest goes first, whatever its level.
+        IgnoresLevels,
+        /// Queue: of one level the newest goes first.
+        TakesNewest,
+        /// Queue: a sender may use up the memory of all.
+        SharesQuota,
+        /// Queue: the oldest gives way in place of the newest.
+        DisplacesOldest,
+        /// Queue: what gave way is not told.
+        ForgetsDisplaced,
+        /// Outbound: no limit to the bytes a second.
+        Unpaced,
+        /// Outbound: a command may hurry more than its sender.
+        Hurries,
+        /// Outbound: what waited too long leaves nevertheless.
+        SendsStale,
+        /// Link: nobody is ever silent.
+        NeverSilent,
+        /// Link: nobody is ever unheard.
+        NeverUnheard,
+        /// Inbound: copies are taken.
+        TakesCopies,
+        /// Inbound: what is missing is not counted.
+        CountsNoGaps,
+        /// Inbound: what is older than what was delivered is delivered.
+        TakesLate,
+        /// Inbound: a flow that has no place in the table is not ordered.
+        ForgetsFloor,
+        /// Inbound: datagrams of lives that are over are taken.
+        TakesOldLives,
+        /// Inbound: other configurations are not refused.
+        TakesOtherDigests,
+        /// Inbound: what waited in the socket for too long is delivered.
+        TakesStale,
+        /// Fragment: parts of different packages of one flow are put together.
+        MixesPackages,
+        /// Fragment: a part that comes twice is counted twice.
+        CountsPartsTwice,
+        /// Fragment: nothing is ever given up for its age.
+        KeepsParts,
+        /// Fragment: as many packages are put together at a time as have begun.
+        Unbounded,
+    }
+
+    impl Broken {
+        /// All mistakes.
+        pub const ALL: [Self; 22] = [
+            Self::SkipsCheck,
+            Self::IgnoresLevels,
+            Self::TakesNewest,
+            Self::SharesQuota,
+            Self::DisplacesOldest,
+            Self::ForgetsDisplaced,
+            Self::Unpaced,
+            Self::Hurries,
+            Self::SendsStale,
+            Self::NeverSilent,
+            Self::NeverUnheard,
+            Self::TakesCopies,
+            Self::CountsNoGaps,
+            Self::TakesLate,
+            Self::ForgetsFloor,
+            Self::TakesOldLives,
+            Self::TakesOtherDigests,
+            Self::TakesStale,
+            Self::MixesPackages,
+            Self::CountsPartsTwice,
+            Self::KeepsParts,
+            Self::Unbounded,
+        ];
+    }
+
+    /// Runs something on this thread with a mistake.
+    pub fn with<R>(broken: Broken, run: impl FnOnce() -> R) -> R {
+        let before = BROKEN.replace(broken);
+        let result = run();
+        BROKEN.set(before);
+        result
+    }
+
+    pub(crate) fn is(broken: Broken) -> bool {
+        BROKEN.get() == broken
+    }
 }

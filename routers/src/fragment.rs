@@ -3,6 +3,7 @@
 //! A sender has at most one package under way for each level and peer, and a more urgent one may go between. So several are put together
 //! at a time; more than there is room for means that parts were lost, and the least important, then oldest, is given up.
 
+use crate::broken::broken;
 use crate::frame::{Fragment, PARTS_MAX};
 use rohrpost_mailbox::Head;
 
@@ -63,7 +64,9 @@ impl Reassembly {
         part: &Fragment<'_>,
         mut tell: impl FnMut(&Head, &[u8], Change),
     ) -> Option<Whole<'_>> {
-        let known = self.partial.iter().position(|partial| partial.is_used && partial.first == part.first);
+        let is_its =
+            |partial: &Partial| partial.first == part.first || broken!(MixesPackages) && partial.head == part.head;
+        let known = self.partial.iter().position(|partial| partial.is_used && is_its(partial));
         let at = match known {
             Some(at) => at,
             None if self.given_up.contains(&Some(part.first)) => return None,
@@ -86,7 +89,7 @@ impl Reassembly {
     pub fn expire(&mut self, now_ns: u64, mut tell: impl FnMut(&Head, &[u8], Change)) {
         for at in 0..self.partial.len() {
             let partial = &self.partial[at];
-            if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS {
+            if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS && !broken!(KeepsParts) {
                 self.give_up(at, &mut tell);
             }
         }
@@ -118,7 +121,7 @@ impl Reassembly {
         if let Some(free) = self.partial.iter().position(|partial| !partial.is_used) {
             return Some(free);
         }
-        if self.partial.len() < PARTIAL_MAX {
+        if self.partial.len() < PARTIAL_MAX || broken!(Unbounded) {
             self.partial.push(Partial::new());
             return Some(self.partial.len() - 1);
         }
@@ -185,7 +188,7 @@ impl Partial {
     fn add(&mut self, now_ns: u64, part: &Fragment<'_>) -> bool {
         let agrees = part.head == self.head && part.count == self.count && part.part_bytes() == self.part_bytes;
         let (word, bit) = (usize::from(part.index) / 64, 1 << (part.index % 64));
-        if !agrees || self.came[word] & bit != 0 {
+        if !agrees || self.came[word] & bit != 0 && !broken!(CountsPartsTwice) {
             return false;
         }
         self.came[word] |= bit;

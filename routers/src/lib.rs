@@ -11,7 +11,6 @@
 
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "broken-variants")]
 pub mod broken;
 pub mod fragment;
 pub mod frame;

@@ -1,5 +1,6 @@
 //! Whether a peer is there: what the receiving half finds out, and the sending half and everyone else reads.
 
+use crate::broken::broken;
 use crate::frame::{Alive, Reason};
 use crate::report::Mismatch;
 use crate::stats::Count;
@@ -59,14 +60,14 @@ impl Link {
         if refused_ns > 0 && refused_ns.saturating_add(REFUSED_FOR_NS) > now_ns {
             return State::Refused(self.mismatch());
         }
-        if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns {
+        if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns && !broken!(NeverSilent) {
             return State::Silent;
         }
         if heard_ns == 0 {
             return State::Unknown;
         }
         let doubt_ns = self.hears_us_ns.get().max(self.since_ns.get()).saturating_add(UNHEARD_AFTER_NS);
-        if doubt_ns <= now_ns { State::Unheard } else { State::Alive }
+        if doubt_ns <= now_ns && !broken!(NeverUnheard) { State::Unheard } else { State::Alive }
     }
 
     /// What to tell it of itself. `missing`: datagrams of its that never came.

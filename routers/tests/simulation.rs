@@ -77,7 +77,12 @@ fn networks_keep_their_promises() {
     let mut bad = Vec::new();
     let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS);
     for seed in 0..seeds {
+        let t = std::time::Instant::now();
         let outcome = simulate(seed);
+        let d = t.elapsed();
+        if d.as_millis() > 200 {
+            eprintln!("seed {seed} {} nodes {d:?} {:?}", Plan::new(seed).nodes.len(), outcome.seen["accepted"]);
+        }
         if !outcome.problems.is_empty() {
             eprintln!("seed {seed}: {:?}", outcome.problems[0]);
             bad.push(seed);

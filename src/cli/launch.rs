@@ -1,11 +1,16 @@
 //! `rohrpost launch`: the modules of a node, with a live table.
 
+mod all;
+
 use super::Failure;
 use super::manager::Manager;
 use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
+pub(super) use all::Nodes;
+use rohrpost::config::Network;
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::survey::Survey;
+use rohrpost_routers::impair;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -16,24 +21,52 @@ use std::time::{Duration, Instant};
 const REFRESH: Duration = Duration::from_millis(500);
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: rohrpost launch config/demo.toml\nCtrl-C stops the modules in reverse order.")]
+#[command(after_help = "Examples:
+  rohrpost launch config/demo.toml
+  rohrpost launch robot.toml --node base
+  rohrpost launch config/demo-nodes.toml --all --impair loss=5%,delay=2ms,reorder=5%
+Ctrl-C stops the modules in reverse order.")]
 pub(super) struct Arguments {
     /// The configuration.
     file: PathBuf,
     /// Node to launch, if the configuration has several.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
+    /// Launch all nodes on this computer, each in a network namespace of its own.
+    #[arg(long, conflicts_with = "node")]
+    all: bool,
+    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed.
+    #[arg(long, value_name = "TEXT", requires = "all")]
+    impair: Option<impair::Settings>,
     /// No live table, only what happens.
     #[arg(long)]
     quiet: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if arguments.all {
+        return launch_all(arguments);
+    }
+    all::stop_with_it()?;
     let speech = Speech::begin()?;
     let code = launch(arguments, &speech).unwrap_or_else(|error| {
         speech.complain(&error.to_string());
         ExitCode::FAILURE
     });
+    speech.settle();
+    Ok(code)
+}
+
+/// Every node here, until all have ended or it is told to stop.
+fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let installation = Arc::new(super::check::load(&arguments.file)?);
+    // Before the first thread, of which the speech has two.
+    let lab = all::lab(&installation)?;
+    let speech = Speech::begin()?;
+    speech.say(Network::UNPROTECTED);
+    let mut nodes = Nodes::begin(installation, lab, arguments.impair, &speech)?;
+    while nodes.watch(Duration::MAX) {}
+    let code = nodes.stop();
     speech.settle();
     Ok(code)
 }
@@ -97,8 +130,8 @@ impl<'a> View<'a> {
         if !self.live {
             let modules = launch.phases().count();
             let word = if modules == 1 { "module" } else { "modules" };
-            let line = format!("node {node} of {} runs: {modules} {word}", launch.installation().name);
-            self.speech.say(&line);
+            let runs = all::runs(node, &launch.installation().name);
+            self.speech.say(&format!("{runs}: {modules} {word}"));
         }
     }
 

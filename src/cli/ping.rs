@@ -1,23 +1,28 @@
 //! `rohrpost ping`: how long a module takes to answer.
 
+mod ways;
+
 use super::table::time;
 use super::target::{Running, Target};
 use super::units::{Stop, seconds};
 use super::{Failure, say};
+use rohrpost::common::TimeReport;
 use rohrpost::mailbox::{Latency, ModuleState};
 use rohrpost::survey::Scope;
-use rohrpost::{CallError, Name};
+use rohrpost::{CallError, Fault, Name};
 use serde_json::json;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use ways::{Moments, WaySum, Ways};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost ping motor.0               once a second; Ctrl-C ends it
   rohrpost ping motor.0 -c 100 --interval 0.01
-It calls `status`. The time is that of the whole round: a module answers between its own work, and so what it does just \
-then is in it, as is being waited for behind more important classes. p50 and p99 come from a histogram and are right to a \
-quarter or so; the others are exact. The exit code is 1 if nothing was answered.")]
+It asks for system time. The time is that of the whole round: a module answers between its own work, and so what it does just \
+then is in it, as is being waited for behind more important classes. The ways there and back are by system time, with how far \
+off they may be; between nodes that do not have the master's time, or where that is too unsure, it says so instead. p50 and p99 \
+come from a histogram and are right to a quarter or so; the others are exact. The exit code is 1 if nothing was answered.")]
 pub(super) struct Arguments {
     /// Module or face, such as motor.0.
     name: String,
@@ -45,18 +50,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut tool = running.join(timeout)?;
     let mut rounds = Rounds::default();
     loop {
-        let began = Instant::now();
-        let answer = tool.status(module);
-        let took = began.elapsed();
+        let (before, began) = (TimeReport::of(&tool.clock), Instant::now());
+        let answer = tool.time(module);
+        let (took, after) = (began.elapsed(), TimeReport::of(&tool.clock));
         rounds.sent += 1;
         let told = match answer {
-            Ok(_) => {
-                rounds.answered(took);
-                if arguments.json {
-                    say(json!({"module": arguments.name, "number": rounds.sent, "round_trip_s": took.as_secs_f64()}))
-                } else {
-                    say(format_args!("{}: answer {} after {}", arguments.name, rounds.sent, time(took)))
-                }
+            Ok(there) => {
+                let pace = tool.clock.record().map_or(1.0, |record| record.pace_ppb as f64 / 1e9);
+                let moments = Moments { before: &before, there: &there, after: &after };
+                let ways = Ways::new(&moments, running.is_own(module), pace);
+                rounds.answered(took, ways.as_ref().ok());
+                tell_answer(arguments, rounds.sent, took, &ways)
+            }
+            // It has answered, if only that it does not know this function.
+            Err(CallError::Fault(_, Fault::Unknown(_))) => {
+                rounds.answered(took, None);
+                let why = "the module was built with a Rohrpost that tells no time; build it anew".into();
+                tell_answer(arguments, rounds.sent, took, &Err(why))
             }
             Err(error) => tell_loss(arguments, &running, module, rounds.sent, &error),
         };
@@ -73,6 +83,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Err(why_silent(&running, module)?.into());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn tell_answer(arguments: &Arguments, number: u64, took: Duration, ways: &Result<Ways, String>) -> bool {
+    let name = &arguments.name;
+    if arguments.json {
+        let (ways, why) = (ways.as_ref().ok(), ways.as_ref().err());
+        return say(json!({
+            "module": name, "number": number, "round_trip_s": took.as_secs_f64(), "there_s": ways.map(|ways| ways.there_s),
+            "back_s": ways.map(|ways| ways.back_s), "ways_error_s": ways.map(|ways| ways.error_s), "ways_unknown": why,
+        }));
+    }
+    let ways = match ways {
+        Ok(ways) => ways.text(),
+        Err(why) => format!("ways unknown: {why}"),
+    };
+    say(format_args!("{name}: answer {number} after {} ({ways})", time(took)))
 }
 
 fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64, error: &CallError) -> bool {
@@ -110,11 +136,17 @@ struct Rounds {
     answered: u64,
     min: Option<Duration>,
     took: Latency,
+    there: WaySum,
+    back: WaySum,
 }
 
 impl Rounds {
-    fn answered(&mut self, took: Duration) {
+    fn answered(&mut self, took: Duration, ways: Option<&Ways>) {
         self.answered += 1;
+        if let Some(ways) = ways {
+            self.there.add(ways.there_s, ways.error_s);
+            self.back.add(ways.back_s, ways.error_s);
+        }
         self.min = Some(self.min.map_or(took, |min| min.min(took)));
         self.took.count_one(took);
     }
@@ -135,7 +167,9 @@ impl Rounds {
         let count = format!("\n{name}: {} sent, {} answered, {} lost", self.sent, self.answered, self.lost());
         let Some(times) = self.times() else { return count };
         let [min, mean, p50, p99, max] = times.map(time);
-        format!("{count}\nmin {min}  mean {mean}  p50 {p50}  p99 {p99}  max {max}")
+        let ways = [("there", &self.there), ("back", &self.back)];
+        let ways = ways.map(|(name, way)| way.text().map_or(String::new(), |text| format!("\n{name:5} {text}")));
+        format!("{count}\nround min {min}  mean {mean}  p50 {p50}  p99 {p99}  max {max}{}", ways.concat())
     }
 
     fn json(&self, module: &str) -> String {
@@ -146,6 +180,7 @@ impl Rounds {
         let object = json!({
             "module": module, "sent": self.sent, "answered": self.answered, "lost": self.lost(),
             "min_s": min, "mean_s": mean, "p50_s": p50, "p99_s": p99, "max_s": max,
+            "there": self.there.json(), "back": self.back.json(),
         });
         object.to_string()
     }
@@ -160,12 +195,12 @@ mod tests {
         let ms = Duration::from_millis;
         let mut rounds = Rounds { sent: 101, ..Rounds::default() };
         assert!(rounds.times().is_none());
-        (1..=100).for_each(|took| rounds.answered(ms(took)));
+        (1..=100).for_each(|took| rounds.answered(ms(took), None));
         let [min, mean, p50, p99, max] = rounds.times().unwrap();
         assert_eq!((min, mean, max, rounds.lost()), (ms(1), Duration::from_micros(50_500), ms(100), 1));
         assert!((ms(38)..ms(63)).contains(&p50) && (ms(75)..=ms(100)).contains(&p99), "{p50:?} {p99:?}");
         let mut one = Rounds { sent: 1, ..Rounds::default() };
-        one.answered(ms(3));
+        one.answered(ms(3), None);
         assert_eq!(one.times(), Some([ms(3); 5]));
     }
 }

@@ -3,11 +3,11 @@
 use super::Failure;
 use super::sight::Sight;
 use clap::Args;
-use rohrpost::ToolLink;
 use rohrpost::config::Installation;
 use rohrpost::launch::{choose_node, launcher_of};
-use rohrpost::mailbox::{Name, Node, NodeError, SendError, node_directory};
+use rohrpost::mailbox::{Name, Node, NodeError, SendError, local, node_directory};
 use rohrpost::survey::node_of;
+use rohrpost::{Fault, ToolLink};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -124,11 +124,6 @@ impl Running {
         all.filter(|name| self.only.as_deref().is_none_or(|only| only == *name)).collect()
     }
 
-    /// Whether there are other nodes to tell this one from.
-    pub(super) fn has_others(&self) -> bool {
-        self.installation.nodes.len() > 1
-    }
-
     /// Where a module is. What is in no configuration can only be here.
     pub(super) fn node_of(&self, module: Name) -> &str {
         node_of(&self.installation, module).unwrap_or(&self.node_name)
@@ -182,10 +177,29 @@ impl Running {
     /// An error about a module, with its name as users write it: the lower layers know numbers only.
     pub(super) fn told(&self, module: Name, error: &dyn std::error::Error) -> Failure {
         let text = error.to_string();
-        if text.contains(&SendError::NoMailbox(module).to_string()) {
+        // Found by the sender, or by the router of the module's node.
+        let absences = [SendError::NoMailbox(module).to_string(), Fault::NoMailbox.to_string()];
+        if absences.iter().any(|absence| text.contains(absence)) {
             return self.absent(module);
         }
+        if let Some(router) = self.missing_router(&text) {
+            return router;
+        }
         text.replace(&module.to_string(), &self.text(module)).into()
+    }
+
+    /// An error about this node's own router, without which nothing goes to other nodes.
+    fn missing_router(&self, text: &str) -> Option<Failure> {
+        let router = self.installation.router_of(&self.node_name)?;
+        let transit = router.with_local(local::TRANSIT).to_string();
+        text.contains(&transit).then(|| {
+            let (router, node) = (self.text(router), &self.node_name);
+            format!(
+                "the router of this node, {router}, does not run, and without it nothing goes from {node} to other nodes; \
+                 `rohrpost start {router}` starts it, or says why it cannot"
+            )
+            .into()
+        })
     }
 
     /// A name as users write it.

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 fn child(place: &crate::harness::Robot, module: &str) -> ChildState {
     let mut tool = place.tool(PATIENCE);
-    let children = tool.children().unwrap();
+    let children = tool.children(tool.launcher()).unwrap();
     tool.close();
     children.into_iter().find(|child| child.module == module).unwrap()
 }
@@ -170,13 +170,13 @@ fn orders_that_cannot_be_carried_out_say_why() {
     assert!(told.contains("no module `probe.7`"), "{told}");
     let mut tool = robot.tool(PATIENCE);
     for text in ["probe.7", "nonsense", "tool.0"] {
-        let refused = tool.restart(text);
+        let refused = tool.restart(tool.launcher(), text);
         assert!(
             matches!(&refused, Err(CallError::Module(_, ControlError::NoModule(name))) if name == text),
             "{refused:?}"
         );
     }
-    assert!(matches!(tool.start("probe.0"), Err(CallError::Module(_, ControlError::Running(_)))));
+    assert!(matches!(tool.start(tool.launcher(), "probe.0"), Err(CallError::Module(_, ControlError::Running(_)))));
     tool.close();
     // Any tool can read what launch offers, and ask for it.
     let listing = place.say(&["call", "tool.0"]).ok();

@@ -339,12 +339,18 @@ fn ping_counts_answers_and_ends_at_its_deadline() {
     let (_launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
     let text = place.say(&["ping", "probe.0", "-c", "5", "--interval", "0"]).ok();
     assert!(text.contains("probe.0: answer 5 after "), "{text}");
-    assert!(text.contains("probe.0: 5 sent, 5 answered, 0 lost\nmin "), "{text}");
+    assert!(text.contains("probe.0: 5 sent, 5 answered, 0 lost\nround min "), "{text}");
+    assert!(text.contains(" (there ") && text.contains("\nthere min ") && text.contains("\nback  min "), "{text}");
     let said = place.say(&["ping", "probe.0", "-c", "3", "--interval", "0", "--json"]).ok();
     let said: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((said.len(), &said[3]["answered"], &said[3]["lost"]), (4, &3.into(), &0.into()));
     let figures = ["min_s", "p50_s", "p99_s", "max_s"].map(|figure| said[3][figure].as_f64().unwrap());
     assert!(figures.is_sorted() && figures[0] > 0.0, "{figures:?}");
+    let ways = ["there_s", "back_s"].map(|way| said[0][way].as_f64().unwrap());
+    assert!(ways.iter().all(|way| *way > 0.0) && said[0]["ways_error_s"] == 0.0, "{}", said[0]);
+    let round_s = said[0]["round_trip_s"].as_f64().unwrap();
+    assert!((ways[0] + ways[1] - round_s).abs() < 0.02 + round_s, "both ways are the round: {}", said[0]);
+    assert_eq!((&said[3]["there"]["known"], &said[3]["back"]["known"]), (&3.into(), &3.into()));
 
     let pid = robot.pid("probe.0");
     halt(pid);

@@ -34,37 +34,3 @@ fn two_configurations_on_one_computer_are_apart() {
     second.stop();
     place.assert_empty();
 }
-
-#[test]
-fn two_nodes_of_one_system_are_apart() {
-    let place = Place::new();
-    let nodes = "[nodes.base]\ntools = [0, 15]\n[nodes.arm]\ntools = [16, 31]\n";
-    let modules = [probe("probe.0", "", "node = \"base\""), probe("probe.1", "", "node = \"arm\"")];
-    let config = place.config_of("test", nodes, &[&modules[0], &modules[1]]);
-    let file = config.to_str().unwrap();
-    let told = place.say(&["launch", file]).fails();
-    assert!(told.contains("which node?") && told.contains("base, arm") && told.contains("--node"), "{told}");
-    let mut running = Vec::new();
-    for node in ["base", "arm"] {
-        let mut launch = crate::process::Running::start(place.command(&["launch", file, "--node", node]));
-        let robot = place.robot(&config, node, &mut launch);
-        robot.wait_on(&mut launch);
-        running.push((launch, robot));
-    }
-    for (node, own, other) in [("base", "probe.0", "probe.1"), ("arm", "probe.1", "probe.0")] {
-        let at = ["--config", file, "--node", node];
-        let list = place.say(&[&["list", "--json"], &at[..]].concat()).json();
-        assert_eq!(list["modules"].as_array().unwrap().len(), 1);
-        assert_eq!(list["modules"][0]["module"], own);
-        assert_eq!(place.say(&[&["call"], &at[..], &[own, "count", "1"]].concat()).ok(), "1\n");
-        let told = place.say(&[&["call"], &at[..], &[other, "count", "1"]].concat()).fails();
-        let why =
-            format!("{other} is a module of node {}, and this is {node}", if node == "base" { "arm" } else { "base" });
-        assert!(told.contains(&why), "{told}");
-    }
-    for (mut launch, robot) in running {
-        drop(robot);
-        launch.stop();
-    }
-    place.assert_empty();
-}

@@ -112,7 +112,7 @@ fn duplicates_of_an_order_to_launch_restart_a_module_once() {
     raw.send_with(RESTART, order(1000), "probe.0");
     assert_eq!(raw.answer_as::<Result<u32, ControlError>>().1, Ok(Ok(2)));
     let mut tool = robot.tool(PATIENCE);
-    assert_eq!(tool.children().unwrap()[0].lives, 2);
+    assert_eq!(tool.children(tool.launcher()).unwrap()[0].lives, 2);
     tool.close();
     raw.replies.close();
     let out = launch.stop();

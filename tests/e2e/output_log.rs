@@ -70,11 +70,11 @@ fn what_is_set_wrongly_is_told_with_what_would_be_right() {
     for (arguments, words) in [
         (&["--level", "probe.0=loud"][..], "no level `loud`; there are error, warn, info, debug, trace"),
         (&["--level", "probe.7=debug"], "the configuration has no module `probe.7`; there are output.0, probe.0"),
-        (&["--level", "prob=debug"], "no class `prob`; there are probe, output, tool"),
+        (&["--level", "prob=debug"], "no class `prob`; there are router, probe, output, tool"),
         (&["--level", "tool=debug"], "node `main` has no module of class `tool`"),
         (&["--level", "warn", "--level", "info"], "to set levels write --level NAME=LEVEL"),
         (&["--module", "probe.7"], "the configuration has no module `probe.7`; there are output.0, probe.0"),
-        (&["--class", "prob"], "no class `prob`; there are probe, output, tool"),
+        (&["--class", "prob"], "no class `prob`; there are router, probe, output, tool"),
         (&["--since", "5"], "`5` has no unit"),
         (&["--timeout=-1"], "-1 s is no time to wait"),
     ] {

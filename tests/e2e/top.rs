@@ -330,7 +330,7 @@ fn it_waits_for_a_node_to_be_launched_again() {
     // Stopped before it is through with them, launch says that they did not start.
     let mut tool = robot.tool(PATIENCE);
     let through = |children: Vec<ChildState>| children.iter().all(|child| child.phase == Phase::Running);
-    wait("launch is through with all", || through(tool.children().unwrap()).then_some(()));
+    wait("launch is through with all", || through(tool.children(tool.launcher()).unwrap()).then_some(()));
     tool.close();
     drop(robot);
     launch.stop();

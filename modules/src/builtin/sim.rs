@@ -72,6 +72,8 @@ pub(super) struct Sim {
     settings: Settings,
     simulator: Simulator,
     clock: SystemClock,
+    /// Of system time: in another one it may be any time.
+    epoch: u64,
     odometry: Every,
     laser: Every,
     bumps: u64,
@@ -137,6 +139,7 @@ impl Module for Sim {
         Ok(Self {
             simulator: Simulator::new(world, robot),
             clock: context.clock().clone(),
+            epoch: context.clock().now().epoch,
             odometry: Every::hz(settings.odometry_rate_hz),
             laser: Every::hz(settings.laser_rate_hz),
             bumps: 0,
@@ -157,11 +160,12 @@ impl Module for Sim {
 
     fn off(&mut self, _: &mut Context) {
         // The safe state: the wheels stand.
-        let _ = self.simulator.command(Twist::default(), self.clock.now().ns);
+        let now_ns = self.now_ns();
+        let _ = self.simulator.command(Twist::default(), now_ns);
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        let now_ns = self.clock.now().ns;
+        let now_ns = self.now_ns();
         let stepped = self.simulator.step_to(now_ns);
         if stepped.skipped > 0 {
             tracing::warn!("the simulation left out {} steps: this computer was too slow", stepped.skipped);
@@ -182,10 +186,26 @@ impl Module for Sim {
     }
 }
 
+impl Sim {
+    /// System time. A node whose clock is set to the master's begins a new epoch, an hour earlier or later perhaps: the robot neither waits
+    /// for that hour nor drives through it.
+    fn now_ns(&mut self) -> u64 {
+        let now = self.clock.now();
+        if now.epoch != self.epoch {
+            self.epoch = now.epoch;
+            self.simulator.set_time(now.ns);
+            self.odometry.next_ns = now.ns;
+            self.laser.next_ns = now.ns;
+        }
+        now.ns
+    }
+}
+
 impl Motor for Sim {
     fn drive(&mut self, speed_m_s: f64, turn_rate_rad_s: f64) -> Result<(), DriveError> {
         let twist = Twist { speed_m_s, turn_rate_rad_s };
-        self.simulator.command(twist, self.clock.now().ns).map(drop).map_err(|_| DriveError::NotFinite)
+        let now_ns = self.now_ns();
+        self.simulator.command(twist, now_ns).map(drop).map_err(|_| DriveError::NotFinite)
     }
 
     fn halt(&mut self) -> Result<(), DriveError> {

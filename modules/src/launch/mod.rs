@@ -66,6 +66,9 @@ const LET_GO: Duration = Duration::from_secs(1);
 /// Notes that are kept for who asks; the oldest go first.
 const NOTES_MAX: usize = 1000;
 
+/// A router that was started again so often, and is not ready, is not going to be.
+const ROUTER_RESTARTS_MAX: u32 = 5;
+
 /// A node that somebody else removes just now is taken at the next try, or the next but one.
 const TAKE_MAX: usize = 20;
 
@@ -173,6 +176,7 @@ impl Launch {
                 let child = &self.children[index];
                 match child.phase() {
                     Phase::Failed => return Err(not_ready(child, child.last_end())),
+                    _ if self.never_ready(child) => return Err(not_ready(child, child.last_end())),
                     Phase::Starting | Phase::Waiting | Phase::Stopping => {}
                     Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => break,
                 }
@@ -192,6 +196,12 @@ impl Launch {
             }
         }
         Ok(())
+    }
+
+    /// A router is never given up, but a node on which it never was ready has not started: perhaps another one has its port.
+    fn never_ready(&self, child: &Child) -> bool {
+        let is_router = self.installation.module(child.name()).is_some_and(|module| !module.is_in_file());
+        is_router && child.restarts() > ROUTER_RESTARTS_MAX
     }
 
     /// Sleeps until something happens, then looks after those children that were started, and answers tools.

@@ -203,6 +203,14 @@ impl Simulator {
         Odometry { pose: self.odometry, twist: self.twist }
     }
 
+    /// Time is another one from now on: the robot goes on from where it stands, and its last command is as old as it was.
+    pub fn set_time(&mut self, now_ns: u64) {
+        if let Some(last_ns) = self.now_ns.replace(now_ns) {
+            let age_ns = last_ns.saturating_sub(self.commanded_ns);
+            self.commanded_ns = now_ns.saturating_sub(age_ns);
+        }
+    }
+
     /// Where the robot really is, which no robot knows.
     pub fn true_pose(&self) -> Pose {
         self.pose

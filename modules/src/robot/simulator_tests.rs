@@ -45,6 +45,23 @@ fn without_commands_it_brakes_after_the_dead_man_time() {
 }
 
 #[test]
+fn another_time_moves_nothing_and_keeps_the_age_of_the_last_command() {
+    const HOUR_NS: u64 = 3_600_000_000_000;
+    for new_ns in [3 * HOUR_NS, HOUR_NS] {
+        let mut robot = robot(Settings::default());
+        let end_ns = drive(&mut robot, FORWARD, 2 * HOUR_NS, 20);
+        assert_eq!(end_ns - TENTH_NS, 2 * HOUR_NS + 19 * TENTH_NS, "the last command is a tenth old");
+        let before = robot.true_pose();
+        robot.set_time(new_ns);
+        assert_eq!((robot.step_to(new_ns), robot.true_pose()), (Stepped { steps: 0, skipped: 0 }, before));
+        robot.step_to(new_ns + 400_000_000);
+        assert_eq!(robot.odometry().twist.speed_m_s, 0.5, "not dead yet");
+        robot.step_to(new_ns + 600_000_000);
+        assert!((robot.odometry().twist.speed_m_s - 0.3).abs() < 1e-9, "braking");
+    }
+}
+
+#[test]
 fn a_wall_stops_it_and_counts_once() {
     let mut robot = robot(Settings::default());
     let now_ns = drive(&mut robot, FORWARD, 0, 400);

@@ -1,7 +1,7 @@
 //! How a program that is no module takes part: tools, tests, launch itself.
 
 use crate::call::{CallError, Link, REPLIES_KEPT};
-use crate::common::{self, Change, DescriptionPart, OutputLevel, ParameterPage, SetParameters, Status};
+use crate::common::{self, Change, DescriptionPart, OutputLevel, ParameterPage, SetParameters, Status, TimeReport};
 use crate::description::Description;
 use crate::interface::append;
 use crate::parameter::{Parameter, Refusal};
@@ -185,6 +185,14 @@ impl ToolLink {
     /// See [`CallError`].
     pub fn status(&mut self, module: Name) -> Result<Status, CallError> {
         self.common(module, common::STATUS, &())
+    }
+
+    /// Asks a module for system time as its node has it.
+    ///
+    /// # Errors
+    /// See [`CallError`]. A module built before there was this function says [`crate::call::Fault::Unknown`].
+    pub fn time(&mut self, module: Name) -> Result<TimeReport, CallError> {
+        self.common(module, common::TIME, &())
     }
 
     /// Sets which output lines a module sends, and tells which it sent before; none when nothing collects them.

@@ -6,7 +6,7 @@ use super::parameters;
 use super::runner::Life;
 use super::server::{Call, Servant, read_arguments, write_result};
 use crate::call::Fault;
-use crate::common::{self, OutputLevel, SetParameters, Subscribe, Unsubscribe};
+use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
 use crate::module::Module;
 use crate::output;
 use rohrpost_mailbox::{Label, Name, SendError, local, monotonic_ns};
@@ -80,6 +80,7 @@ impl<M: Module> Hosted<'_, M> {
                 self.life.changes = self.life.changes.wrapping_add(u32::from(set.is_ok() && !wish.only_check));
                 write_result(reply, &set)
             }
+            common::TIME => write_result(reply, &TimeReport::of(&self.context.clock)),
             other => Err(Fault::Unknown(other)),
         }
     }

@@ -3,7 +3,7 @@
 //! Nothing here waits but [`look_at_all`], and that for a bounded time. A page that gets lost is asked for again.
 
 use super::Seen;
-use crate::call::{CallError, Link};
+use crate::call::{CallError, Fault, Link};
 use crate::interface::append;
 use crate::launch::{LOOK, LOOK_BYTES_MAX, LOOK_ON, LauncherInterface, Look, LookError, LookPage};
 use rohrpost_mailbox::{Name, wait_any};
@@ -95,7 +95,7 @@ impl Distant {
                 Some(Ok(Ok(page))) => self.take(&asked, &page, link)?,
                 Some(Ok(Err(LookError::Gone))) => self.begin_anew(link),
                 Some(Ok(Err(error))) => return Err(error.into()),
-                Some(Err(CallError::Timeout(..))) => self.ask_for(asked.from, link)?,
+                Some(Err(error)) if passes(&error) => self.ask_for(asked.from, link)?,
                 Some(Err(error)) => return Err(error.into()),
             }
         }
@@ -163,6 +163,17 @@ impl Distant {
         let sequence = link.begin(self.launcher, function, LauncherInterface::hash(), patience, write)?;
         self.under_way.push(Asked { sequence, from });
         Ok(())
+    }
+}
+
+/// Whether the next try may do better.
+fn passes(error: &CallError) -> bool {
+    match error {
+        CallError::Timeout(..) => true,
+        CallError::Fault(_, fault) => {
+            matches!(fault, Fault::Busy | Fault::MailboxFull | Fault::RouterFull | Fault::Delayed)
+        }
+        _ => false,
     }
 }
 

@@ -3,6 +3,7 @@
 //! A table with four places for each value of a hash. What has no place any more is remembered by its group's floor: nothing unknown at
 //! or below it is delivered. So a full table costs packages that were overtaken, never the order.
 
+use crate::broken::broken;
 use rohrpost_mailbox::Head;
 
 const GROUPS: usize = 64;
@@ -53,11 +54,11 @@ impl Order {
         let group = &mut self.groups[(spread >> 58) as usize % GROUPS];
         let mark = position + 1;
         if let Some((last, _)) = group.places.iter_mut().find(|(last, known)| *last != 0 && *known == flow) {
-            let newer = mark > *last;
+            let newer = mark > *last || broken!(TakesLate);
             *last = mark.max(*last);
             return newer;
         }
-        if mark <= group.floor {
+        if mark <= group.floor && !broken!(ForgetsFloor) {
             return false;
         }
         // The oldest gives way; an empty place is older than all.

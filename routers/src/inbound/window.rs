@@ -6,6 +6,8 @@
 //!           next - 1024                       settled (next - 64)       next
 //! ```
 
+use crate::broken::broken;
+
 /// Sequences whose coming is remembered.
 pub const WINDOW: u64 = 1024;
 /// So many may overtake a datagram before it counts as lost.
@@ -24,8 +26,8 @@ pub(super) enum Arrival {
     Copy,
 }
 
-/// Sequences of one life of one peer.
-#[derive(Debug)]
+/// Sequences of one life of one peer; at first all from 0 on are to come.
+#[derive(Debug, Default)]
 pub(super) struct Window {
     next: u64,
     /// All below is judged.
@@ -38,10 +40,17 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Of a life that is first heard with this sequence. Who has just begun itself cannot know what earlier ones were for.
-    pub(super) fn new(sequence: u64) -> Self {
+    /// Of a life that may have begun long before us: what it sent before this sequence is not missed. Near its beginning both have just
+    /// begun, and what is missing is lost.
+    pub(super) fn joining(sequence: u64) -> Self {
         let start = if sequence < REORDER_MAX { 0 } else { sequence };
-        Self { next: start, settled: start, start, came: [0; (WINDOW / 64) as usize], ticks: [start; 2] }
+        Self { next: start, settled: start, start, ticks: [start; 2], ..Self::default() }
+    }
+
+    /// Of a life that was heard before: what it sent before this sequence has come.
+    pub(super) fn going_on(sequence: u64) -> Self {
+        let came = [u64::MAX; (WINDOW / 64) as usize];
+        Self { next: sequence, settled: sequence, start: sequence, came, ticks: [sequence; 2] }
     }
 
     /// The sequence expected next.
@@ -55,7 +64,7 @@ impl Window {
             self.advance(sequence, lost);
             return Arrival::Newest;
         }
-        if self.next - sequence > WINDOW || self.has(sequence) {
+        if (self.next - sequence > WINDOW || self.has(sequence)) && !broken!(TakesCopies) {
             return Arrival::Copy;
         }
         self.note(sequence);
@@ -86,14 +95,15 @@ impl Window {
         if next - self.next >= WINDOW {
             self.came = [0; (WINDOW / 64) as usize];
         } else {
-            (self.next..sequence).for_each(|skipped| self.came[word(skipped)] &= !bit(skipped));
+            (self.next..=sequence).for_each(|skipped| self.came[word(skipped)] &= !bit(skipped));
         }
         self.note(sequence);
         self.next = next;
     }
 
     fn settle(&mut self, until: u64) -> u64 {
-        let lost = (self.settled..until).filter(|sequence| !self.has(*sequence)).count() as u64;
+        let lost =
+            (self.settled..until).filter(|sequence| !self.has(*sequence) && !broken!(CountsNoGaps)).count() as u64;
         self.settled = self.settled.max(until);
         lost
     }

@@ -7,8 +7,9 @@
 //!
 //! Each package that is accepted is sent or lost with a cause; see [`Stats`].
 
-use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
-use crate::link::{ALIVE_EVERY_NS, State, TELL_EVERY_NS};
+use crate::broken::broken;
+use crate::frame::{self, Fragment, Kind, NodeIndex};
+use crate::link::State;
 use crate::queue::{Place, Queue, Waiting};
 use crate::report::Report;
 use crate::settings::{LEVELS, Settings};
@@ -16,6 +17,7 @@ use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
 use std::sync::Arc;
 
+mod datagram;
 mod pace;
 
 use pace::Pace;
@@ -126,7 +128,8 @@ impl Outbound {
         let mut head = package.head;
         if matches!(head.kind.kind(), rohrpost_mailbox::Kind::Command(_)) {
             // Nobody makes others hurry more than it may hurry itself.
-            head.priority = head.priority.at_most(head.from.class().priority());
+            let limit = head.from.class().priority();
+            head.priority = if broken!(Hurries) { head.priority } else { head.priority.at_most(limit) };
         }
         self.stats.out.came(head.priority);
         let peer = match self.admit(now_ns, &head, package.published_ns) {
@@ -143,7 +146,7 @@ impl Outbound {
         let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
         let stats = &self.stats;
         let taken = self.queue.push(waiting, package.body, |gone, body| {
-            take_from_level(stats, gone.level);
+            stats.waiting[usize::from(gone.level)].take_back(1);
             lose(stats, Some(gone.peer), &gone.head, body, Cause::Quota, report);
         });
         if taken {
@@ -185,7 +188,6 @@ impl Outbound {
                 self.pack(now_ns, waiting.peer, waiting.level, datagram, report)
             };
         }
-        self.stats.waiting_bytes.set(0);
         Output::Wait { until_ns: self.alive_ns }
     }
 
@@ -233,7 +235,7 @@ impl Outbound {
 
     fn why_not(&self, now_ns: u64, peer: NodeIndex, published_ns: u64) -> Option<Cause> {
         match self.stats.state(peer, now_ns) {
-            _ if now_ns.saturating_sub(published_ns) > WAIT_MAX_NS => Some(Cause::Stale),
+            _ if is_stale(now_ns, published_ns) => Some(Cause::Stale),
             State::Unknown | State::Alive => None,
             State::Silent => Some(Cause::Silent),
             State::Unheard => Some(Cause::Unheard),
@@ -257,119 +259,20 @@ impl Outbound {
         DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.settings.network.datagram_bytes_max
     }
 
-    fn direct(&mut self, now_ns: u64, peer: NodeIndex, head: &Head, body: &[u8]) -> [u8; DIRECT_HEAD_BYTES] {
-        let package_head = head.to_bytes();
-        let frame = self.head(Kind::Packages, peer).to_bytes(&[&package_head, body]);
-        let mut bytes = [0; DIRECT_HEAD_BYTES];
-        bytes[..frame::HEAD_BYTES].copy_from_slice(&frame);
-        bytes[frame::HEAD_BYTES..].copy_from_slice(&package_head);
-        self.passed(peer, head);
-        self.left(now_ns, peer, DIRECT_HEAD_BYTES + body.len());
-        bytes
-    }
-
-    /// As many whole packages for a peer as fit, level by level. The first one fits.
-    fn pack(
-        &mut self,
-        now_ns: u64,
-        peer: NodeIndex,
-        from: u8,
-        datagram: &mut [u8],
-        report: &mut impl Report,
-    ) -> Output {
-        let mut end = frame::HEAD_BYTES;
-        let mut level = from;
-        while let Some(next) = self.queue.next_level(peer, level) {
-            level = next;
-            let Some(place) = self.queue.first_of(peer, level) else { break };
-            let waiting = *self.queue.at(place);
-            let size = PACKAGE_HEAD_BYTES + usize::from(waiting.head.len);
-            if waiting.parts > 0 || end + size > datagram.len() {
-                // Its turn comes; behind it nothing of its level may go, but perhaps something of a lower one fits.
-                level += 1;
-                continue;
-            }
-            if now_ns.saturating_sub(waiting.published_ns) > WAIT_MAX_NS {
-                self.drop_out(place, Cause::Stale, report);
-                continue;
-            }
-            let (head, body) = datagram[end..end + size].split_at_mut(PACKAGE_HEAD_BYTES);
-            head.copy_from_slice(&waiting.head.to_bytes());
-            self.queue.read(place, body);
-            end += size;
-            self.take_out(place);
-            self.passed(peer, &waiting.head);
-        }
-        self.finish(now_ns, Kind::Packages, peer, &mut datagram[..end])
-    }
-
-    /// The next part of a package that does not fit in a datagram.
-    fn part(&mut self, now_ns: u64, place: Place, datagram: &mut [u8]) -> Output {
-        let waiting = *self.queue.at(place);
-        let peer = waiting.peer;
-        let start = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
-        let (len, part_bytes) = (usize::from(waiting.head.len), datagram.len() - start);
-        let first = if waiting.parts == 0 { self.stats.peer(peer).sent.datagrams.get() } else { waiting.first };
-        let offset = usize::from(waiting.parts) * part_bytes;
-        let size = part_bytes.min(len - offset);
-        let (index, count, offset) = (waiting.parts, len.div_ceil(part_bytes) as u16, offset as u32);
-        let part = Fragment { first, index, count, offset, head: waiting.head, bytes: &[] };
-        datagram[frame::HEAD_BYTES..start].copy_from_slice(&part.head_bytes());
-        self.queue.read(place, &mut datagram[start..start + size]);
-        self.queue.part_left(place, first);
-        self.stats.peer(peer).sent.fragments.add(1);
-        if index + 1 == count {
-            self.take_out(place);
-            self.passed(peer, &waiting.head);
-        }
-        self.finish(now_ns, Kind::Fragment, peer, &mut datagram[..start + size])
-    }
-
-    fn alive(&mut self, now_ns: u64, peer: NodeIndex, datagram: &mut [u8]) -> Output {
-        let stats = self.stats.peer(peer);
-        let told = stats.link.told(stats.received.missing()).to_bytes();
-        let end = frame::HEAD_BYTES + told.len();
-        datagram[frame::HEAD_BYTES..end].copy_from_slice(&told);
-        self.peers[usize::from(peer)].tell_ns = now_ns + TELL_EVERY_NS;
-        self.finish(now_ns, Kind::Alive, peer, &mut datagram[..end])
-    }
-
-    /// Writes the head before what lies in the datagram already.
-    fn finish(&mut self, now_ns: u64, kind: Kind, to: NodeIndex, datagram: &mut [u8]) -> Output {
-        let (head, rest) = datagram.split_at_mut(frame::HEAD_BYTES);
-        head.copy_from_slice(&self.head(kind, to).to_bytes(&[rest]));
-        self.left(now_ns, to, datagram.len());
-        Output::Send { to, bytes: datagram.len() }
-    }
-
-    fn head(&self, kind: Kind, to: NodeIndex) -> FrameHead {
-        let Settings { system, own, digest, incarnation, .. } = self.settings;
-        let sequence = self.stats.peer(to).sent.datagrams.get();
-        FrameHead { kind, system, from: own, to, digest, incarnation, sequence }
-    }
-
-    fn left(&mut self, now_ns: u64, to: NodeIndex, bytes: usize) {
-        let sent = &self.stats.peer(to).sent;
-        sent.datagrams.add(1);
-        sent.bytes.add(bytes as u64);
-        self.peers[usize::from(to)].quiet_until_ns = now_ns + ALIVE_EVERY_NS;
-        self.pace.left(now_ns, bytes);
-    }
-
     fn passed(&self, peer: NodeIndex, head: &Head) {
         self.stats.peer(peer).sent.packages.add(1);
         self.stats.out.passed(head.priority, head.len);
     }
 
-    fn take_out(&mut self, place: Place) {
-        let (waiting, _) = self.queue.remove(place);
-        take_from_level(&self.stats, waiting.level);
-    }
-
     fn drop_out(&mut self, place: Place, cause: Cause, report: &mut impl Report) {
         let (waiting, body) = self.queue.remove(place);
-        take_from_level(&self.stats, waiting.level);
         lose(&self.stats, Some(waiting.peer), &waiting.head, body, cause, report);
+        self.left_queue(waiting.level);
+    }
+
+    fn left_queue(&self, level: u8) {
+        self.stats.waiting[usize::from(level)].take_back(1);
+        self.stats.waiting_bytes.set(self.queue.used_bytes());
     }
 
     /// Drops what has waited too long behind others, and what goes to peers that are not there any more.
@@ -384,27 +287,10 @@ impl Outbound {
             }
         }
     }
-
-    /// A peer that is to be told that we are still there. If none is, notes when one will be.
-    fn due(&mut self, now_ns: u64) -> Option<NodeIndex> {
-        let when = |peer: &Peer| peer.quiet_until_ns.min(peer.tell_ns);
-        let peers = self.settings.peers().map(|node| (when(&self.peers[usize::from(node)]), node));
-        match peers.min() {
-            Some((at_ns, node)) if at_ns <= now_ns => Some(node),
-            Some((at_ns, _)) => {
-                self.alive_ns = at_ns;
-                None
-            }
-            None => {
-                self.alive_ns = u64::MAX;
-                None
-            }
-        }
-    }
 }
 
-fn take_from_level(stats: &Stats, level: u8) {
-    stats.waiting[usize::from(level)].take_back(1);
+fn is_stale(now_ns: u64, published_ns: u64) -> bool {
+    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS && !broken!(SendsStale)
 }
 
 fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause, report: &mut impl Report) {

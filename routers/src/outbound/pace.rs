@@ -1,5 +1,6 @@
 //! Bytes a second: a bucket of tokens, kept as the time at which it will be full.
 
+use crate::broken::broken;
 use crate::settings::Settings;
 
 /// A burst of so much time may leave at once: waking up takes a part of it.
@@ -29,7 +30,7 @@ impl Pace {
     /// Whether a datagram may leave now; else when.
     pub(super) fn may_leave(&self, now_ns: u64) -> Result<(), u64> {
         let from_ns = self.through_ns.saturating_sub(self.ahead_ns);
-        if from_ns <= now_ns { Ok(()) } else { Err(from_ns) }
+        if from_ns <= now_ns || broken!(Unpaced) { Ok(()) } else { Err(from_ns) }
     }
 
     pub(super) fn left(&mut self, now_ns: u64, bytes: usize) {

@@ -11,6 +11,7 @@
 mod blocks;
 mod list;
 
+use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::settings::LEVELS;
 use blocks::{BLOCK_BYTES, Blocks, Chain};
@@ -60,6 +61,8 @@ pub struct Queue {
     by_sender: Lists,
     free: List,
     peers: Box<[[List; LEVELS]]>,
+    /// Levels on which something waits for a peer, one bit each.
+    waiting_for: Box<[u32]>,
     senders: Box<[Sender]>,
     /// Peers with something on a level, one bit each.
     busy: [u64; LEVELS],
@@ -91,6 +94,7 @@ impl Queue {
             by_sender: Lists::new(count),
             free: List::default(),
             peers: vec![[List::default(); LEVELS]; nodes].into(),
+            waiting_for: vec![0; nodes].into(),
             senders: vec![Sender::default(); senders].into(),
             busy: [0; LEVELS],
             levels: 0,
@@ -131,6 +135,7 @@ impl Queue {
         let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
         self.by_peer.append(&mut self.peers[peer][level], place);
         self.busy[level] |= 1 << peer;
+        self.waiting_for[peer] |= 1 << level;
         self.levels |= 1 << level;
         let sender = &mut self.senders[usize::from(waiting.sender)];
         self.by_sender.append(&mut sender.levels[level], place);
@@ -143,15 +148,23 @@ impl Queue {
         let own = &self.senders[sender];
         let lower = usize::from(level) + 1;
         let yielding: u32 = own.blocks[lower..].iter().sum();
-        if own.used - yielding + needed > self.quota_blocks {
+        let quota = if broken!(SharesQuota) {
+            self.entries.len() as u32 - self.used_blocks + own.used
+        } else {
+            self.quota_blocks
+        };
+        if own.used - yielding + needed > quota {
             return false;
         }
-        while self.senders[sender].used + needed > self.quota_blocks {
-            let last = self.senders[sender].levels[lower..].iter().rev().find_map(List::last);
+        while self.senders[sender].used + needed > quota {
+            let end = if broken!(DisplacesOldest) { List::first } else { List::last };
+            let last = self.senders[sender].levels[lower..].iter().rev().find_map(end);
             // There is one: what could give way was counted.
             let Some(last) = last else { return false };
             let (waiting, beginning) = self.remove(Place(last));
-            gone(&waiting, beginning);
+            if !broken!(ForgetsDisplaced) {
+                gone(&waiting, beginning);
+            }
         }
         true
     }
@@ -161,6 +174,10 @@ impl Queue {
         if self.levels == 0 {
             return None;
         }
+        if broken!(IgnoresLevels) {
+            let firsts = self.peers.iter().flatten().filter_map(List::first);
+            return firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place);
+        }
         let level = self.levels.trailing_zeros() as usize;
         let firsts = bits(self.busy[level]).filter_map(|peer| self.peers[peer][level].first());
         firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place)
@@ -168,13 +185,14 @@ impl Queue {
 
     /// The first package for a peer on a level, if any.
     pub fn first_of(&self, peer: NodeIndex, level: u8) -> Option<Place> {
-        self.peers[usize::from(peer)][usize::from(level)].first().map(Place)
+        let list = &self.peers[usize::from(peer)][usize::from(level)];
+        if broken!(TakesNewest) { list.last() } else { list.first() }.map(Place)
     }
 
     /// The first level, from this one on, on which something waits for a peer.
     pub fn next_level(&self, peer: NodeIndex, from: u8) -> Option<u8> {
-        let levels = &self.peers[usize::from(peer)][usize::from(from).min(LEVELS)..];
-        levels.iter().position(|list| list.first().is_some()).map(|further| from + further as u8)
+        let levels = self.waiting_for[usize::from(peer)] & u32::MAX.checked_shl(from.into()).unwrap_or(0);
+        (levels != 0).then(|| levels.trailing_zeros() as u8)
     }
 
     /// What waits at a place.
@@ -207,6 +225,7 @@ impl Queue {
         self.by_peer.remove(&mut self.peers[peer][level], place.0);
         if self.peers[peer][level].first().is_none() {
             self.busy[level] &= !(1 << peer);
+            self.waiting_for[peer] &= !(1 << level);
             if self.busy[level] == 0 {
                 self.levels &= !(1 << level);
             }

@@ -6,9 +6,12 @@
 //! ```
 
 use super::clock::Now;
+use super::times::Times;
 use crate::frame::{Frame, NodeIndex};
+use crate::time::Term;
 use rohrpost_mailbox::{Head, Name};
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
 use std::rc::Rc;
 
 /// A promise that was broken.
@@ -68,6 +71,11 @@ pub enum Role {
         /// What it says.
         answer: super::calls::Answer,
     },
+    /// A router's answer to a command that it could not deliver. It has no place among those of the module for which it speaks.
+    Report {
+        /// Which call.
+        call: usize,
+    },
 }
 
 /// How far a package has come at its sender's side.
@@ -110,6 +118,43 @@ pub struct Package {
     pub deliveries: Vec<(u32, u32)>,
 }
 
+type Mixing = BuildHasherDefault<Mix>;
+type Table<K, V> = HashMap<K, V, Mixing>;
+
+/// Hashes what nobody chooses in order to do harm: numbers, a few at a time. The usual one takes a sixth of a simulation's time.
+#[derive(Default)]
+struct Mix(u64);
+
+impl Hasher for Mix {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.write_u64((*byte).into()));
+    }
+
+    fn write_u8(&mut self, value: u8) {
+        self.write_u64(value.into());
+    }
+
+    fn write_u16(&mut self, value: u16) {
+        self.write_u64(value.into());
+    }
+
+    fn write_u32(&mut self, value: u32) {
+        self.write_u64(value.into());
+    }
+
+    fn write_u64(&mut self, value: u64) {
+        self.0 = (self.0.rotate_left(23) ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn write_i16(&mut self, value: i16) {
+        self.write_u64(value.cast_unsigned().into());
+    }
+
+    fn finish(&self) -> u64 {
+        self.0 ^ self.0 >> 32
+    }
+}
+
 /// What one life of a router has had of a package.
 #[derive(Clone, Copy, Default, Debug)]
 struct Receipt {
@@ -122,7 +167,7 @@ struct Receipt {
 /// What one life of a router has taken of another.
 #[derive(Default, Debug)]
 struct Taken {
-    sequences: HashSet<u64>,
+    sequences: HashSet<u64, Mixing>,
     highest: u64,
 }
 
@@ -152,18 +197,18 @@ struct Sent {
 pub struct Book {
     /// All packages, by number.
     pub packages: Vec<Package>,
-    places: HashMap<(Name, Name, u8), u32>,
-    ids: HashMap<(Name, Name, i16), u16>,
+    places: Table<(Name, Name, u8), u32>,
+    ids: Table<(Name, Name, i16), u16>,
     /// Packages by what their heads tell them apart by.
-    by_head: HashMap<(Name, Name, i16, u16), u32>,
+    by_head: Table<(Name, Name, i16, u16), u32>,
     /// Large packages by their first part: incarnation of the sender, receiver, sequence.
-    by_part: HashMap<(u64, NodeIndex, u64), u32>,
+    by_part: Table<(u64, NodeIndex, u64), u32>,
     /// What routers have received of packages: life, package.
-    receipts: HashMap<(u32, u32), Receipt>,
+    receipts: Table<(u32, u32), Receipt>,
     /// Datagrams that routers took: life, incarnation of the sender.
-    taken: HashMap<(u32, u64), Taken>,
+    taken: Table<(u32, u64), Taken>,
     /// Last place that was delivered, of sender, receiver and priority, in one life of the receiver's router.
-    last: HashMap<(Name, Name, u8, u32), u32>,
+    last: Table<(Name, Name, u8, u32), u32>,
     sent: BTreeMap<u32, Sent>,
     accounts: BTreeMap<u32, Account>,
     /// What was broken.
@@ -174,6 +219,10 @@ pub struct Book {
     pattern: Vec<u8>,
     /// Level of a priority.
     bulk_below: u8,
+    /// System time.
+    pub times: Times,
+    /// The master, and its term, that all nodes must agree on by now.
+    pub master: Option<(Option<NodeIndex>, Term)>,
     /// Packages that came to an end at a receiver's side.
     pub delivered_or_lost: u64,
     /// Whether damaged datagrams were handed to routers; then not all is theirs.
@@ -212,7 +261,7 @@ impl Book {
         head.id = *id;
         self.by_head.insert(key(&head), number);
         let place = self.places.entry((head.from, head.to, head.priority.0)).or_default();
-        *place += 1;
+        *place += u32::from(!matches!(role, Role::Report { .. }));
         self.packages.push(Package {
             head,
             from_node: nodes.0 as NodeIndex,
@@ -431,6 +480,7 @@ impl Book {
         let twice = package.deliveries.contains(&lives);
         package.deliveries.push(lives);
         let (head, place) = (package.head, package.place);
+        let has_place = !twice && !redelivered && !matches!(package.role, Role::Report { .. });
         if twice {
             self.broken(
                 now,
@@ -441,7 +491,7 @@ impl Book {
         let last = self.last.entry((head.from, head.to, head.priority.0, life)).or_default();
         let before = *last;
         *last = before.max(place);
-        if place <= before && !twice && !redelivered {
+        if place <= before && has_place {
             let text = format!("package {number}, the {place}th of {head:?}, was delivered after the {before}th");
             self.broken(now, Promise::Order, text);
         }

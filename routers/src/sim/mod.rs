@@ -20,5 +20,7 @@ pub mod packages;
 pub mod plan;
 pub mod run;
 pub mod station;
+pub mod ticking;
+pub mod times;
 pub mod trace;
 pub mod world;

@@ -162,6 +162,7 @@ impl World<'_> {
             match package.role {
                 Role::Data => {}
                 Role::Answer { call, answer } => self.calls.answered(&mut self.book, now, call, answer),
+                Role::Report { call } => self.calls.answered(&mut self.book, now, call, Answer::NotRun),
                 Role::Command { call, age_ns } => {
                     let Some(server) = self.servers.get_mut(&head.to.module()) else { continue };
                     server.waiting.push_back(Waiting {
@@ -201,7 +202,7 @@ impl World<'_> {
         }
         for number in 0..self.book.packages.len() {
             let package = &self.book.packages[number];
-            let is_answer = matches!(package.role, Role::Answer { .. });
+            let is_answer = !matches!(package.role, Role::Data | Role::Command { .. });
             if package.posted_ns > well_ns && !is_answer && package.deliveries.is_empty() {
                 let text = format!("package {number} was not delivered: {package:?}");
                 self.book.broken(now, Promise::Recovery, text);

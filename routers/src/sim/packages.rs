@@ -1,7 +1,6 @@
 //! The layer that carries packages: `Outbound` and `Inbound`, called as the threads of the shell call them, and watched.
 
 use super::book::{Promise, Role};
-use super::calls::Answer;
 use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
 use super::plan::{Plan, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
@@ -21,6 +20,8 @@ use std::sync::Arc;
 
 /// The socket of packages.
 pub const PORT: Port = 0;
+/// Of the configuration.
+pub(super) const DIGEST: u64 = 0x1234_5678;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
@@ -44,7 +45,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
         system: SYSTEM,
         own: node as NodeIndex,
         nodes: nodes.collect(),
-        digest: 0x1234_5678,
+        digest: DIGEST,
         incarnation,
         network: Network {
             datagram_bytes_max: plan.shape.datagram_bytes_max,
@@ -112,9 +113,8 @@ impl Packages {
         if let Accepted::Send { to, head } =
             self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch)
         {
-            let bytes: Rc<[u8]> = head.iter().chain(body).copied().collect();
             io.book.saw("sent at once");
-            self.send(io, to, bytes);
+            self.send(io, to, Rc::from([&head, body].concat()));
         }
     }
 
@@ -143,7 +143,7 @@ impl Packages {
                 priority: command.priority,
                 options: Options::ERROR,
             };
-            let role = Role::Answer { call, answer: Answer::NotRun };
+            let role = Role::Report { call };
             let (number, head, body) = io.book.post(io.now, head, (io.node, to_node.into()), role);
             io.book.accepted(io.life, number);
             io.book.saw("told a caller on another node");

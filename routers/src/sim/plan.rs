@@ -6,6 +6,7 @@
 
 use super::chance::Chance;
 use super::link::Quality;
+use crate::frame::NodeIndex;
 use rohrpost_mailbox::Name;
 
 /// Microseconds, milliseconds and seconds in ns.
@@ -29,6 +30,9 @@ pub const DRAIN_NS: u64 = 7 * S / 2;
 /// A datagram takes so long on the wire at most: with the longest waits in a router and in a socket, less than the 2 s that "at most
 /// once" relies on.
 pub const WIRE_NS_MAX: u64 = 100 * MS;
+
+/// So many intervals after the last fault, and one for each that may be master, all nodes follow one.
+pub const TIMED_INTERVALS: u64 = 12;
 
 /// Classes of the modules that may stand on a node; the first is not real time.
 const CLASSES: [u8; 6] = [10, 40, 90, 140, 200, 254];
@@ -212,10 +216,16 @@ pub struct Plan {
     pub calls: Vec<Calls>,
     /// What goes wrong.
     pub faults: Vec<Planned>,
+    /// Who may be master of time, in order.
+    pub masters: Vec<NodeIndex>,
+    /// Whether kernels stamp datagrams.
+    pub has_stamps: bool,
     /// Whether damaged datagrams are dropped by the kernel, as UDP's checksum has it; else the routers get them.
     pub checksum: bool,
     /// No fault and no flood after this, ns.
     pub mended_ns: u64,
+    /// From then on all nodes follow one master, ns.
+    pub timed_ns: u64,
     /// No data and no call after this, ns.
     pub traffic_end_ns: u64,
     /// The end, ns.
@@ -235,6 +245,8 @@ impl Plan {
         let nodes: Vec<NodePlan> = (0..count).map(|index| node(index, &mut chance)).collect();
         let quality = quality(&mut chance);
         let mended_ns = chance.between(2 * S, 6 * S);
+        let masters = masters(count, &mut chance);
+        let timed_ns = mended_ns + (TIMED_INTERVALS + masters.len() as u64) * shape.interval_ns;
         let traffic_end_ns = mended_ns + RECOVERY_NS + WELL_NS;
         let mut plan = Self {
             seed,
@@ -246,7 +258,10 @@ impl Plan {
             checksum: chance.percent(90),
             mended_ns,
             traffic_end_ns,
-            end_ns: traffic_end_ns + DRAIN_NS,
+            end_ns: (traffic_end_ns + DRAIN_NS).max(timed_ns + S),
+            timed_ns,
+            masters,
+            has_stamps: chance.percent(80),
             nodes,
         };
         plan.draw_flows(&mut chance.fork());
@@ -308,7 +323,9 @@ impl Plan {
         let count = if chance.percent(10) { 0 } else { chance.below(4 + self.nodes.len() as u64) };
         for _ in 0..count {
             let fault = self.fault(chance);
-            let from_ns = chance.below(self.mended_ns - S / 2);
+            // A refusal is said up to a second later, and holds for three.
+            let is_strange = matches!(fault, Fault::Foreign { .. } | Fault::Replay { .. });
+            let from_ns = chance.below(self.mended_ns - if is_strange { 3 * S / 2 } else { S / 2 });
             let longest_ns = self.mended_ns - from_ns;
             let long_ns = chance.scale(5 * MS, 4 * S).min(longest_ns);
             self.faults.push(Planned { from_ns, until_ns: from_ns + long_ns, fault });
@@ -354,7 +371,7 @@ fn shape(chance: &mut Chance) -> Shape {
         rate_bytes_s: chance.scale(1 << 20, 100 << 20),
         quota_bytes: chance.between(128, 256) as usize * 1024,
         bulk_below: 16,
-        interval_ns: chance.pick(&[100 * MS, 250 * MS, S]),
+        interval_ns: if chance.percent(5) { S } else { chance.pick(&[100 * MS, 250 * MS, 250 * MS, 500 * MS]) },
     }
 }
 
@@ -368,10 +385,21 @@ fn node(index: usize, chance: &mut Chance) -> NodePlan {
         monotonic_ns: chance.scale(S, 1_000_000 * S),
         realtime_ns: (1_790_000_000 * S).saturating_add_signed(chance.around(100 * S as i64)),
         rate_ppb: chance.around(100_000),
-        wander_ppb: chance.around(500).abs(),
+        wander_ppb: chance.below(200) as i64,
         boot_ns: chance.below(300 * MS),
         modules: classes.into_iter().map(|class| Name::new(SYSTEM, class, index as u8, 0)).collect(),
     }
+}
+
+fn masters(nodes: usize, chance: &mut Chance) -> Vec<NodeIndex> {
+    let mut masters: Vec<NodeIndex> = (0..nodes as NodeIndex).collect();
+    if chance.percent(60) {
+        let kept = chance.between(1, 4) as usize;
+        while masters.len() > kept {
+            masters.remove(chance.below(masters.len() as u64) as usize);
+        }
+    }
+    masters
 }
 
 fn quality(chance: &mut Chance) -> Quality {

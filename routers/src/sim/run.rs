@@ -5,6 +5,7 @@ use super::calls::NewGuard;
 use super::packages::{Packages, settings};
 use super::plan::Plan;
 use super::station::Layer;
+use super::ticking::{self, Ticking};
 use super::world::{NewLayers, World};
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -32,10 +33,11 @@ pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
 /// Routers as this version has them.
 fn routers(plan: &Rc<Plan>) -> NewLayers<'static> {
     let plan = plan.clone();
-    Box::new(move |node, life, now| {
+    Box::new(move |node, life, now, page| {
         // Never the same again, and in no order.
         let incarnation = (plan.seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let packages = Packages::new(&settings(&plan, node, incarnation), now.monotonic_ns);
-        vec![Box::new(packages) as Box<dyn Layer>]
+        let ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
+        vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]
     })
 }

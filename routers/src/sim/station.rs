@@ -26,6 +26,8 @@ pub struct Io<'a> {
     pub node: usize,
     /// Nodes in all.
     pub nodes: usize,
+    /// From then on all nodes have one time, true ns.
+    pub timed_ns: u64,
     /// Counts the router's lives, over all nodes.
     pub life: u32,
     /// Its computer.
@@ -105,6 +107,8 @@ pub struct Station {
     pub host: Host,
     /// Its router, while it lives.
     pub router: Option<Router>,
+    /// How much its clocks run faster than planned now, ns a second.
+    pub drift_ppb: i64,
     /// How many faults keep its router dead.
     pub down: u32,
     /// How many faults keep its router from running.
@@ -124,6 +128,7 @@ impl Station {
             clock,
             host: Host::default(),
             router: None,
+            drift_ppb: 0,
             down: 0,
             frozen: 0,
             asleep: 0,

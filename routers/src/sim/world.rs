@@ -7,16 +7,17 @@ use super::chance::Chance;
 use super::clock::{Clock, Now};
 use super::faults::damage;
 use super::link::Link;
-use super::plan::{MS, Plan, US};
+use super::plan::{MS, Plan, S, US};
 use super::station::{Arrived, Io, Layer, Port, Router, Sent, Station};
+use super::times::Times;
 use super::trace::Trace;
-use rohrpost_mailbox::{Name, local};
+use rohrpost_mailbox::{Name, TimeRecord, local};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
 
-/// Makes the layers of a router that begins to live: node, life, its clocks.
-pub type NewLayers<'a> = Box<dyn FnMut(usize, u32, Now) -> Vec<Box<dyn Layer>> + 'a>;
+/// Makes the layers of a router that begins to live: node, life, its clocks, what its page of system time says.
+pub type NewLayers<'a> = Box<dyn FnMut(usize, u32, Now, Option<TimeRecord>) -> Vec<Box<dyn Layer>> + 'a>;
 
 /// What happens.
 pub(super) enum Event {
@@ -119,6 +120,8 @@ impl<'a> World<'a> {
             }
             stations.push(station);
         }
+        let mut book = Book::new(plan.shape.bulk_below);
+        book.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
         let mut world = Self {
             now_ns: 0,
             events: BinaryHeap::new(),
@@ -127,7 +130,7 @@ impl<'a> World<'a> {
             links: vec![vec![Link::new(plan.quality); count]; count],
             servers,
             sequences: vec![1; count],
-            book: Book::new(plan.shape.bulk_below),
+            book,
             calls: Calls::default(),
             trace: Trace::new(trace),
             new_layers: layers,
@@ -219,6 +222,7 @@ impl<'a> World<'a> {
         let Some(router) = station.router.as_mut().filter(|router| router.life == life) else { return };
         let mut io = Io {
             nodes: self.plan.nodes.len(),
+            timed_ns: self.plan.timed_ns,
             now,
             node,
             life,
@@ -347,7 +351,7 @@ impl<'a> World<'a> {
         self.lives += 1;
         let life = self.lives;
         let now = self.now(node);
-        let layers = (self.new_layers)(node, life, now);
+        let layers = (self.new_layers)(node, life, now, self.book.times.page(node));
         self.stations[node].router = Some(Router { life, layers, sent: Default::default() });
         self.trace.line(self.now_ns, || format!("{node}/{life} the router starts"));
         if self.stations[node].runs() {
@@ -369,13 +373,23 @@ impl<'a> World<'a> {
 
     fn look(&mut self) {
         for node in 0..self.stations.len() {
-            let its = &self.plan.nodes[node];
-            let (rate_ppb, wander_ppb) = (its.rate_ppb, its.wander_ppb);
-            let drift_ppb = self.chance.around(wander_ppb);
-            self.stations[node].clock.set_rate(self.now_ns, rate_ppb + drift_ppb);
+            self.wander(node);
+            let now = self.now(node);
+            self.book.times.read(now, node, &mut self.book.problems);
             let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
             let well = self.now_ns >= self.plan.mended_ns + super::plan::RECOVERY_NS;
             self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.check(io, well)));
         }
+    }
+
+    /// A clock's rate changes a little.
+    fn wander(&mut self, node: usize) {
+        let its = &self.plan.nodes[node];
+        let step_ppb = its.wander_ppb * LOOK_NS as i64 / S as i64;
+        let station = &mut self.stations[node];
+        let drift_ppb = station.drift_ppb + self.chance.around(step_ppb.max(1));
+        station.drift_ppb = drift_ppb.clamp(-10 * its.wander_ppb, 10 * its.wander_ppb);
+        station.clock.set_rate(self.now_ns, its.rate_ppb + station.drift_ppb);
+        self.book.times.clocks[node] = station.clock.clone();
     }
 }

@@ -1,5 +1,6 @@
 //! A node's part in keeping time: what the thread with the socket hands it and asks of it.
 
+use super::broken::Broken;
 use super::election::{Election, Followed, Heard, State};
 use super::history::{Estimate, History, Sample};
 use super::line::{EVEN_PPB, Line};
@@ -167,7 +168,6 @@ struct Left {
 struct Asked {
     exchange: Exchange,
     sequence: u64,
-    doubt_ns: u32,
 }
 
 /// What is about to be sent; its stamps are taken when it is.
@@ -207,6 +207,8 @@ pub struct Clock {
     last: Option<Exchange>,
     offset_ns: i64,
     contradictions: u64,
+    #[cfg(any(test, feature = "broken-variants"))]
+    pub(super) broken: Option<Broken>,
 }
 
 impl Clock {
@@ -247,6 +249,8 @@ impl Clock {
             last: None,
             offset_ns: 0,
             contradictions: 0,
+            #[cfg(any(test, feature = "broken-variants"))]
+            broken: None,
             settings,
         }
     }
@@ -388,6 +392,9 @@ impl Clock {
     fn sync(&mut self, now_ns: u64, received: Stamp, head: &FrameHead, sync: &Sync) -> Result<(), Ignored> {
         let was_master = matches!(self.election.state(), State::Master(_));
         let followed = self.is_followed(now_ns);
+        if was_master && self.is(Broken::Stubborn) {
+            return Err(Ignored::Late);
+        }
         match self.election.sync(head.from, head.incarnation, sync, received.ns, followed) {
             Heard::Ignored => {
                 self.keep_term();
@@ -451,16 +458,17 @@ impl Clock {
         if (head.from, head.incarnation, reply.began) != (master.node, master.incarnation, master.began) {
             return Err(Ignored::Unasked);
         }
+        let any = self.is(Broken::AnyReply);
         let mut asked = self.asked.iter_mut();
-        let asked = asked.find(|asked| asked.exchange.id == reply.id && asked.exchange.request_sent_ns != 0);
-        let Asked { mut exchange, doubt_ns, .. } = asked.map(std::mem::take).ok_or(Ignored::Unasked)?;
+        let asked = asked.find(|asked| (asked.exchange.id == reply.id || any) && asked.exchange.request_sent_ns != 0);
+        let mut exchange = asked.map(std::mem::take).ok_or(Ignored::Unasked)?.exchange;
         exchange.sync_left_ns = reply.sync_ns;
         exchange.request_came_ns = reply.request_ns;
         (exchange.reply_sent_ns, exchange.reply_came) = (reply.sent_ns, received);
         let master_by_kernel = reply.sync_by_kernel && reply.request_by_kernel;
         exchange.by_kernel = master_by_kernel && exchange.sync_came.by_kernel && exchange.request_left.by_kernel;
-        self.election.reply(reply.epoch, reply.error_ns);
-        let doubt_ns = doubt_ns.max(exchange.sync_came.doubt_ns).max(exchange.request_left.doubt_ns);
+        self.election.reply(reply.epoch, reply.error_ns, received.ns);
+        let doubt_ns = exchange.sync_came.doubt_ns.max(exchange.request_left.doubt_ns);
         let sample =
             sample(&exchange, u64::from(doubt_ns) + u64::from(reply.doubt_ns)).ok_or(Ignored::NegativeDelay)?;
         self.last = Some(exchange);
@@ -486,20 +494,28 @@ impl Clock {
         let target_ns = now_ns.saturating_add_signed(estimate.offset_ns);
         let epoch = self.line.record().epoch;
         let by_ns = target_ns.wrapping_sub(self.line.at(now_ns).ns).cast_signed();
-        if master.epoch > epoch {
-            let error_ns = bound_ns(&estimate, estimate.offset_ns, &master);
+        if master.epoch > epoch || self.is(Broken::Steps) {
+            let error_ns = self.bound_ns(&estimate, estimate.offset_ns, &master);
             self.line.step(now_ns, master.epoch, target_ns, pace_ppb, error_ns, drift_ns_s);
         } else if master.epoch < epoch || !self.line.is_synchronised() || by_ns.unsigned_abs() > STEP_MIN_NS {
             self.far = true;
             return;
         } else {
             let page_ns = self.line.at(now_ns).ns.wrapping_sub(now_ns).cast_signed();
-            let error_ns = bound_ns(&estimate, page_ns, &master).max(bound_ns(&estimate, estimate.offset_ns, &master));
+            let target_error_ns = self.bound_ns(&estimate, estimate.offset_ns, &master);
+            let error_ns = self.bound_ns(&estimate, page_ns, &master).max(target_error_ns);
             let within_ns = self.exchange_ns.saturating_mul(4).max(SERVO_NS_MIN);
             self.line.bend(now_ns, by_ns, within_ns, pace_ppb, error_ns, drift_ns_s);
         }
         (self.term, self.far, self.offset_ns) = (master.term, false, by_ns);
         self.stated = (now_ns.saturating_add(self.horizon_ns()), self.horizon_ns());
+    }
+
+    /// How far a line may be off that is `offset_ns` from the local clock now.
+    fn bound_ns(&self, estimate: &Estimate, offset_ns: i64, master: &Followed) -> u64 {
+        let off_ns = (estimate.high_ns - offset_ns).max(offset_ns - estimate.low_ns).unsigned_abs();
+        let off_ns = if self.is(Broken::HalfBound) { off_ns / 2 } else { off_ns };
+        off_ns.saturating_add(if self.is(Broken::NoMasterError) { 0 } else { master.error_ns })
     }
 
     /// How fast a bound may grow until the horizon, ns a second.
@@ -516,7 +532,9 @@ impl Clock {
     /// Without a master for longer than was thought of, the rate may have changed more: the bound grows faster.
     fn keep_bound(&mut self, now_ns: u64) {
         let (until_ns, span_ns) = self.stated;
-        if until_ns <= now_ns && self.is_held_over() {
+        if self.is(Broken::NoDrift) {
+            self.line.restate(self.line.record().error_ns, 0);
+        } else if until_ns <= now_ns && self.is_held_over() {
             let record = self.line.record();
             let drift_ns_s = record.drift_ns_s + wander_ns_s(span_ns);
             self.line.restate(record.error_ns, drift_ns_s.min(2 * RATE_MAX_PPB.unsigned_abs()));
@@ -567,7 +585,9 @@ impl Clock {
 
     /// What was measured of another timeline does not count any more.
     fn forget(&mut self) {
-        self.history.clear();
+        if !self.is(Broken::OldSamples) {
+            self.history.clear();
+        }
         self.asked = [Asked::default(); PENDING];
         self.asked_ns = 0;
         self.far = false;
@@ -730,12 +750,6 @@ fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<Sample> {
         low_ns: low_ns.saturating_sub(doubt_ns),
         high_ns: high_ns.saturating_add(doubt_ns),
     })
-}
-
-/// How far a line may be off that is `offset_ns` from the local clock now.
-fn bound_ns(estimate: &Estimate, offset_ns: i64, master: &Followed) -> u64 {
-    let off = (estimate.high_ns - offset_ns).max(offset_ns - estimate.low_ns);
-    off.unsigned_abs().saturating_add(master.error_ns)
 }
 
 fn wander_ns_s(span_ns: u64) -> u64 {

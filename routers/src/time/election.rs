@@ -4,6 +4,9 @@ use super::message::{Request, Sync};
 use super::{TAKEOVER_HALF_INTERVALS, Term};
 use crate::frame::NodeIndex;
 
+/// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
+const DEAF_NS_MIN: u64 = 200_000_000;
+
 /// A master that is heard.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Followed {
@@ -14,6 +17,8 @@ pub(super) struct Followed {
     pub(super) epoch: u64,
     pub(super) error_ns: u64,
     pub(super) heard_ns: u64,
+    /// When it last answered this node, or said that it is followed; at first when it was found.
+    answered_ns: u64,
     followed: bool,
     id: u64,
 }
@@ -114,6 +119,7 @@ impl Election {
             epoch,
             error_ns,
             heard_ns: received_ns,
+            answered_ns: received_ns,
             followed: sync.followed,
             id,
         };
@@ -139,16 +145,20 @@ impl Election {
             State::Slave(master) if theirs.claim() > master.claim() => Heard::Turned,
             State::Slave(_) => Heard::Ignored,
         };
-        if heard != Heard::Ignored {
-            self.state = State::Slave(theirs);
+        match (heard, self.state) {
+            (Heard::Ignored, _) => {}
+            (Heard::Followed, State::Slave(before)) if !sync.followed => {
+                self.state = State::Slave(Followed { answered_ns: before.answered_ns, ..theirs });
+            }
+            _ => self.state = State::Slave(theirs),
         }
         heard
     }
 
     /// The master's answer says more lately what its Sync said.
-    pub(super) fn reply(&mut self, epoch: u64, error_ns: u64) {
+    pub(super) fn reply(&mut self, epoch: u64, error_ns: u64, received_ns: u64) {
         if let State::Slave(master) = &mut self.state {
-            (master.epoch, master.error_ns) = (master.epoch.max(epoch), error_ns);
+            (master.epoch, master.error_ns, master.answered_ns) = (master.epoch.max(epoch), error_ns, received_ns);
         }
     }
 
@@ -200,25 +210,31 @@ impl Election {
 
     /// When something changes without a datagram.
     pub(super) fn deadline_ns(&self, now_ns: u64, timed: bool) -> Option<u64> {
+        let takeover_ns = self.takeover_ns(now_ns, timed);
         match self.state {
-            State::Slave(master) => Some(master.heard_ns.saturating_add(self.silence_ns())),
-            State::Listening => self.takeover_ns(now_ns, timed),
-            State::Master(_) => None,
+            State::Slave(master) => {
+                let silent_ns = master.heard_ns.saturating_add(self.silence_ns());
+                Some(takeover_ns.map_or(silent_ns, |takeover_ns| takeover_ns.min(silent_ns)))
+            }
+            State::Listening | State::Master(_) => takeover_ns,
         }
     }
 
+    /// When it is this node's turn. A master that is heard, but answers nobody, hears nobody: it has to be replaced as well.
     fn takeover_ns(&self, now_ns: u64, timed: bool) -> Option<u64> {
-        if self.state != State::Listening {
-            return None;
-        }
         let rank = self.rank()?;
-        let before = self.masters[..usize::from(rank)].iter().filter(|master| Some(**master) != self.lost).count();
+        let (since_ns, patience_ns, last) = match self.state {
+            State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
+            State::Slave(master) => (master.answered_ns, self.silence_ns().max(DEAF_NS_MIN), Some(master.node)),
+            State::Master(_) => return None,
+        };
+        let before = self.masters[..usize::from(rank)].iter().filter(|master| Some(**master) != last).count();
         // Who has no time leaves it to who has, as long as there is one.
         let recently_ns = self.interval_ns.saturating_mul(4);
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = before + if others_timed && !timed { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
-        Some(self.quiet_since_ns.saturating_add(self.silence_ns()).saturating_add(staggered_ns))
+        Some(since_ns.saturating_add(patience_ns).saturating_add(staggered_ns))
     }
 }
 

@@ -22,6 +22,8 @@
 //! time waits longer still, when it has heard of one that has time. So a router that starts listens first; if there is a master, it is
 //! its slave, and it stays so until that one fails: each change of master makes the bound a little larger, and none is made without need.
 //!
+//! A master that is heard but answers nobody hears nobody; it is replaced as if it were silent.
+//!
 //! Of two masters that hear each other, the one that nobody follows yields; if both or neither are followed, that of the lower term.
 //! Terms are never shared, since a term has its master's rank in it. Who yields is a slave with the next [`Sync`](message::Sync), so
 //! after a split is mended there is one master after at most two intervals. The nodes of the other part slew if they are off by
@@ -29,12 +31,17 @@
 //!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
+mod broken;
 mod clock;
 mod election;
 mod history;
 mod line;
 pub mod message;
+#[cfg(test)]
+mod tests;
 
+#[cfg(any(test, feature = "broken-variants"))]
+pub use broken::Broken;
 pub use clock::{Clock, Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
 pub use line::UNSYNCHRONISED_NS;
 

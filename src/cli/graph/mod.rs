@@ -313,6 +313,7 @@ fn common(number: u16) -> String {
         c::DESCRIBE => "describe",
         c::PARAMETERS => "param get",
         c::SET_PARAMETERS => "param set",
+        c::TIME => "time",
         other => return format!("number {other}"),
     };
     name.into()

@@ -1,0 +1,215 @@
+//! One peer as it is heard: which life, which datagrams, and what becomes of the packages in them.
+
+use super::order::Order;
+use super::refusing::Refusing;
+use super::window::{Arrival, Window};
+use crate::broken::broken;
+use crate::fragment::{Change, Reassembly};
+use crate::frame::{Alive, FrameHead, NodeIndex, Reason};
+use crate::link::{REFUSED_FOR_NS, SILENT_AFTER_NS, State};
+use crate::report::{Deliver, Event, Mismatch, NotDelivered};
+use crate::stats::{Cause, PeerStats, Stats};
+use rohrpost_mailbox::Head;
+
+/// Lives of a peer that are known to be over.
+const OLD_KEPT: usize = 8;
+/// Datagrams of an old life are on their way for so long at most; after that, its router still runs.
+const OLD_GONE_NS: u64 = 2_000_000_000;
+
+/// What is known of a peer.
+#[derive(Debug, Default)]
+pub(super) struct Peer {
+    /// The life that is heard; 0: none yet.
+    incarnation: u64,
+    began_ns: u64,
+    /// Lives that are over; 0: none.
+    old: [u64; OLD_KEPT],
+    old_next: usize,
+    pub(super) window: Window,
+    pub(super) order: Order,
+    pub(super) reassembly: Reassembly,
+    pub(super) refusing: Refusing,
+    told: Told,
+}
+
+/// What was said of a peer and is not over.
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    heard: bool,
+    silent: bool,
+    unheard: bool,
+    twice: bool,
+    /// It refuses us; and until when that holds.
+    refuses: Option<(Mismatch, u64)>,
+}
+
+impl Peer {
+    /// Whether a datagram is of the life that is heard. A life that was not known begins; of one that is over nothing is taken, unless
+    /// the one that was taken for its successor is silent: then it was the other way round.
+    pub(super) fn lives(&mut self, now_ns: u64, head: &FrameHead, way: &Way<'_>, deliver: &mut impl Deliver) -> bool {
+        if head.incarnation == self.incarnation {
+            return true;
+        }
+        let was = self.old.iter().position(|old| *old == head.incarnation);
+        let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
+        if was.is_some() && !is_silent && !broken!(TakesOldLives) {
+            if now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
+                self.told.twice = true;
+                deliver.event(Event::Twice { peer: way.from });
+            }
+            return false;
+        }
+        let is_first = self.incarnation == 0;
+        if !is_first {
+            self.end_life(way, deliver);
+            let place = was.unwrap_or(self.old_next % OLD_KEPT);
+            self.old_next += usize::from(was.is_none());
+            self.old[place] = self.incarnation;
+            self.told = Told { heard: true, twice: self.told.twice, ..Told::default() };
+            deliver.event(Event::Restarted { peer: way.from });
+        }
+        self.window = match was {
+            // What it sent before may have been delivered.
+            Some(_) => Window::going_on(head.sequence),
+            None if is_first => Window::joining(head.sequence),
+            None => Window::default(),
+        };
+        (self.incarnation, self.began_ns) = (head.incarnation, now_ns);
+        way.peer.link.incarnation.set(head.incarnation);
+        way.peer.link.since_ns.set(now_ns);
+        way.peer.link.accept();
+        true
+    }
+
+    fn end_life(&mut self, way: &Way<'_>, deliver: &mut impl Deliver) {
+        way.peer.received.lost.add(self.window.close());
+        way.peer.received.restarts.add(1);
+        self.reassembly.clear(|head, body, change| way.partial(head, body, change, deliver));
+        self.order.clear();
+    }
+
+    /// Notes that it is there, and takes something from us or not.
+    pub(super) fn is_heard(&mut self, now_ns: u64, way: &Way<'_>, deliver: &mut impl Deliver) {
+        let link = &way.peer.link;
+        if !self.told.heard {
+            self.told = Told { heard: true, silent: false, ..self.told };
+            link.since_ns.set(now_ns);
+            deliver.event(Event::Heard { peer: way.from });
+        }
+        link.heard_ns.set(now_ns);
+        match self.told.refuses {
+            // That it does not know our address says nothing of what it sends.
+            Some((Mismatch { reason: Reason::Stranger, .. }, until_ns)) if now_ns < until_ns => {}
+            _ => {
+                self.told.refuses = None;
+                link.accept();
+            }
+        }
+    }
+
+    /// Notes that it takes nothing from us; whether that is to be told.
+    pub(super) fn is_refused_anew(&mut self, now_ns: u64, mismatch: Mismatch) -> bool {
+        let before = self.told.refuses.replace((mismatch, now_ns + REFUSED_FOR_NS));
+        before.is_none_or(|(before, _)| before != mismatch)
+    }
+
+    /// Counts a datagram by its sequence; whether it is to be read.
+    pub(super) fn is_new(&mut self, sequence: u64, way: &Way<'_>) -> bool {
+        let received = &way.peer.received;
+        let mut lost = 0;
+        let arrival = self.window.arrive(sequence, &mut lost);
+        if lost > 0 {
+            received.lost.add(lost);
+        }
+        way.peer.link.next.set(self.window.next());
+        match arrival {
+            Arrival::Newest => return true,
+            Arrival::Overtaken => received.overtaken.add(1),
+            Arrival::Returned => {
+                received.overtaken.add(1);
+                received.returned.add(1);
+            }
+            Arrival::Copy => received.copies.add(1),
+        }
+        arrival != Arrival::Copy
+    }
+
+    /// Begins to wait for it anew: nobody could have been heard.
+    pub(super) fn excuse(&self, now_ns: u64, way: &Way<'_>) {
+        if self.told.heard {
+            way.peer.link.heard_ns.set(now_ns);
+            way.peer.link.since_ns.set(now_ns);
+        }
+    }
+
+    /// Notices silence, and that nothing of ours reaches it.
+    pub(super) fn look_after(&mut self, now_ns: u64, way: &Way<'_>, deliver: &mut impl Deliver) {
+        let peer = way.from;
+        let state = way.stats.state(peer, now_ns);
+        if state == State::Silent && !self.told.silent {
+            self.told = Told { silent: true, heard: false, ..self.told };
+            deliver.event(Event::Silent { peer });
+        }
+        let is_unheard = state == State::Unheard;
+        if is_unheard && !self.told.unheard {
+            deliver.event(Event::Unheard { peer });
+        }
+        self.told.unheard = is_unheard;
+    }
+}
+
+/// Who something came from, and where it is counted.
+#[derive(Clone, Copy)]
+pub(super) struct Way<'a> {
+    pub(super) from: NodeIndex,
+    pub(super) stats: &'a Stats,
+    pub(super) peer: &'a PeerStats,
+}
+
+impl Way<'_> {
+    /// Delivers a package that is there as a whole, or says why not.
+    pub(super) fn pass(
+        &self,
+        is_old: bool,
+        order: &mut Order,
+        position: u64,
+        head: &Head,
+        body: &[u8],
+        deliver: &mut impl Deliver,
+    ) {
+        self.peer.received.packages.add(1);
+        if is_old {
+            return self.lose(head, body, Cause::Stale, deliver);
+        }
+        if !order.admit(head, position) {
+            return self.lose(head, body, Cause::Late, deliver);
+        }
+        match deliver.deliver(self.from, head, body) {
+            Ok(()) => self.stats.inn.passed(head.priority, head.len),
+            Err(NotDelivered::NoMailbox) => self.lose(head, body, Cause::NoMailbox, deliver),
+            Err(NotDelivered::MailboxFull) => self.lose(head, body, Cause::MailboxFull, deliver),
+            Err(NotDelivered::TooLarge) => self.lose(head, body, Cause::TooLarge, deliver),
+        }
+    }
+
+    /// Counts a package whose parts come.
+    pub(super) fn partial(&self, head: &Head, body: &[u8], change: Change, deliver: &mut impl Deliver) {
+        match change {
+            Change::Began => self.stats.inn.came(head.priority),
+            Change::GivenUp => self.lose(head, body, Cause::Incomplete, deliver),
+        }
+    }
+
+    /// Hears what the peer says of us.
+    pub(super) fn hears_of_us(&self, now_ns: u64, own: u64, alive: &Alive) {
+        if alive.heard_incarnation == own {
+            self.peer.link.hears_us_ns.set(now_ns);
+            self.peer.link.missed_by_it.set(alive.heard_lost);
+        }
+    }
+
+    fn lose(&self, head: &Head, body: &[u8], cause: Cause, deliver: &mut impl Deliver) {
+        self.stats.inn.lost(head.priority, cause);
+        deliver.lost(Some(self.from), head, body, cause);
+    }
+}

@@ -1,0 +1,99 @@
+//! Whose datagrams are not taken, and how they learn of it: at most once a second each.
+
+use super::{Inbound, REFUSE_EVERY_NS};
+use crate::broken::broken;
+use crate::frame::{self, FrameHead, Kind, NodeIndex, Reason, Refusal};
+use crate::report::{Deliver, Event, Mismatch};
+use crate::settings::Settings;
+use std::net::IpAddr;
+
+/// After so long without another, a refusal is over; the next is told anew.
+const OVER_NS: u64 = 5_000_000_000;
+
+/// Refusals to one address.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Refusing {
+    /// To whom and why, if it is still to be said.
+    due: Option<(IpAddr, Reason)>,
+    /// Not before this time again, ns.
+    not_before_ns: u64,
+    told: Option<(IpAddr, Mismatch)>,
+    last_ns: u64,
+}
+
+impl Inbound {
+    pub(super) fn peer_at(&self, source: IpAddr) -> Option<NodeIndex> {
+        self.settings.node_at(source).filter(|node| *node != self.settings.own)
+    }
+
+    pub(super) fn mismatch(&self, source: IpAddr, head: &FrameHead) -> Option<Mismatch> {
+        let ours = &self.settings;
+        let differs = |reason| Mismatch { reason, version: frame::VERSION, digest: Some(head.digest) };
+        if head.digest != ours.digest && !broken!(TakesOtherDigests) {
+            return Some(differs(Reason::Digest));
+        }
+        let is_there = ours.nodes.get(usize::from(head.from)).is_some_and(|node| node.address == source);
+        let is_known = is_there && head.from != ours.own && head.to == ours.own && head.system == ours.system;
+        (!is_known).then(|| differs(Reason::Stranger))
+    }
+
+    pub(super) fn refuse(&mut self, now_ns: u64, source: IpAddr, mismatch: Mismatch, deliver: &mut impl Deliver) {
+        let peer = self.peer_at(source);
+        let refusing = match peer {
+            Some(peer) => {
+                let stats = self.stats.peer(peer);
+                stats.received.refused.add(1);
+                stats.link.refuse(now_ns, mismatch);
+                &mut self.peers[usize::from(peer)].refusing
+            }
+            None => {
+                self.stats.foreign.add(1);
+                &mut self.strangers
+            }
+        };
+        if refusing.due.is_none() {
+            refusing.due = Some((source, mismatch.reason));
+            self.must_refuse = true;
+        }
+        let is_over = refusing.last_ns + OVER_NS < now_ns;
+        refusing.last_ns = now_ns;
+        if is_over || refusing.told != Some((source, mismatch)) {
+            refusing.told = Some((source, mismatch));
+            deliver.event(Event::Refused { source, peer, mismatch });
+        }
+    }
+
+    pub(super) fn refused_by(&mut self, now_ns: u64, source: IpAddr, refusal: &Refusal, deliver: &mut impl Deliver) {
+        let Some(peer) = self.peer_at(source) else { return self.stats.foreign.add(1) };
+        let mismatch = Mismatch { reason: refusal.reason, version: refusal.version, digest: Some(refusal.digest) };
+        self.stats.peer(peer).link.refuse(now_ns, mismatch);
+        if self.peers[usize::from(peer)].is_refused_anew(now_ns, mismatch) {
+            deliver.event(Event::Refuses { peer, mismatch });
+        }
+    }
+
+    pub(super) fn due(&mut self, now_ns: u64) -> Option<(IpAddr, Reason)> {
+        let all = self.peers.iter_mut().map(|peer| &mut peer.refusing).chain([&mut self.strangers]);
+        let mut waiting = false;
+        for refusing in all {
+            if refusing.due.is_some() && refusing.not_before_ns <= now_ns {
+                refusing.not_before_ns = now_ns + REFUSE_EVERY_NS;
+                return refusing.due.take();
+            }
+            waiting |= refusing.due.is_some();
+        }
+        self.must_refuse = waiting;
+        None
+    }
+
+    pub(super) fn refusal(&self, to: IpAddr, reason: Reason, datagram: &mut [u8]) -> usize {
+        let Settings { system, own, digest, incarnation, .. } = self.settings;
+        let peer = self.peer_at(to).unwrap_or(NodeIndex::MAX);
+        let head = FrameHead { kind: Kind::Refusal, system, from: own, to: peer, digest, incarnation, sequence: 0 };
+        let said = Refusal { version: frame::VERSION, reason, digest }.to_bytes();
+        let end = frame::HEAD_BYTES + said.len();
+        datagram[..frame::HEAD_BYTES].copy_from_slice(&head.to_bytes(&[&said]));
+        datagram[frame::HEAD_BYTES..end].copy_from_slice(&said);
+        end
+    }
+}

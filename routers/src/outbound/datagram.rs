@@ -1,0 +1,130 @@
+//! How a datagram is made: of one package where it lies, of many that wait, of a part of one, or of nothing but "still there".
+
+use super::{DIRECT_HEAD_BYTES, Outbound, Output, Peer, is_stale};
+use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
+use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
+use crate::queue::Place;
+use crate::report::Report;
+use crate::settings::Settings;
+use crate::stats::Cause;
+use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
+
+impl Outbound {
+    pub(super) fn direct(&mut self, now_ns: u64, peer: NodeIndex, head: &Head, body: &[u8]) -> [u8; DIRECT_HEAD_BYTES] {
+        let package_head = head.to_bytes();
+        let frame = self.head(Kind::Packages, peer).to_bytes(&[&package_head, body]);
+        let mut bytes = [0; DIRECT_HEAD_BYTES];
+        bytes[..frame::HEAD_BYTES].copy_from_slice(&frame);
+        bytes[frame::HEAD_BYTES..].copy_from_slice(&package_head);
+        self.passed(peer, head);
+        self.left(now_ns, peer, DIRECT_HEAD_BYTES + body.len());
+        bytes
+    }
+
+    /// As many whole packages for a peer as fit, level by level. The first one fits.
+    pub(super) fn pack(
+        &mut self,
+        now_ns: u64,
+        peer: NodeIndex,
+        from: u8,
+        datagram: &mut [u8],
+        report: &mut impl Report,
+    ) -> Output {
+        let mut end = frame::HEAD_BYTES;
+        let mut level = from;
+        while let Some(next) = self.queue.next_level(peer, level) {
+            level = next;
+            let Some(place) = self.queue.first_of(peer, level) else { break };
+            let waiting = *self.queue.at(place);
+            let size = PACKAGE_HEAD_BYTES + usize::from(waiting.head.len);
+            if waiting.parts > 0 || end + size > datagram.len() {
+                // Its turn comes; behind it nothing of its level may go, but perhaps something of a lower one fits.
+                level += 1;
+                continue;
+            }
+            if is_stale(now_ns, waiting.published_ns) {
+                self.drop_out(place, Cause::Stale, report);
+                continue;
+            }
+            let (head, body) = datagram[end..end + size].split_at_mut(PACKAGE_HEAD_BYTES);
+            head.copy_from_slice(&waiting.head.to_bytes());
+            self.queue.read(place, body);
+            end += size;
+            self.queue.remove(place);
+            self.left_queue(waiting.level);
+            self.passed(peer, &waiting.head);
+        }
+        self.finish(now_ns, Kind::Packages, peer, &mut datagram[..end])
+    }
+
+    /// The next part of a package that does not fit in a datagram.
+    pub(super) fn part(&mut self, now_ns: u64, place: Place, datagram: &mut [u8]) -> Output {
+        let waiting = *self.queue.at(place);
+        let peer = waiting.peer;
+        let start = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
+        let (len, part_bytes) = (usize::from(waiting.head.len), datagram.len() - start);
+        let first = if waiting.parts == 0 { self.stats.peer(peer).sent.datagrams.get() } else { waiting.first };
+        let offset = usize::from(waiting.parts) * part_bytes;
+        let size = part_bytes.min(len - offset);
+        let (index, count, offset) = (waiting.parts, len.div_ceil(part_bytes) as u16, offset as u32);
+        let part = Fragment { first, index, count, offset, head: waiting.head, bytes: &[] };
+        datagram[frame::HEAD_BYTES..start].copy_from_slice(&part.head_bytes());
+        self.queue.read(place, &mut datagram[start..start + size]);
+        self.queue.part_left(place, first);
+        self.stats.peer(peer).sent.fragments.add(1);
+        if index + 1 == count {
+            self.queue.remove(place);
+            self.left_queue(waiting.level);
+            self.passed(peer, &waiting.head);
+        }
+        self.finish(now_ns, Kind::Fragment, peer, &mut datagram[..start + size])
+    }
+
+    pub(super) fn alive(&mut self, now_ns: u64, peer: NodeIndex, datagram: &mut [u8]) -> Output {
+        let stats = self.stats.peer(peer);
+        let told = stats.link.told(stats.received.missing()).to_bytes();
+        let end = frame::HEAD_BYTES + told.len();
+        datagram[frame::HEAD_BYTES..end].copy_from_slice(&told);
+        self.peers[usize::from(peer)].tell_ns = now_ns + TELL_EVERY_NS;
+        self.finish(now_ns, Kind::Alive, peer, &mut datagram[..end])
+    }
+
+    /// Writes the head before what lies in the datagram already.
+    fn finish(&mut self, now_ns: u64, kind: Kind, to: NodeIndex, datagram: &mut [u8]) -> Output {
+        let (head, rest) = datagram.split_at_mut(frame::HEAD_BYTES);
+        head.copy_from_slice(&self.head(kind, to).to_bytes(&[rest]));
+        self.left(now_ns, to, datagram.len());
+        Output::Send { to, bytes: datagram.len() }
+    }
+
+    fn head(&self, kind: Kind, to: NodeIndex) -> FrameHead {
+        let Settings { system, own, digest, incarnation, .. } = self.settings;
+        let sequence = self.stats.peer(to).sent.datagrams.get();
+        FrameHead { kind, system, from: own, to, digest, incarnation, sequence }
+    }
+
+    fn left(&mut self, now_ns: u64, to: NodeIndex, bytes: usize) {
+        let sent = &self.stats.peer(to).sent;
+        sent.datagrams.add(1);
+        sent.bytes.add(bytes as u64);
+        self.peers[usize::from(to)].quiet_until_ns = now_ns + ALIVE_EVERY_NS;
+        self.pace.left(now_ns, bytes);
+    }
+
+    /// A peer that is to be told that we are still there. If none is, notes when one will be.
+    pub(super) fn due(&mut self, now_ns: u64) -> Option<NodeIndex> {
+        let when = |peer: &Peer| peer.quiet_until_ns.min(peer.tell_ns);
+        let peers = self.settings.peers().map(|node| (when(&self.peers[usize::from(node)]), node));
+        match peers.min() {
+            Some((at_ns, node)) if at_ns <= now_ns => Some(node),
+            Some((at_ns, _)) => {
+                self.alive_ns = at_ns;
+                None
+            }
+            None => {
+                self.alive_ns = u64::MAX;
+                None
+            }
+        }
+    }
+}

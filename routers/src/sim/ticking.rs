@@ -1,0 +1,136 @@
+//! The layer that keeps time: `Clock`, called as the thread of the shell calls it, and watched.
+
+use super::book::Promise;
+use super::clock::Now;
+use super::plan::{Plan, SYSTEM};
+use super::station::{Arrived, Io, Layer, Port, Sent};
+use crate::frame::FrameHead;
+use crate::time::{Clock, Role, SentId, Stamp, Step, TIME_BYTES, TimeSettings};
+use rohrpost_mailbox::TimeRecord;
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::time::Duration;
+
+/// The socket of time.
+pub const PORT: Port = 1;
+/// How far off a kernel's stamp is at most, ns; the kernel stamps CLOCK_REALTIME, and the other clock is read around it.
+const DOUBT_NS: u32 = 100;
+/// Stamps that are waited for at a time.
+const AWAITED_MAX: usize = 16;
+
+/// What one life of a router's time is configured with.
+pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> TimeSettings {
+    TimeSettings {
+        system: SYSTEM,
+        own: node as u8,
+        nodes: plan.nodes.len() as u8,
+        masters: plan.masters.clone(),
+        interval: Duration::from_nanos(plan.shape.interval_ns),
+        digest: super::packages::DIGEST,
+        incarnation,
+    }
+}
+
+/// One life of a router's time.
+pub struct Ticking {
+    clock: Clock,
+    has_stamps: bool,
+    /// Which datagrams of this layer are to be stamped, by how many went before.
+    awaited: VecDeque<(u64, SentId)>,
+    sent: u64,
+}
+
+impl Ticking {
+    /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
+    pub fn new(settings: TimeSettings, now: Now, page: Option<TimeRecord>, has_stamps: bool) -> Self {
+        let clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, page);
+        Self { clock, has_stamps, awaited: VecDeque::new(), sent: 0 }
+    }
+
+    /// The core, so that mistakes can be switched on.
+    pub fn clock(&mut self) -> &mut Clock {
+        &mut self.clock
+    }
+
+    fn stamp(&self, io: &mut Io<'_>, at: Now) -> Stamp {
+        if !self.has_stamps {
+            return Stamp::by_us(io.now.monotonic_ns);
+        }
+        let wrong_ns = io.chance.around(DOUBT_NS.into());
+        Stamp { ns: at.monotonic_ns.saturating_add_signed(wrong_ns), doubt_ns: DOUBT_NS, by_kernel: true }
+    }
+
+    fn look(&self, io: &mut Io<'_>) {
+        io.book.times.look(io.now, io.node, &self.clock, &mut io.book.problems);
+    }
+}
+
+impl Layer for Ticking {
+    fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
+        let stamp = self.stamp(io, arrived.stamp);
+        let Ok((head, rest)) = FrameHead::parse(&arrived.bytes) else { return io.book.saw("time: no frame") };
+        let taken = self.clock.handle(io.now.monotonic_ns, stamp, &head, rest);
+        io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));
+        io.book.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
+        self.look(io);
+    }
+
+    fn left(&mut self, io: &mut Io<'_>, index: u64, at: Now) {
+        self.awaited.retain(|(other, _)| *other >= index);
+        let awaited = self.awaited.pop_front_if(|(other, _)| *other == index);
+        // Now and then the kernel has none.
+        if let Some((_, id)) = awaited
+            && self.has_stamps
+            && !io.chance.percent(2)
+        {
+            let stamp = self.stamp(io, at);
+            self.clock.sent(id, stamp);
+            self.look(io);
+        }
+    }
+
+    fn poll(&mut self, io: &mut Io<'_>) -> u64 {
+        let mut datagram = [0; TIME_BYTES];
+        loop {
+            let step = self.clock.poll(io.now.monotonic_ns, &mut datagram);
+            self.look(io);
+            match step {
+                Step::Send { to, stamp } => {
+                    if let Some(id) = stamp {
+                        self.awaited.push_back((self.sent, id));
+                        if self.awaited.len() > AWAITED_MAX {
+                            self.awaited.pop_front();
+                        }
+                    }
+                    self.sent += 1;
+                    io.sent.push(Sent { port: PORT, to: to.into(), bytes: Rc::from(datagram) });
+                }
+                Step::Wait { until_ns } => return until_ns,
+            }
+        }
+    }
+
+    fn dies(&mut self, _: &mut Io<'_>) {}
+
+    fn check(&mut self, io: &mut Io<'_>, _: bool) {
+        io.book.times.read(io.now, io.node, &mut io.book.problems);
+        if io.now.true_ns < io.timed_ns {
+            return;
+        }
+        let reading = self.clock.reading(io.now.monotonic_ns);
+        let own = (self.clock.master(), self.clock.term());
+        io.line(|| format!("time: {:?} of {own:?}, {reading:?}", self.clock.role()));
+        let agreed = *io.book.master.get_or_insert(own);
+        let role = if own.0.map(usize::from) == Some(io.node) { Role::Master } else { Role::Slave };
+        if agreed != own || self.clock.role() != role || !reading.synchronised || reading.term != own.1 {
+            let text = format!(
+                "node {} is {:?} of {own:?}, others of {agreed:?}; it says {reading:?}",
+                io.node,
+                self.clock.role()
+            );
+            io.book.broken(io.now, Promise::OneMaster, text);
+        }
+    }
+
+    fn close(&mut self, _: &mut Io<'_>) {}
+}

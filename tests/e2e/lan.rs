@@ -1,0 +1,243 @@
+//! Two nodes of one system on this computer, each with its router, at addresses of the loopback: what goes from one to the other, and
+//! what is told when it does not.
+
+use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait};
+use crate::process::Running;
+use nix::sys::signal::Signal;
+use rohrpost::{CallError, Fault};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU16, Ordering};
+use std::time::Duration;
+
+/// Two nodes, `base` with probe.0 and `arm` with probe.1.
+struct Lan {
+    place: Place,
+    config: PathBuf,
+    nodes: Vec<(Running, Robot)>,
+}
+
+/// Addresses that no other test has: of the loopback's 16 million, by process and count.
+fn addresses() -> [String; 2] {
+    static COUNT: AtomicU16 = AtomicU16::new(0);
+    let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+    [1, 2].map(|node| format!("127.{}.{}.{}", 1 + pid / 250 % 250, pid % 250, 10 * (1 + count) + node))
+}
+
+/// A configuration with these nodes' addresses, and further sections.
+fn configured(place: &Place, name: &str, addresses: &[String; 2], further: &str) -> PathBuf {
+    let [base, arm] = addresses;
+    let nodes = format!(
+        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}{further}"
+    );
+    let modules = [probe("probe.0", "", "node = \"base\""), probe("probe.1", "rate-hz = 20.0", "node = \"arm\"")];
+    place.config_of(name, &nodes, &[&modules[0], &modules[1]])
+}
+
+impl Lan {
+    /// Both nodes, and all that is on them.
+    fn launched() -> Self {
+        Self::launched_with("", &[])
+    }
+
+    /// The same, with further sections of the configuration, and things in the environment.
+    fn launched_with(further: &str, environment: &[(&str, &str)]) -> Self {
+        let place = Place::new();
+        let config = configured(&place, "test", &addresses(), further);
+        let mut lan = Self { place, config, nodes: Vec::new() };
+        for node in ["base", "arm"] {
+            let started = lan.start(node, environment);
+            lan.nodes.push(started);
+        }
+        lan
+    }
+
+    fn start(&self, node: &str, environment: &[(&str, &str)]) -> (Running, Robot) {
+        let mut command = self.place.command(&["launch", self.config.to_str().unwrap(), "--node", node]);
+        command.envs(environment.iter().copied());
+        let mut launch = Running::start(command);
+        let robot = self.place.robot(&self.config, node, &mut launch);
+        robot.wait_on(&mut launch);
+        (launch, robot)
+    }
+
+    fn base(&self) -> &Robot {
+        &self.nodes[0].1
+    }
+
+    fn arm(&self) -> &Robot {
+        &self.nodes[1].1
+    }
+
+    /// A command of a person at `base`.
+    fn say(&self, arguments: &[&str]) -> crate::process::Said {
+        let at = ["--config", self.config.to_str().unwrap(), "--node", "base"];
+        let (command, rest) = arguments.split_first().unwrap();
+        self.place.say(&[&[*command], &at[..], rest].concat())
+    }
+
+    /// What counting at `arm` brings, called from `base`.
+    fn count(&self, number: u32) -> Result<u64, CallError> {
+        let mut tool = self.base().tool(Duration::from_secs(10));
+        let call = self.base().begin(&mut tool, "probe.1", crate::probe::COUNT, &(number,));
+        let counted = tool.link.wait(call, |bytes| rohrpost::macro_support::from_bytes(bytes));
+        tool.close();
+        counted
+    }
+
+    fn fault(&self) -> Fault {
+        match self.count(0) {
+            Err(CallError::Fault(_, fault)) => fault,
+            other => panic!("no fault: {other:?}"),
+        }
+    }
+
+    fn stop(mut self) {
+        for (mut launch, robot) in self.nodes.drain(..) {
+            drop(robot);
+            launch.stop();
+        }
+        self.place.assert_empty();
+    }
+}
+
+#[test]
+fn calls_and_data_cross_from_node_to_node_as_if_there_were_one() {
+    let lan = Lan::launched();
+    assert_eq!(lan.say(&["call", "probe.1", "count", "1"]).ok(), "1\n");
+    assert_eq!(lan.say(&["call", "probe.1", "count", "2"]).ok(), "2\n", "by another tool");
+    assert_eq!(lan.say(&["call", "probe.0", "count", "3"]).ok(), "1\n", "its own node's");
+    let data = lan.say(&["echo", "probe.1", "beat", "--count", "3"]).ok();
+    assert_eq!(data.lines().count(), 3, "{data}");
+    // Larger than a datagram, there and back.
+    let word = "x".repeat(900);
+    let told = lan.say(&["call", "probe.1", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
+    assert!(told.contains(&word), "{told}");
+    lan.stop();
+}
+
+#[test]
+fn what_is_not_there_is_told_with_its_remedy() {
+    let mut lan = Lan::launched();
+    assert_eq!(lan.say(&["stop", "probe.1"]).code, Some(0));
+    assert_eq!(lan.fault(), Fault::NoMailbox);
+    let told = lan.say(&["call", "probe.1", "count", "1"]).fails();
+    assert!(told.contains("probe.1 does not run on node arm; `rohrpost start probe.1` starts it"), "{told}");
+
+    // The node goes, and is silent.
+    let (mut launch, robot) = lan.nodes.pop().unwrap();
+    drop(robot);
+    launch.stop();
+    let silent = Fault::NodeSilent { node: "arm".into() };
+    wait("arm is silent", || (lan.fault() == silent).then_some(()));
+    let told = lan.say(&["call", "probe.1", "count", "1"]).fails();
+    assert!(told.contains("probe.1: node arm is silent; is it on"), "{told}");
+
+    // Its own router goes.
+    assert_eq!(lan.say(&["stop", "router.0"]).code, Some(0));
+    let told = lan.say(&["call", "probe.1", "count", "1"]).fails();
+    assert!(
+        told.contains("the router of this node, router.0, does not run") && told.contains("`rohrpost start router.0`"),
+        "{told}"
+    );
+    assert_eq!(lan.place.counted(), [], "nothing was run");
+    lan.stop();
+}
+
+#[test]
+fn a_full_mailbox_on_another_node_is_told() {
+    let lan = Lan::launched();
+    halt(lan.arm().pid("probe.1"));
+    let mut tool = lan.base().tool(PATIENCE);
+    // One after the other, each given up: the mailbox fills.
+    let full = wait("full", || {
+        let call = lan.base().begin(&mut tool, "probe.1", crate::probe::COUNT, &(1u32,));
+        let answer = wait("answered, or in the mailbox", || {
+            let waiting = lan.arm().waiting("probe.1");
+            tool.link.collect();
+            let answer = tool.link.poll(call);
+            (answer.is_some() || waiting > 0 && waiting < 32).then_some(answer)
+        });
+        tool.link.forget(call);
+        answer
+    });
+    assert!(matches!(full, Err(CallError::Fault(_, Fault::MailboxFull))), "{full:?}");
+    tool.close();
+    signal(lan.arm().pid("probe.1"), Signal::SIGCONT);
+    lan.stop();
+}
+
+#[test]
+fn routers_may_be_killed_at_any_time_and_nothing_runs_twice() {
+    let lan = Lan::launched();
+    let mut numbers = 0..;
+    for (robot, router) in [(lan.base(), "router.0"), (lan.arm(), "router.1"), (lan.base(), "router.0")] {
+        let pid = robot.pid(router);
+        signal(pid, Signal::SIGKILL);
+        // Through the transit mailbox, in which it waits for the next router; or refused, when launch was quicker.
+        for number in numbers.by_ref().take(3) {
+            wait("a call comes through", || lan.count(number).ok());
+        }
+        robot.wait_restarted(router, pid);
+    }
+    let counted = lan.place.counted();
+    let mut once = counted.clone();
+    once.dedup();
+    assert_eq!(counted, once, "none ran twice");
+    assert!((0..9).all(|number| counted.contains(&number)), "{counted:?}");
+    lan.stop();
+}
+
+#[test]
+fn a_node_with_another_configuration_is_refused_by_both_digests() {
+    let mut lan = Lan::launched();
+    let (mut launch, robot) = lan.nodes.pop().unwrap();
+    drop(robot);
+    launch.stop();
+    // The same nodes, one module more.
+    let text = std::fs::read_to_string(&lan.config).unwrap();
+    let other = lan.place.path("other.toml");
+    std::fs::write(&other, format!("{text}{}", probe("probe.2", "", "node = \"arm\""))).unwrap();
+    let ours = std::mem::replace(&mut lan.config, other);
+    let started = lan.start("arm", &[]);
+    lan.nodes.push(started);
+    let theirs = std::mem::replace(&mut lan.config, ours);
+    let digests = [&lan.config, &theirs]
+        .map(|file| format!("{:016x}", rohrpost::config::Installation::load(file).unwrap().digest().lan()));
+    let fault = wait("refused", || Some(lan.fault()).filter(|fault| matches!(fault, Fault::NodeRefuses { .. })));
+    let told = fault.to_string();
+    assert!(
+        told.starts_with("node arm takes nothing from this one") && digests.iter().all(|digest| told.contains(digest)),
+        "{told}"
+    );
+    assert!(told.contains("launch all nodes from the same file"), "{told}");
+    lan.stop();
+}
+
+#[test]
+fn an_address_in_use_is_told_plainly() {
+    let place = Place::new();
+    let config = configured(&place, "test", &addresses(), "");
+    let installation = rohrpost::config::Installation::load(&config).unwrap();
+    let (address, port) = (installation.nodes[0].address.unwrap(), installation.network.unwrap().port);
+    let _taken = std::net::UdpSocket::bind((address, port)).unwrap();
+    let told = place.say(&["router", "--config", config.to_str().unwrap(), "--name", "router.0"]).fails();
+    assert!(told.contains(&format!("{address}:{port} is in use")) && told.contains("choose another `port`"), "{told}");
+}
+
+#[test]
+fn a_bad_network_loses_no_call_and_runs_none_twice() {
+    let lan = Lan::launched_with(
+        "",
+        &[("ROHRPOST_IMPAIR", "loss=20%,duplicate=20%,reorder=20%,delay=1ms,jitter=1ms,corrupt=1%,seed=7")],
+    );
+    for number in 0..30 {
+        wait("a call comes through", || lan.count(number).ok());
+    }
+    let counted = lan.place.counted();
+    // A call that timed out was made anew, as another one: what one call runs, it runs once.
+    assert!((0..30).all(|number| counted.contains(&number)), "{counted:?}");
+    let links = lan.say(&["echo", "router.0", "links", "--count", "1", "--json"]).json();
+    let peer = &links["value"]["peers"][0];
+    assert!(peer["lost"].as_u64().unwrap() > 0 && peer["copies"].as_u64().unwrap() > 0, "{peer}");
+    lan.stop();
+}
