@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod all_nodes;
 mod bench;
 mod boot;
 mod check;
