@@ -21,6 +21,8 @@ const READ_TRIES: usize = 8;
 /// A slower pace begins so far ahead: longer than writing a record takes. A writer that was held up tries again, so often.
 const SLOWER_LEAD_NS: u64 = 1_000_000;
 const WRITE_TRIES: usize = 8;
+/// The error bound of who does not know the time: 292 years.
+pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
 
 /// Where system time comes from.
@@ -278,6 +280,28 @@ impl TimeKeeper {
             drift_ns_s: 0,
         });
         page.turn();
+        Ok(keeper)
+    }
+
+    /// Opens the page of a node that is to have the master's time. What it has of it stays. Else there is the wall clock, with a bound
+    /// that says that nobody knows, until the node's router has heard a master.
+    ///
+    /// # Errors
+    /// When the page cannot be made.
+    pub fn await_master(node: &Arc<Node>) -> Result<Self, NodeError> {
+        let mut keeper = Self::resume(node)?;
+        let last = keeper.record();
+        if last.is_none_or(|last| last.source != TimeSource::Master) {
+            keeper.write(&TimeRecord {
+                epoch: last.map_or(0, |last| last.epoch.saturating_add(1)),
+                source: TimeSource::Master,
+                monotonic_ns: monotonic_ns(),
+                system_ns: realtime_ns(),
+                pace_ppb: BILLION as u64,
+                error_ns: ERROR_UNKNOWN_NS,
+                drift_ns_s: 0,
+            });
+        }
         Ok(keeper)
     }
 

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Ground, tell};
-use rohrpost_mailbox::{SystemClock, TimeKeeper, TimeRecord, TimeSource, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemClock, TimeKeeper, TimeRecord, TimeSource, monotonic_ns, realtime_ns};
 use std::time::{Duration, Instant};
 
 /// The killed writer's mark: an epoch of pace p begins at p times this.
@@ -115,6 +115,22 @@ fn a_successor_goes_on_and_writes_nothing_that_goes_back() {
         assert_eq!(second.write(&record), is_written, "{why}");
         assert_eq!(SystemClock::open(&node).record(), if is_written { Some(record) } else { before }, "{why}");
     }
+}
+
+#[test]
+fn who_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let mut keeper = TimeKeeper::await_master(&node).unwrap();
+    let unknown = keeper.record().unwrap();
+    assert_eq!((unknown.epoch, unknown.source, unknown.error_ns), (0, TimeSource::Master, ERROR_UNKNOWN_NS));
+    assert!(SystemClock::open(&node).now().ns.abs_diff(realtime_ns()) < 1_000_000_000);
+    let known = TimeRecord { epoch: 4, error_ns: 10, ..unknown };
+    assert!(keeper.write(&known));
+    assert_eq!(TimeKeeper::await_master(&node).unwrap().record(), Some(known), "it goes on");
+    drop(TimeKeeper::begin(&node, TimeSource::Simulation, 5, 1.0).unwrap());
+    let again = TimeKeeper::await_master(&node).unwrap().record().unwrap();
+    assert_eq!((again.epoch, again.error_ns), (6, ERROR_UNKNOWN_NS), "a simulation's time is not the master's");
 }
 
 #[test]

@@ -19,11 +19,12 @@ pub use state::{ClockState, Snapshot};
 
 use crate::frame::FrameHead;
 use crate::impair::{self, Impairment, Output};
+use crate::settings::Settings;
 use crate::time::{Clock, Exchange, Stamp, Step, TIME_BYTES, TimeSettings};
 use local::LocalClock;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
-use rohrpost_config::FIFO_MAX;
+use rohrpost_config::{FIFO_MAX, Installation, TimeSource};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_mailbox::{Node, NodeError, TimeKeeper, TimeRecord, realtime_ns};
 use socket::{Came, TimeSocket};
@@ -70,6 +71,25 @@ pub struct ClockParts {
     pub skew: Option<Skew>,
     /// For measurements: each exchange, as long as there is room.
     pub observer: Option<SyncSender<Exchange>>,
+}
+
+impl ClockParts {
+    /// The clock of a router of this installation; none unless its time comes from a master.
+    pub fn new(router: &Settings, installation: &Installation, node: &Arc<Node>) -> Option<Self> {
+        let TimeSource::Master { masters, interval } = &installation.time else { return None };
+        let port = router.network.time_port();
+        let settings = TimeSettings {
+            system: router.system,
+            own: router.own,
+            nodes: router.nodes.len() as u8,
+            masters: masters.clone(),
+            interval: *interval,
+            digest: router.digest,
+            incarnation: router.incarnation,
+        };
+        let nodes = router.nodes.iter().map(|node| SocketAddr::new(node.address, port)).collect();
+        Some(Self { settings, nodes, node: Some(node.clone()), impair: None, skew: None, observer: None })
+    }
 }
 
 /// A clock at work; dropped, it ends. The page stays, and its bound grows.
