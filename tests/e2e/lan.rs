@@ -19,7 +19,7 @@ struct Lan {
 }
 
 /// Addresses that no other test has: of the loopback's 16 million, by process and count.
-fn addresses() -> [String; 2] {
+pub(crate) fn addresses() -> [String; 2] {
     static COUNT: AtomicU16 = AtomicU16::new(0);
     let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
     [1, 2].map(|node| format!("127.{}.{}.{}", 1 + pid / 250 % 250, pid % 250, 10 * (1 + count) + node))

@@ -77,8 +77,8 @@ pub(super) struct Output {
     suppressed: AtomicU64,
     out: Arc<Out>,
     print: Print,
-    /// Whether the configuration has a collector, on this node or another. Where there is none, nothing waits for it: what is
-    /// said is counted as lost, and errors are printed.
+    /// Whether the configuration has a collector, on whichever node: routers lead there. Where there is none, nothing waits for it:
+    /// what is said is counted as lost, and errors are printed.
     collected: bool,
 }
 
