@@ -92,7 +92,7 @@ enum Command {
     Graph(graph::Arguments),
     /// Measure how long a module takes to answer.
     Ping(ping::Arguments),
-    /// Show how the routers of all nodes are: peers, queues, losses, clocks.
+    /// Show how the nodes hear each other, what waits and what is lost.
     Net(net::Arguments),
     /// Send a command over and over.
     Send(send::Arguments),

@@ -240,8 +240,11 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
     let counted = lan.place.counted();
     // A call that timed out was made anew, as another one: what one call runs, it runs once.
     assert!((0..20).all(|number| counted.contains(&number)), "{counted:?}");
-    let links = lan.say(&["echo", "router.0", "links", "--count", "1", "--json"]).json();
-    let peer = &links["value"]["peers"][0];
-    assert!(peer["lost"].as_u64().unwrap() > 0 && peer["copies"].as_u64().unwrap() > 0, "{peer}");
+    // Known when it is clear that they do not come late.
+    wait("losses and copies are counted", || {
+        let told = lan.say(&["echo", "router.0", "links", "--count", "1", "--json"]).json();
+        let peer = &told["value"]["peers"][0];
+        ["lost", "copies", "damaged"].iter().all(|count| peer[count].as_u64().unwrap() > 0).then_some(())
+    });
     lan.stop();
 }

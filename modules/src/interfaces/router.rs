@@ -135,6 +135,17 @@ pub struct Links {
     pub classes: Vec<ClassCarried>,
     /// Datagrams from addresses of no node, or that are nothing of Rohrpost's.
     pub foreign: u64,
+    /// What this computer said when it was to send a datagram, and how often.
+    pub failures: Vec<SocketFailure>,
+}
+
+/// Why datagrams could not be sent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SocketFailure {
+    /// In a word: `nobody-there` (of an earlier one), `no-way`, `too-long`, `no-room`, `other`.
+    pub cause: String,
+    /// How often.
+    pub times: u64,
 }
 
 /// What a node does for the common time.

@@ -403,7 +403,7 @@ impl Output {
             self.lose(&line);
             return true;
         }
-        let gone = matches!(error, SendError::NoMailbox(_));
+        let gone = matches!(error, SendError::NoMailbox(_) | SendError::NoRouter { .. });
         if gone {
             way.sender = None;
         }

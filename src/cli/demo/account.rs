@@ -173,6 +173,7 @@ mod tests {
             waiting_bytes: 0,
             classes,
             foreign: 0,
+            failures: Vec::new(),
         }
     }
 

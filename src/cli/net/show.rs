@@ -22,7 +22,7 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
             parts.push(format!("node {} and node {} refuse each other: {}\n", told.node, peer.node, peer.why));
         }
     }
-    parts.extend([waiting(all), losses(running, all), clocks(all)]);
+    parts.extend([failures(all), waiting(all), losses(running, all), clocks(all)]);
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
 }
@@ -69,6 +69,15 @@ fn state(state: LinkState) -> &'static str {
         LinkState::Unheard => "unheard",
         LinkState::Refused => "refused",
     }
+}
+
+/// What was refused by computers themselves. That nobody listened is no news: that one is silent.
+fn failures(all: &[Told]) -> String {
+    let links = all.iter().filter_map(|told| told.links.as_ref());
+    let all = links.flat_map(|links| links.failures.iter().map(|failure| (&links.node, failure)));
+    let told = all.filter(|(_, failure)| failure.cause != "nobody-there");
+    told.map(|(node, failure)| format!("node {node}: {} datagrams not sent: {}\n", failure.times, failure.cause))
+        .collect()
 }
 
 fn waiting(all: &[Told]) -> String {

@@ -71,10 +71,10 @@ impl Module for RouterModule {
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         // Without one of its threads it is of no use; started again, it is.
-        let well = self.shell.is_well() && self.clock.as_ref().is_none_or(ClockService::is_well);
-        assert!(well, "a thread of the router has ended");
+        assert!(self.shell.is_well(), "a thread of the router has ended");
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
         if let Some(clock) = &self.clock {
+            assert!(clock.is_well(), "the thread of the clock has ended");
             context.publish_now(RouterInterface::CLOCK, &clock::of(&self.shell, clock))?;
         }
         Ok(())
