@@ -32,6 +32,7 @@ mod status;
 mod summary;
 mod table;
 mod target;
+mod time;
 mod top;
 mod units;
 mod version;
@@ -94,6 +95,8 @@ enum Command {
     Send(send::Arguments),
     /// Show, set, save and load the parameters of modules.
     Param(param::Arguments),
+    /// Show how well each node knows the common time.
+    Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
     /// Look whether this computer lets a robot run in time.
@@ -137,6 +140,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Ping(arguments) => ping::run(&arguments),
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
+        Command::Time(arguments) => time::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
