@@ -4,7 +4,7 @@
 mod router;
 
 pub use router::{
-    Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
+    Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
     RouterInterface, RouterProxy,
 };
 

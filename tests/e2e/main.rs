@@ -14,6 +14,7 @@ mod control;
 mod crash;
 mod demo;
 mod doctor;
+mod faults;
 mod harness;
 mod lan;
 mod lan_tools;

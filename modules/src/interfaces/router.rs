@@ -81,6 +81,21 @@ pub struct ClassCarried {
     pub delivered: u64,
     /// Lost, and why.
     pub lost: Vec<CarriedLoss>,
+    /// How old data from other nodes were when they were put into mailboxes; none without data.
+    pub age: Option<Age>,
+}
+
+/// How old data are, from their stamp, by system time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Age {
+    /// Packages with a stamp.
+    pub packages: u64,
+    /// Half were not older, ns.
+    pub p50_ns: u64,
+    /// 99 of 100 were not older, ns.
+    pub p99_ns: u64,
+    /// The oldest, ns.
+    pub max_ns: u64,
 }
 
 /// Packages lost for one cause.

@@ -125,6 +125,11 @@ impl Inbound {
         Output::Wait { until_ns: self.sweep_ns }
     }
 
+    /// Packages of which only parts have come.
+    pub fn partial(&self) -> u64 {
+        self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
+    }
+
     fn take(
         &mut self,
         now_ns: u64,
@@ -189,3 +194,8 @@ impl Inbound {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+pub(crate) use tests::CHECKS;

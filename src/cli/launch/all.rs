@@ -170,11 +170,6 @@ impl<'a> Nodes<'a> {
         self.nodes.iter().all(|node| node.runs)
     }
 
-    /// The namespaces of the nodes.
-    pub(crate) fn lab(&self) -> &Lab {
-        &self.lab
-    }
-
     fn note(&mut self, happening: Happening) {
         match happening {
             Happening::Line { node, text, complaint } => self.line(node, &text, complaint),
