@@ -43,10 +43,12 @@ mod line;
 pub mod message;
 #[cfg(test)]
 mod tests;
+mod types;
 
 #[cfg(any(test, feature = "broken-variants"))]
 pub use broken::Broken;
-pub use clock::{Clock, Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
+pub use clock::Clock;
+pub use types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
 
 /// The bound of a node that does not know the time.
 pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;
