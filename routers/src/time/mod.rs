@@ -96,7 +96,7 @@ impl Term {
 
     /// Round 1 is the first; rank 0 stands first among the masters, and before the others of its round.
     pub fn new(round: u64, rank: u8) -> Self {
-        Self(round << 8 | u64::from(u8::MAX - rank))
+        Self(round.min(u64::MAX >> 8) << 8 | u64::from(u8::MAX - rank))
     }
 
     /// Raised by each master that takes over.

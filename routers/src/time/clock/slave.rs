@@ -122,7 +122,8 @@ impl Clock {
 
     /// How far a line may be off that is `offset_ns` from the local clock now.
     pub(super) fn bound_ns(&self, estimate: &Estimate, offset_ns: i64, master: &Followed) -> u64 {
-        let off_ns = (estimate.high_ns - offset_ns).max(offset_ns - estimate.low_ns).unsigned_abs();
+        let (above, below) = (estimate.high_ns.saturating_sub(offset_ns), offset_ns.saturating_sub(estimate.low_ns));
+        let off_ns = above.max(below).unsigned_abs();
         let off_ns = if self.is(Broken::HalfBound) { off_ns / 2 } else { off_ns };
         off_ns.saturating_add(if self.is(Broken::NoMasterError) { 0 } else { master.error_ns })
     }
