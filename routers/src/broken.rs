@@ -115,10 +115,15 @@ mod variants {
 
     /// Runs something on this thread with a mistake.
     pub fn with<R>(broken: Broken, run: impl FnOnce() -> R) -> R {
-        let before = BROKEN.replace(broken);
-        let result = run();
-        BROKEN.set(before);
-        result
+        // Also when what runs panics, as it should.
+        struct Back(Broken);
+        impl Drop for Back {
+            fn drop(&mut self) {
+                BROKEN.set(self.0);
+            }
+        }
+        let _back = Back(BROKEN.replace(broken));
+        run()
     }
 
     pub(crate) fn is(broken: Broken) -> bool {

@@ -14,6 +14,8 @@
 pub mod broken;
 pub mod fragment;
 pub mod frame;
+#[cfg(test)]
+mod harness;
 pub mod impair;
 pub mod inbound;
 pub mod lab;

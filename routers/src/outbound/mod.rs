@@ -218,6 +218,13 @@ impl Outbound {
         }
     }
 
+    /// Has every peer told at once that we are here.
+    #[cfg(test)]
+    pub(crate) fn tell_all(&mut self, now_ns: u64) {
+        self.alive_ns = now_ns;
+        self.peers.iter_mut().for_each(|peer| peer.tell_ns = now_ns);
+    }
+
     fn came_back(&mut self, peer: NodeIndex, head: &Head, body: &[u8], report: &mut impl Report) {
         self.stats.peer(peer).sent.packages.take_back(1);
         self.stats.out.came_back(head.priority, head.len);
@@ -297,3 +304,8 @@ fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause:
     stats.out.lost(head.priority, cause);
     report.lost(peer, head, body, cause);
 }
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+pub(crate) use tests::CHECKS;

@@ -15,8 +15,18 @@ pub(super) const EVEN_PPB: u64 = 1_000_000_000;
 #[derive(Debug)]
 pub(super) struct Line {
     record: TimeRecord,
-    /// When slewing is over, and the pace from then on.
-    slew: Option<(u64, u64)>,
+    slew: Option<Slew>,
+}
+
+/// The line is bent for a while.
+#[derive(Clone, Copy, Debug)]
+struct Slew {
+    /// When that is over.
+    end_ns: u64,
+    /// The pace from then on.
+    pace_ppb: u64,
+    /// By how much the bound grows faster until then, ns a second: whoever is to straighten the line may die, or stand still.
+    drift_ns_s: u64,
 }
 
 impl Line {
@@ -56,7 +66,7 @@ impl Line {
     }
 
     pub(super) fn slew_end_ns(&self) -> Option<u64> {
-        self.slew.map(|(end_ns, _)| end_ns)
+        self.slew.map(|slew| slew.end_ns)
     }
 
     /// The bound just now, ns.
@@ -102,24 +112,27 @@ impl Line {
             (u128::from(slew_ppb.unsigned_abs()) * 2 * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128);
         let error_ns = error_ns.saturating_add(overshoot_ns as u64).saturating_add(ROUNDING_NS);
         self.turn(now_ns, now_ns, pace_ppb.saturating_add_signed(slew_ppb));
-        self.record = TimeRecord { error_ns: error_ns.min(ERROR_UNKNOWN_NS), drift_ns_s, ..self.record };
+        let slew_drift_ns_s = slew_ppb.unsigned_abs();
+        let error_ns = error_ns.min(ERROR_UNKNOWN_NS);
+        self.record = TimeRecord { error_ns, drift_ns_s: drift_ns_s + slew_drift_ns_s, ..self.record };
         self.slew = (slew_ppb != 0).then(|| {
             let takes_ns = i128::from(by_ns) * BILLION / i128::from(slew_ppb);
-            (now_ns.saturating_add(takes_ns as u64), pace_ppb)
+            Slew { end_ns: now_ns.saturating_add(takes_ns as u64), pace_ppb, drift_ns_s: slew_drift_ns_s }
         });
     }
 
     /// Straightens the line when slewing is over.
     pub(super) fn end_slew(&mut self, now_ns: u64) {
-        if let Some((_, pace_ppb)) = self.slew.take_if(|(end_ns, _)| *end_ns <= now_ns) {
-            self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
+        if self.slew.is_some_and(|slew| slew.end_ns <= now_ns) {
+            self.stop_slew(now_ns);
         }
     }
 
     /// Stops slewing, however far it came.
     pub(super) fn stop_slew(&mut self, now_ns: u64) {
-        if let Some((_, pace_ppb)) = self.slew.take() {
+        if let Some(Slew { pace_ppb, drift_ns_s, .. }) = self.slew.take() {
             self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
+            self.record.drift_ns_s = self.record.drift_ns_s.saturating_sub(drift_ns_s);
         }
     }
 

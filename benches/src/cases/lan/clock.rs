@@ -127,8 +127,11 @@ fn await_time(nodes: &Nodes, settings: &Settings) -> Result<(), Failure> {
     let give_up = Instant::now() + SETTLES_WITHIN;
     while !clocks.are_settled() {
         if interrupted() || Instant::now() > give_up {
+            let [near, far] = [&clocks.near, &clocks.far].map(|clock| clock.record().map(|record| record.source));
             let error = clocks.far.now().error;
-            return Err(Failure::Failed(format!("after {SETTLES_WITHIN:?} the slave knows the time within {error:?}")));
+            return Err(Failure::Failed(format!(
+                "after {SETTLES_WITHIN:?} the slave knows the time within {error:?}; sources: {near:?}, {far:?}"
+            )));
         }
         std::thread::sleep(EACH);
     }

@@ -370,3 +370,6 @@ fn long<const N: usize>(bytes: &[u8; N], at: usize) -> u64 {
     eight.copy_from_slice(&bytes[at..at + 8]);
     u64::from_le_bytes(eight)
 }
+
+#[cfg(test)]
+mod tests;

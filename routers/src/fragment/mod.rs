@@ -199,3 +199,8 @@ impl Partial {
         self.missing == 0
     }
 }
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+pub(crate) use tests::CHECKS;

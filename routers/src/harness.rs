@@ -1,0 +1,231 @@
+//! What the tests of the cores have in common: settings from plain values, a log of all that is told, and a router without sockets.
+
+use crate::broken::{Broken, with};
+use crate::frame::NodeIndex;
+use crate::inbound::{self, Datagram, Inbound};
+use crate::outbound::{Accepted, Outbound, Output, Package};
+use crate::report::{Deliver, Event, NotDelivered, Report};
+use crate::settings::{NodeSettings, Settings};
+use crate::stats::{Cause, Side, Stats};
+use rohrpost_config::{Network, Route};
+use rohrpost_mailbox::{Head, Name, Priority, Type};
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::Arc;
+
+pub(crate) const MS: u64 = 1_000_000;
+pub(crate) const S: u64 = 1000 * MS;
+/// When all tests begin.
+pub(crate) const START: u64 = 100 * S;
+/// A command's interface, caller and so on: something to recognise in what is told of a lost one.
+pub(crate) const ENVELOPE: [u8; 24] = *b"the envelope of a call..";
+
+/// The module of a class on a node: instances are nodes.
+pub(crate) fn module(class: u8, node: NodeIndex) -> Name {
+    Name::new(1, class, node, 0)
+}
+
+pub(crate) fn address(node: NodeIndex) -> IpAddr {
+    Ipv4Addr::new(10, 0, 0, node + 1).into()
+}
+
+/// A router of a few nodes; the module of class 200 has a quota of its own, all others share one.
+pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
+    let route = |class, node| Route { first: module(class, node), last: module(class, node).with_local(u8::MAX), node };
+    let others = || (0..nodes).filter(|node| *node != own);
+    Settings {
+        system: 1,
+        own,
+        nodes: (0..nodes).map(|node| NodeSettings { name: format!("n{node}"), address: address(node) }).collect(),
+        digest: 7,
+        incarnation: 100 + u64::from(own),
+        network: Network {
+            port: 21117,
+            mtu: 1500,
+            datagram_bytes_max: 1472,
+            rate_bytes_s: 100 << 20,
+            quota_bytes: 128 << 10,
+            bulk_below: 16,
+        },
+        routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
+        senders: vec![vec![module(200, own)], vec![module(100, own)]],
+    }
+}
+
+pub(crate) fn head(to: Name, from: Name, priority: u8) -> Head {
+    Head { to, from, priority: Priority(priority), kind: Type::data(1), ..Head::default() }
+}
+
+#[derive(Default)]
+pub(crate) struct Log {
+    pub(crate) lost: Vec<(Head, Vec<u8>, Cause)>,
+    pub(crate) delivered: Vec<(NodeIndex, Head, Vec<u8>)>,
+    pub(crate) events: Vec<Event>,
+    /// What mailboxes say.
+    pub(crate) closed: Option<NotDelivered>,
+}
+
+impl Log {
+    pub(crate) fn causes(&self) -> Vec<Cause> {
+        self.lost.iter().map(|(.., cause)| *cause).collect()
+    }
+
+    /// Ids of what was delivered, in order.
+    pub(crate) fn ids(&self) -> Vec<u16> {
+        self.delivered.iter().map(|(_, head, _)| head.id).collect()
+    }
+}
+
+impl Report for Log {
+    fn lost(&mut self, _: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
+        self.lost.push((*head, body.to_vec(), cause));
+    }
+}
+
+impl Deliver for Log {
+    fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
+        assert_eq!(body.len(), usize::from(head.len));
+        if let Some(why) = self.closed {
+            return Err(why);
+        }
+        self.delivered.push((from, *head, body.to_vec()));
+        Ok(())
+    }
+
+    fn event(&mut self, event: Event) {
+        self.events.push(event);
+    }
+}
+
+/// A router without sockets.
+pub(crate) struct End {
+    pub(crate) settings: Settings,
+    pub(crate) stats: Arc<Stats>,
+    pub(crate) outbound: Outbound,
+    pub(crate) inbound: Inbound,
+    pub(crate) log: Log,
+    next_id: u16,
+}
+
+impl End {
+    pub(crate) fn new(own: NodeIndex, change: impl FnOnce(&mut Settings)) -> Self {
+        Self::begin(own, START, change)
+    }
+
+    pub(crate) fn begin(own: NodeIndex, now_ns: u64, change: impl FnOnce(&mut Settings)) -> Self {
+        let mut settings = settings(own, 3);
+        change(&mut settings);
+        let stats = Stats::new(&settings, now_ns);
+        let (outbound, inbound) = (Outbound::new(&settings, stats.clone()), Inbound::new(&settings, stats.clone()));
+        let mut end = Self { settings, stats, outbound, inbound, log: Log::default(), next_id: 0 };
+        // The first "still there" is out of the way.
+        end.leave(now_ns);
+        end
+    }
+
+    /// Hands a package to the router; its ids count from 0. What leaves at once is returned.
+    pub(crate) fn send(&mut self, now_ns: u64, head: Head, body: &[u8], alone: bool) -> Option<(NodeIndex, Vec<u8>)> {
+        let head = Head { len: body.len() as u16, id: self.next_id, ..head };
+        self.next_id += 1;
+        let package = Package { head, published_ns: now_ns, body };
+        match self.outbound.accept(now_ns, &package, alone, &mut self.log) {
+            Accepted::Send { to, head } => Some((to, [&head[..], body].concat())),
+            Accepted::Waits | Accepted::Lost => None,
+        }
+    }
+
+    /// A package that waits: others stand behind it.
+    pub(crate) fn queue(&mut self, now_ns: u64, head: Head, body: &[u8]) {
+        assert_eq!(self.send(now_ns, head, body, false), None);
+    }
+
+    pub(crate) fn poll(&mut self, now_ns: u64) -> Result<(NodeIndex, Vec<u8>), u64> {
+        let mut datagram = vec![0; self.settings.network.datagram_bytes_max];
+        match self.outbound.poll(now_ns, &mut datagram, &mut self.log) {
+            Output::Send { to, bytes } => Ok((to, datagram[..bytes].to_vec())),
+            Output::Wait { until_ns } => Err(until_ns),
+        }
+    }
+
+    /// All that leaves now.
+    pub(crate) fn leave(&mut self, now_ns: u64) -> Vec<(NodeIndex, Vec<u8>)> {
+        std::iter::from_fn(|| self.poll(now_ns).ok()).collect()
+    }
+
+    pub(crate) fn take(&mut self, now_ns: u64, from: NodeIndex, bytes: &[u8]) {
+        self.take_from(now_ns, address(from), bytes);
+    }
+
+    pub(crate) fn take_from(&mut self, now_ns: u64, source: IpAddr, bytes: &[u8]) {
+        let datagram = Datagram { source, arrived_ns: now_ns, bytes };
+        self.inbound.handle(now_ns, &datagram, &mut self.log);
+    }
+
+    /// Refusals that it says now.
+    pub(crate) fn refusals(&mut self, now_ns: u64) -> Vec<(IpAddr, Vec<u8>)> {
+        let mut datagram = [0; 64];
+        let mut all = Vec::new();
+        while let inbound::Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut datagram, &mut self.log) {
+            all.push((to, datagram[..bytes].to_vec()));
+        }
+        all
+    }
+
+    /// What a peer knows of this router is what it needs to know: it hears it, and is heard.
+    pub(crate) fn meet(&mut self, now_ns: u64, other: &mut Self) {
+        let (own, theirs) = (self.settings.own, other.settings.own);
+        for (_, datagram) in self.alive(now_ns).into_iter().filter(|(to, _)| *to == theirs) {
+            other.take(now_ns, own, &datagram);
+        }
+        for (_, datagram) in other.alive(now_ns).into_iter().filter(|(to, _)| *to == own) {
+            self.take(now_ns, theirs, &datagram);
+        }
+    }
+
+    /// As if a peer had just said that it hears this router.
+    pub(crate) fn hears(&self, peer: NodeIndex, now_ns: u64) {
+        let link = &self.stats.peer(peer).link;
+        link.heard_ns.set(now_ns);
+        link.hears_us_ns.set(now_ns);
+    }
+
+    fn alive(&mut self, now_ns: u64) -> Vec<(NodeIndex, Vec<u8>)> {
+        let peers: Vec<_> = self.settings.peers().collect();
+        self.outbound.tell_all(now_ns);
+        let all = self.leave(now_ns);
+        assert!(all.len() >= peers.len());
+        all
+    }
+
+    /// Accounts of both sides, by class; `waiting`: what is still there, packages of which parts came included.
+    pub(crate) fn assert_balanced(&self) {
+        let sums = |side: &Side| {
+            let all = side.classes().map(|(_, class)| (class.packages.get(), class.passed.get(), class.lost_in_all()));
+            all.fold((0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2))
+        };
+        let (packages, passed, lost) = sums(&self.stats.out);
+        assert_eq!(packages, passed + lost + self.stats.waiting_in_all(), "outgoing");
+        let (packages, passed, inn_lost) = sums(&self.stats.inn);
+        assert_eq!(packages, passed + inn_lost + self.inbound.partial(), "incoming");
+        assert_eq!(lost + inn_lost, self.log.lost.len() as u64, "each is told once");
+        let mut told = [0; Cause::ALL.len()];
+        self.log.lost.iter().for_each(|(.., cause)| told[*cause as usize] += 1);
+        for cause in Cause::ALL {
+            let counted = |side: &Side| side.classes().map(|(_, class)| class.lost(cause)).sum::<u64>();
+            assert_eq!(counted(&self.stats.out) + counted(&self.stats.inn), told[cause as usize], "{cause:?}");
+        }
+    }
+}
+
+/// Runs all checks as they are, and those of which one must fail with each mistake.
+#[test]
+fn every_mistake_is_noticed() {
+    let checks = || [crate::queue::CHECKS, crate::outbound::CHECKS, crate::inbound::CHECKS, crate::fragment::CHECKS];
+    let mut missed = Vec::new();
+    for broken in Broken::ALL {
+        let notices = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
+        if !checks().into_iter().flatten().any(notices) {
+            missed.push(broken);
+        }
+    }
+    assert_eq!(missed, []);
+}

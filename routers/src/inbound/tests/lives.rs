@@ -1,0 +1,151 @@
+//! Peers that begin, fall silent, are started anew, or do not hear us.
+
+use super::*;
+use crate::harness::address;
+use crate::link::State;
+use crate::report::Event;
+use crate::stats::Cause;
+
+fn data(from: NodeIndex, to: NodeIndex) -> Head {
+    head(module(50, to), module(200, from), 90)
+}
+
+use crate::frame::NodeIndex;
+
+pub(super) fn check_silence() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
+    let states = |end: &End, now_ns| end.stats.state(1, now_ns);
+    assert_eq!(states(&base, START + S - 1), State::Unknown);
+    assert_eq!(states(&base, START + S), State::Silent);
+    base.meet(START + 2 * S, &mut arm);
+    assert_eq!(states(&base, START + 2 * S), State::Alive);
+    let mut told = Vec::new();
+    for ms in (2000..4000).step_by(10) {
+        let now_ns = START + ms * MS;
+        base.refusals(now_ns);
+        told.extend(base.log.events.drain(..).map(|event| (ms, event)));
+        assert_eq!(states(&base, now_ns) == State::Silent, ms >= 3000, "at {ms} ms");
+    }
+    let (heard, silent) = (Event::Heard { peer: 1 }, |peer| Event::Silent { peer });
+    assert_eq!(told, [(2000, heard), (2000, silent(2)), (3000, silent(1))]);
+    base.meet(START + 4 * S, &mut arm);
+    assert_eq!(base.log.events, [Event::Heard { peer: 1 }]);
+}
+
+#[test]
+fn who_says_nothing_for_a_second_is_silent() {
+    check_silence();
+}
+
+#[test]
+fn who_stood_still_itself_waits_for_others_anew() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
+    base.meet(START, &mut arm);
+    base.refusals(START);
+    base.log.events.clear();
+    base.refusals(START + 5 * S);
+    assert_eq!(base.log.events, [Event::Silent { peer: 2 }], "which was never heard");
+    assert_eq!(base.stats.state(1, START + 5 * S), State::Alive);
+    (1..=10).for_each(|step| drop(base.refusals(START + 5 * S + step * 100 * MS)));
+    assert_eq!(base.stats.state(1, START + 6 * S), State::Silent);
+}
+
+pub(super) fn check_restart() {
+    let mut base = End::new(0, |_| {});
+    let lives = |incarnation| End::new(1, |settings| settings.incarnation = incarnation);
+    let (mut first, mut second) = (lives(11), lives(12));
+    let old: Vec<_> = (0..3).map(|_| first.send(START, data(1, 0), b"", true).unwrap().1).collect();
+    base.take(START, 1, &old[0]);
+    let (_, new) = second.send(START, data(1, 0), b"", true).unwrap();
+    base.take(START, 1, &new);
+    assert_eq!(base.log.events, [Event::Heard { peer: 1 }, Event::Restarted { peer: 1 }]);
+    base.take(START + MS, 1, &old[1]);
+    base.take(START + MS, 1, &new);
+    assert_eq!(base.log.ids(), [0, 0], "nothing of the old life, nothing twice");
+    let received = &base.stats.peer(1).received;
+    assert_eq!((received.restarts.get(), received.old.get(), received.copies.get()), (1, 1, 1));
+    assert_eq!(received.lost.get(), 1, "the first life's first, which only said that it is there");
+
+    // A second router that goes on as the same node is noticed, and kept out.
+    for step in 0..30 {
+        let now_ns = START + step * 100 * MS;
+        second.hears(0, now_ns);
+        let (_, new) = second.send(now_ns, data(1, 0), b"", true).unwrap();
+        base.take(now_ns, 1, &new);
+    }
+    base.take(START + 29 * 100 * MS, 1, &old[2]);
+    base.take(START + 29 * 100 * MS, 1, &old[2]);
+    assert_eq!(base.log.events[2..], [Event::Twice { peer: 1 }]);
+    assert_eq!(base.log.delivered.len(), 2 + 30);
+    base.assert_balanced();
+}
+
+#[test]
+fn a_restarted_peer_is_known_by_its_incarnation() {
+    check_restart();
+}
+
+#[test]
+fn a_life_that_was_taken_for_over_comes_back() {
+    let mut base = End::new(0, |_| {});
+    let lives = |incarnation| End::new(1, |settings| settings.incarnation = incarnation);
+    let (mut dead, mut living) = (lives(11), lives(12));
+    let (_, late) = dead.send(START, data(1, 0), b"", true).unwrap();
+    let all: Vec<_> = (0..4).map(|_| living.send(START, data(1, 0), b"", true).unwrap().1).collect();
+    // We have just begun, and a datagram of the dead one comes after one of the living.
+    base.take(START, 1, &all[1]);
+    base.take(START, 1, &late);
+    base.take(START + S - 1, 1, &all[2]);
+    assert_eq!(base.log.ids(), [1, 0]);
+    base.take(START + S, 1, &all[3]);
+    base.take(START + S, 1, &all[0]);
+    base.take(START + S, 1, &all[1]);
+    assert_eq!(base.log.ids(), [1, 0, 3], "and nothing that may have been delivered");
+    base.assert_balanced();
+}
+
+pub(super) fn check_one_way() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
+    base.meet(START, &mut arm);
+    let mut unheard_ns = None;
+    for step in 0..40 {
+        let now_ns = START + step * 100 * MS;
+        // Nothing of ours arrives any more: what it hears is another router of ours, long gone.
+        arm.stats.peer(0).link.incarnation.set(99);
+        arm.outbound.tell_all(now_ns);
+        for (_, datagram) in arm.leave(now_ns).into_iter().filter(|(to, _)| *to == 0) {
+            base.take(now_ns, 1, &datagram);
+        }
+        base.refusals(now_ns);
+        if base.stats.state(1, now_ns) == State::Unheard {
+            unheard_ns.get_or_insert(now_ns - START);
+        }
+    }
+    assert_eq!(unheard_ns, Some(2200 * MS));
+    assert_eq!(base.log.events.iter().filter(|event| **event == Event::Unheard { peer: 1 }).count(), 1);
+    arm.stats.peer(0).link.incarnation.set(100);
+    base.meet(START + 4 * S, &mut arm);
+    assert_eq!(base.stats.state(1, START + 4 * S), State::Alive);
+}
+
+#[test]
+fn a_one_way_link_is_noticed() {
+    check_one_way();
+}
+
+pub(super) fn check_socket() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
+    for (waited_ns, delivered) in [(SOCKET_MAX_NS, 1), (SOCKET_MAX_NS + 1, 1)] {
+        let (_, bytes) = arm.send(START, data(1, 0), b"old", true).unwrap();
+        let datagram = Datagram { source: address(1), arrived_ns: START, bytes: &bytes };
+        base.inbound.handle(START + waited_ns, &datagram, &mut base.log);
+        assert_eq!(base.log.delivered.len(), delivered);
+    }
+    assert_eq!(base.log.causes(), [Cause::Stale]);
+    base.assert_balanced();
+}
+
+#[test]
+fn what_waited_in_the_socket_is_not_delivered() {
+    check_socket();
+}

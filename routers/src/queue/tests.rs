@@ -1,0 +1,182 @@
+use super::*;
+use proptest::prelude::*;
+use rohrpost_mailbox::Priority;
+
+pub(crate) const CHECKS: &[fn()] =
+    &[check_order_of_levels, check_who_gives_way, check_senders_have_memory_of_their_own, check_what_gives_way_is_told];
+
+const QUOTA: usize = 16 * BLOCK_BYTES;
+
+fn waiting(id: u16, sender: u16, peer: NodeIndex, level: u8, len: usize) -> Waiting {
+    let head = Head { id, len: len as u16, priority: Priority(255 - level * 8), ..Head::default() };
+    Waiting { head, peer, sender, level, ..Waiting::default() }
+}
+
+/// Lets a package wait; what gave way for it, or itself.
+fn push(queue: &mut Queue, id: u16, sender: u16, level: u8, len: usize) -> Vec<u16> {
+    let mut gone = Vec::new();
+    let body = vec![id as u8; len];
+    let taken = queue.push(waiting(id, sender, id as u8 % 3, level, len), &body, |waiting, beginning| {
+        assert_eq!(beginning, vec![waiting.head.id as u8; BLOCK_BYTES.min(waiting.head.len.into())]);
+        gone.push(waiting.head.id);
+    });
+    gone.extend((!taken).then_some(id));
+    gone
+}
+
+fn drain(queue: &mut Queue) -> Vec<u16> {
+    let next = |queue: &mut Queue| {
+        let place = queue.first()?;
+        let Waiting { head, .. } = *queue.at(place);
+        let mut body = vec![0; head.len.into()];
+        queue.read(place, &mut body);
+        assert!(body.iter().all(|byte| *byte == head.id as u8), "the body is its own");
+        Some(queue.remove(place).0.head.id)
+    };
+    std::iter::from_fn(|| next(queue)).collect()
+}
+
+fn check_order_of_levels() {
+    let mut queue = Queue::new(1, 3, QUOTA);
+    for (id, level) in [(0, 31), (1, 4), (2, 4), (3, 0), (4, 31), (5, 4)] {
+        assert_eq!(push(&mut queue, id, 0, level, 10), []);
+    }
+    assert_eq!(drain(&mut queue), [3, 1, 2, 5, 0, 4], "by level; in a level first in, first out, whatever the peer");
+    assert!(queue.is_empty() && queue.used_bytes() == 0);
+}
+
+#[test]
+fn urgent_ones_go_first_and_equal_ones_in_order() {
+    check_order_of_levels();
+}
+
+fn check_who_gives_way() {
+    let mut queue = Queue::new(1, 3, QUOTA);
+    for id in 0..16 {
+        assert_eq!(push(&mut queue, id, 0, [20, 10][usize::from(id) % 2], 100), []);
+    }
+    for (id, level, len, gone, why) in [
+        (16, 20, 100, vec![16], "it is of the least important level itself, and the newest"),
+        (17, 21, 100, vec![17], "it is the least important"),
+        (18, 19, 100, vec![14], "the newest of the least important"),
+        (19, 10, 3 * BLOCK_BYTES, vec![12, 10, 8], "as many as it needs"),
+        (20, 0, 16 * BLOCK_BYTES + 1, vec![20], "more than a quota, so nothing gives way for it"),
+        (21, 10, 9 * BLOCK_BYTES, vec![21], "it would need some of its own level"),
+    ] {
+        assert_eq!(push(&mut queue, id, 0, level, len), gone, "{id}: {why}");
+    }
+    assert_eq!(drain(&mut queue), [1, 3, 5, 7, 9, 11, 13, 15, 19, 18, 0, 2, 4, 6]);
+}
+
+#[test]
+fn who_is_over_its_quota_loses_its_own_least_important_and_newest() {
+    check_who_gives_way();
+}
+
+fn check_senders_have_memory_of_their_own() {
+    let mut queue = Queue::new(3, 3, QUOTA);
+    for id in 0..100 {
+        push(&mut queue, id, 0, 0, 1000);
+    }
+    for id in 100..116 {
+        assert_eq!(push(&mut queue, id, 1, 31, 1), [], "the other sender's flood leaves no trace");
+    }
+    assert_eq!(drain(&mut queue).len(), 4 + 16);
+}
+
+#[test]
+fn no_sender_uses_up_anothers_memory() {
+    check_senders_have_memory_of_their_own();
+}
+
+fn check_what_gives_way_is_told() {
+    let mut queue = Queue::new(1, 3, QUOTA);
+    let told: usize = (0..64).map(|id| push(&mut queue, id, 0, 31 - id as u8 / 2, 100).len()).sum();
+    assert_eq!(told + drain(&mut queue).len(), 64);
+}
+
+#[test]
+fn every_package_that_gives_way_is_told() {
+    check_what_gives_way_is_told();
+}
+
+#[test]
+fn what_has_left_in_part_does_not_give_way() {
+    let mut queue = Queue::new(1, 3, QUOTA);
+    assert_eq!(push(&mut queue, 0, 0, 31, 15 * BLOCK_BYTES), []);
+    let place = queue.first().unwrap();
+    queue.read(place, &mut [0; 100]);
+    queue.part_left(place, 77);
+    assert_eq!(push(&mut queue, 1, 0, 0, 2 * BLOCK_BYTES), [1]);
+    assert_eq!(push(&mut queue, 2, 0, 0, BLOCK_BYTES), []);
+    assert_eq!((queue.at(place).first, queue.at(place).parts), (77, 1));
+    let mut rest = vec![9; 15 * BLOCK_BYTES - 100];
+    queue.read(place, &mut rest);
+    assert!(rest.iter().all(|byte| *byte == 0));
+    assert_eq!(queue.remove(place).0.head.id, 0);
+    assert_eq!(drain(&mut queue), [2]);
+}
+
+#[test]
+fn levels_of_a_peer_are_found_one_after_the_other() {
+    let mut queue = Queue::new(1, 3, QUOTA);
+    for (id, level) in [(0, 3), (3, 31), (1, 4)] {
+        assert_eq!(push(&mut queue, id, 0, level, 0), []);
+    }
+    let found = |from| queue.next_level(0, from);
+    assert_eq!([0, 3, 4, 31, 32].map(found), [Some(3), Some(3), Some(31), Some(31), None]);
+    assert_eq!((queue.next_level(1, 0), queue.next_level(2, 0)), (Some(4), None));
+}
+
+/// What the queue promises, in a slow and simple way.
+#[derive(Default)]
+struct Model {
+    waiting: Vec<Waiting>,
+}
+
+impl Model {
+    fn push(&mut self, new: Waiting) -> Vec<u16> {
+        let blocks = |waiting: &Waiting| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
+        let of_sender = |waiting: &&Waiting| waiting.sender == new.sender;
+        let used: usize = self.waiting.iter().filter(of_sender).map(blocks).sum();
+        let yielding: usize =
+            self.waiting.iter().filter(of_sender).filter(|other| other.level > new.level).map(blocks).sum();
+        if used - yielding + blocks(&new) > QUOTA / BLOCK_BYTES {
+            return vec![new.head.id];
+        }
+        let mut gone = Vec::new();
+        while self.waiting.iter().filter(of_sender).map(blocks).sum::<usize>() + blocks(&new) > QUOTA / BLOCK_BYTES {
+            let own = self.waiting.iter().enumerate().filter(|(_, waiting)| waiting.sender == new.sender);
+            let (at, _) = own.max_by_key(|(at, waiting)| (waiting.level, *at)).unwrap();
+            gone.push(self.waiting.remove(at).head.id);
+        }
+        self.waiting.push(new);
+        gone
+    }
+
+    fn pop(&mut self) -> Option<u16> {
+        let at = (0..self.waiting.len()).min_by_key(|at| (self.waiting[*at].level, *at))?;
+        Some(self.waiting.remove(at).head.id)
+    }
+}
+
+proptest! {
+    #[test]
+    fn it_does_what_the_slow_and_simple_one_does(
+        steps in prop::collection::vec((0u16..3, 0u8..32, 0usize..2000, any::<bool>()), 1..200),
+    ) {
+        let (mut queue, mut model) = (Queue::new(3, 3, QUOTA), Model::default());
+        for (id, (sender, level, len, take)) in steps.into_iter().enumerate() {
+            let id = id as u16;
+            let gone = push(&mut queue, id, sender, level, len);
+            prop_assert_eq!(gone, model.push(waiting(id, sender, id as u8 % 3, level, len)));
+            if take {
+                let first = queue.first().map(|place| queue.remove(place).0.head.id);
+                prop_assert_eq!(first, model.pop());
+            }
+        }
+        let rest: Vec<u16> = std::iter::from_fn(|| model.pop()).collect();
+        prop_assert_eq!(drain(&mut queue), rest);
+        prop_assert_eq!(queue.used_bytes(), 0);
+    }
+}

@@ -1,0 +1,225 @@
+//! A package on its way through a router takes nothing from the heap, and gives nothing back to it: at once or through the queue,
+//! packed or in parts, delivered or lost, in order or not. Only putting together the first large packages of a peer takes memory.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use rohrpost_config::{Network, Route};
+use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::inbound::{Datagram, Inbound};
+use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
+use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
+use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::stats::{Cause, Stats};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::Arc;
+
+thread_local! {
+    static USES: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+#[global_allocator]
+static HEAP: Counting = Counting;
+
+// SAFETY: hands all on to the system's; a constant thread-local without destructor neither allocates nor ends.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        USES.with(|uses| uses.set(uses.get() + 1));
+        // SAFETY: as promised by our caller.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        USES.with(|uses| uses.set(uses.get() + 1));
+        // SAFETY: as promised by our caller.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+const MS: u64 = 1_000_000;
+
+fn address(node: NodeIndex) -> IpAddr {
+    Ipv4Addr::new(10, 0, 0, node + 1).into()
+}
+
+/// The module that a node has.
+fn module(node: NodeIndex) -> Name {
+    Name::new(1, 200, node, 0)
+}
+
+fn settings(own: NodeIndex) -> Settings {
+    let other = 1 - own;
+    Settings {
+        system: 1,
+        own,
+        nodes: (0..2).map(|node| NodeSettings { name: format!("n{node}"), address: address(node) }).collect(),
+        digest: 7,
+        incarnation: 9,
+        network: Network {
+            port: 21117,
+            mtu: 1500,
+            datagram_bytes_max: 1472,
+            rate_bytes_s: 1 << 30,
+            quota_bytes: 128 << 10,
+            bulk_below: 16,
+        },
+        routes: vec![Route { first: module(other), last: module(other).with_local(255), node: other }],
+        senders: vec![vec![module(own)]],
+    }
+}
+
+#[derive(Default)]
+struct Counts {
+    lost: [u64; Cause::ALL.len()],
+    delivered: u64,
+    closed: Option<NotDelivered>,
+}
+
+impl Report for Counts {
+    fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], cause: Cause) {
+        self.lost[cause as usize] += 1;
+    }
+}
+
+impl Deliver for Counts {
+    fn deliver(&mut self, _: NodeIndex, _: &Head, _: &[u8]) -> Result<(), NotDelivered> {
+        self.delivered += 1;
+        self.closed.map_or(Ok(()), Err)
+    }
+
+    fn event(&mut self, _: Event) {}
+}
+
+/// Two routers and a wire that now and then loses, copies and holds back.
+struct Pair {
+    out: Outbound,
+    inn: Inbound,
+    back: (Outbound, Inbound),
+    counts: Counts,
+    held: ([u8; 1472], usize),
+    datagrams: u64,
+}
+
+impl Pair {
+    fn new(now_ns: u64) -> Self {
+        let (base, arm) = (settings(0), settings(1));
+        let stats: [Arc<Stats>; 2] = [Stats::new(&base, now_ns), Stats::new(&arm, now_ns)];
+        Self {
+            out: Outbound::new(&base, stats[0].clone()),
+            inn: Inbound::new(&arm, stats[1].clone()),
+            back: (Outbound::new(&arm, stats[1].clone()), Inbound::new(&base, stats[0].clone())),
+            counts: Counts::default(),
+            held: ([0; 1472], 0),
+            datagrams: 0,
+        }
+    }
+
+    fn send(&mut self, now_ns: u64, priority: u8, body: &[u8], alone: bool) {
+        let kind = if priority.is_multiple_of(2) { Type::command(16) } else { Type::data(1) };
+        let head = Head {
+            to: module(1),
+            from: module(0),
+            len: body.len() as u16,
+            kind,
+            priority: Priority(priority),
+            ..Head::default()
+        };
+        let package = Package { head, published_ns: now_ns, body };
+        if let Accepted::Send { head, .. } = self.out.accept(now_ns, &package, alone, &mut self.counts) {
+            let mut datagram = [0; 1472];
+            datagram[..head.len()].copy_from_slice(&head);
+            datagram[head.len()..head.len() + body.len()].copy_from_slice(body);
+            self.wire(now_ns, &datagram[..head.len() + body.len()]);
+        }
+    }
+
+    fn leave(&mut self, now_ns: u64) {
+        let mut datagram = [0; 1472];
+        while let Output::Send { bytes, .. } = self.out.poll(now_ns, &mut datagram, &mut self.counts) {
+            if self.datagrams % 31 == 30 {
+                self.out.unsent(&datagram[..bytes], &[], &mut self.counts);
+            }
+            self.wire(now_ns, &datagram[..bytes]);
+        }
+        while let Output::Send { bytes, .. } = self.back.0.poll(now_ns, &mut datagram, &mut self.counts) {
+            let datagram = Datagram { source: address(1), arrived_ns: now_ns, bytes: &datagram[..bytes] };
+            self.back.1.handle(now_ns, &datagram, &mut self.counts);
+        }
+        self.inn.poll(now_ns, &mut datagram, &mut self.counts);
+        self.back.1.poll(now_ns, &mut datagram, &mut self.counts);
+    }
+
+    fn wire(&mut self, now_ns: u64, datagram: &[u8]) {
+        self.datagrams += 1;
+        match self.datagrams % 23 {
+            3 => {}
+            5 => {
+                self.held.0[..datagram.len()].copy_from_slice(datagram);
+                self.held.1 = datagram.len();
+            }
+            7 => (0..2).for_each(|_| self.arrive(now_ns, datagram)),
+            9 => {
+                let (held, bytes) = self.held;
+                self.arrive(now_ns, datagram);
+                self.arrive(now_ns, &held[..bytes]);
+            }
+            11 => self.arrive(now_ns, &datagram[1..]),
+            _ => self.arrive(now_ns, datagram),
+        }
+    }
+
+    fn arrive(&mut self, now_ns: u64, bytes: &[u8]) {
+        let datagram = Datagram { source: address(0), arrived_ns: now_ns, bytes };
+        self.inn.handle(now_ns, &datagram, &mut self.counts);
+    }
+
+    /// What a busy router does in some milliseconds.
+    fn round(&mut self, now_ns: u64, round: u64) {
+        let bodies = [7; 9000];
+        self.counts.closed = round.is_multiple_of(3).then_some(NotDelivered::MailboxFull);
+        (0..10).for_each(|_| self.send(now_ns, 200, &bodies[..64], true));
+        for n in 0..40 {
+            self.send(now_ns, 120 + n, &bodies[..20 + usize::from(n)], false);
+        }
+        self.leave(now_ns);
+        for n in 0..8 {
+            self.send(now_ns, 20 + n * 30, &bodies, n == 0);
+        }
+        self.leave(now_ns + MS);
+        // More than its quota.
+        for n in 0..40 {
+            self.send(now_ns + 2 * MS, 250 - n * 5, &bodies, false);
+        }
+        self.leave(now_ns + 20 * MS);
+        if round.is_multiple_of(16) {
+            self.send(now_ns + 20 * MS, 90, &bodies, false);
+        }
+        self.leave(now_ns + if round.is_multiple_of(16) { 2100 } else { 40 } * MS);
+    }
+}
+
+#[test]
+fn no_package_touches_the_heap() {
+    let mut now_ns = 1000 * MS;
+    let mut pair = Pair::new(now_ns);
+    let mut rounds = |pair: &mut Pair, from: u64, to: u64| {
+        for round in from..to {
+            pair.round(now_ns, round);
+            now_ns += if round.is_multiple_of(16) { 2200 } else { 50 } * MS;
+        }
+    };
+    rounds(&mut pair, 0, 100);
+    let before = USES.with(Cell::get);
+    assert!(before > 0, "counts");
+    rounds(&mut pair, 100, 1000);
+    assert_eq!(USES.with(Cell::get), before, "used the heap");
+    let happened = |cause: Cause| pair.counts.lost[cause as usize];
+    for cause in [Cause::Quota, Cause::Socket, Cause::Late, Cause::Incomplete, Cause::MailboxFull] {
+        assert!(happened(cause) > 10, "{cause:?}: {} times", happened(cause));
+    }
+    assert!(pair.counts.delivered > 10_000 && pair.datagrams > 10_000);
+}
