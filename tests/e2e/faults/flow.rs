@@ -78,7 +78,7 @@ fn read(package: &rohrpost::mailbox::Package<'_>) -> (u8, u64) {
 
 /// What a router did with a class.
 pub(super) fn carried(links: &Links, class: Class) -> ClassCarried {
-    let none = ClassCarried { class: class.0, taken: 0, sent: 0, came: 0, delivered: 0, lost: Vec::new() };
+    let none = ClassCarried { class: class.0, taken: 0, sent: 0, came: 0, delivered: 0, lost: Vec::new(), age: None };
     links.classes.iter().find(|carried| carried.class == class.0).cloned().unwrap_or(none)
 }
 
