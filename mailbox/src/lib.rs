@@ -120,6 +120,6 @@ pub use registry::CreateError;
 pub use routes::ROUTES_MAX;
 pub use sender::{Label, Loan, SendError, Sender};
 pub use slots::{Full, SLOTS_MAX};
-pub use system_time::{SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource};
+pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource};
 pub use waiting::{Waiting, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};

@@ -21,6 +21,8 @@ const READ_TRIES: usize = 8;
 /// A slower pace begins so far ahead: longer than writing a record takes. A writer that was held up tries again, so often.
 const SLOWER_LEAD_NS: u64 = 1_000_000;
 const WRITE_TRIES: usize = 8;
+/// The error bound of who does not know the time: 292 years.
+pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
 
 /// Where system time comes from.
@@ -97,7 +99,7 @@ pub struct SystemTime {
     pub epoch: u64,
     /// How far off it is at most.
     pub error: Duration,
-    /// How long ago its source was last heard.
+    /// How long ago its source was last heard; of a clock that is its own source, since when it is.
     pub age: Duration,
 }
 
@@ -279,6 +281,60 @@ impl TimeKeeper {
         });
         page.turn();
         Ok(keeper)
+    }
+
+    /// Opens the page of a node that is to have the master's time. What it has of it stays. Else there is the wall clock, with a bound
+    /// that says that nobody knows, until the node's router has heard a master.
+    ///
+    /// # Errors
+    /// When the page cannot be made.
+    pub fn await_master(node: &Arc<Node>) -> Result<Self, NodeError> {
+        let mut keeper = Self::resume(node)?;
+        let last = keeper.record();
+        if last.is_none_or(|last| last.source != TimeSource::Master) {
+            keeper.write(&TimeRecord {
+                epoch: last.map_or(0, |last| last.epoch.saturating_add(1)),
+                source: TimeSource::Master,
+                monotonic_ns: monotonic_ns(),
+                system_ns: realtime_ns(),
+                pace_ppb: BILLION as u64,
+                error_ns: ERROR_UNKNOWN_NS,
+                drift_ns_s: 0,
+            });
+        }
+        Ok(keeper)
+    }
+
+    /// Opens the page, making it if need be, and leaves what it says: who was started again goes on from there.
+    ///
+    /// # Errors
+    /// When the page cannot be made.
+    pub fn resume(node: &Arc<Node>) -> Result<Self, NodeError> {
+        let failed = |error| NodeError::of(&node.path().join("time"), error);
+        let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
+        let page: &TimePage = keeper.mapping.at(0);
+        page.writer_pid.store(std::process::id(), Ordering::Relaxed);
+        Ok(keeper)
+    }
+
+    /// What the page says; none if nobody wrote it yet.
+    pub fn record(&self) -> Option<TimeRecord> {
+        self.mapping.at::<TimePage>(0).read()
+    }
+
+    /// Makes this the page's record. False, and the page stays as it was, if time would go back within its epoch just now: because the
+    /// record is of a slower pace, and this thread was held up until it was too late for it.
+    pub fn write(&mut self, record: &TimeRecord) -> bool {
+        let page: &TimePage = self.mapping.at(0);
+        let last = page.read().filter(|last| last.epoch == record.epoch);
+        page.fill(record);
+        // From here to the turn are nanoseconds, as in `set_pace`.
+        let now_ns = monotonic_ns();
+        let goes_on = last.is_none_or(|last| last.at(now_ns).ns <= record.at(now_ns).ns);
+        if goes_on {
+            page.turn();
+        }
+        goes_on
     }
 
     /// Goes on in the same epoch with another pace, never back. False when the pace stays as it was: this thread was held up

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Ground, tell};
-use rohrpost_mailbox::{SystemClock, TimeKeeper, TimeSource, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemClock, TimeKeeper, TimeRecord, TimeSource, monotonic_ns, realtime_ns};
 use std::time::{Duration, Instant};
 
 /// The killed writer's mark: an epoch of pace p begins at p times this.
@@ -81,6 +81,56 @@ fn another_pace_never_takes_time_back() {
         last = now;
     }
     assert!(steps > 100);
+}
+
+#[test]
+fn a_successor_goes_on_and_writes_nothing_that_goes_back() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let mut first = TimeKeeper::resume(&node).unwrap();
+    assert_eq!(first.record(), None);
+    let line = |monotonic_ns, system_ns, pace_ppb, epoch| TimeRecord {
+        epoch,
+        source: TimeSource::Master,
+        monotonic_ns,
+        system_ns,
+        pace_ppb,
+        error_ns: 5,
+        drift_ns_s: 7,
+    };
+    let even = line(monotonic_ns(), MARK_NS, 1_000_000_000, 3);
+    assert!(first.write(&even));
+    drop(first);
+    let mut second = TimeKeeper::resume(&node).unwrap();
+    assert_eq!(second.record(), Some(even));
+    let now_ns = monotonic_ns();
+    for (record, is_written, why) in [
+        (line(now_ns, even.at(now_ns).ns - 1_000_000, 1_000_000_000, 3), false, "it would go back"),
+        (line(now_ns, even.at(now_ns).ns, 900_000_000, 3), false, "slower, and its beginning is over"),
+        (line(now_ns + 1_000_000_000, even.at(now_ns + 1_000_000_000).ns, 900_000_000, 3), true, "slower, and in time"),
+        (line(now_ns, even.at(now_ns).ns + 500_000_000, 1_000_000_000, 3), true, "forward"),
+        (line(now_ns, 1_000, 1_000_000_000, 4), true, "another epoch may begin anywhere"),
+    ] {
+        let before = second.record();
+        assert_eq!(second.write(&record), is_written, "{why}");
+        assert_eq!(SystemClock::open(&node).record(), if is_written { Some(record) } else { before }, "{why}");
+    }
+}
+
+#[test]
+fn who_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let mut keeper = TimeKeeper::await_master(&node).unwrap();
+    let unknown = keeper.record().unwrap();
+    assert_eq!((unknown.epoch, unknown.source, unknown.error_ns), (0, TimeSource::Master, ERROR_UNKNOWN_NS));
+    assert!(SystemClock::open(&node).now().ns.abs_diff(realtime_ns()) < 1_000_000_000);
+    let known = TimeRecord { epoch: 4, error_ns: 10, ..unknown };
+    assert!(keeper.write(&known));
+    assert_eq!(TimeKeeper::await_master(&node).unwrap().record(), Some(known), "it goes on");
+    drop(TimeKeeper::begin(&node, TimeSource::Simulation, 5, 1.0).unwrap());
+    let again = TimeKeeper::await_master(&node).unwrap().record().unwrap();
+    assert_eq!((again.epoch, again.error_ns), (6, ERROR_UNKNOWN_NS), "a simulation's time is not the master's");
 }
 
 #[test]

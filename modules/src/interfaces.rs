@@ -4,8 +4,8 @@
 mod router;
 
 pub use router::{
-    Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
-    RouterInterface, RouterProxy,
+    Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
+    RouterInterface, RouterProxy, SocketFailure,
 };
 
 use crate::interface;

@@ -2,9 +2,11 @@
 //! `ROHRPOST_SIM_SEED=n` to see one line by line.
 
 use rohrpost_modules::call::{Fault, Once, Request, Verdict};
+use rohrpost_routers::broken::Broken;
 use rohrpost_routers::sim::calls::{Attempt, Guard, Ruling};
 use rohrpost_routers::sim::plan::Plan;
-use rohrpost_routers::sim::run::{Outcome, run};
+use rohrpost_routers::sim::run::{Mistake, Outcome, run, run_broken};
+use rohrpost_routers::time;
 use std::collections::BTreeMap;
 
 /// Networks without being asked for more.
@@ -91,4 +93,18 @@ fn networks_keep_their_promises() {
     }
     eprintln!("{seen:#?}");
     eprintln!("{} of {seeds} bad: {bad:?}", bad.len());
+}
+
+#[test]
+fn mistakes_are_noticed() {
+    let packages = Broken::ALL.into_iter().map(Mistake::Packages);
+    let time = time::Broken::ALL.into_iter().map(Mistake::Time);
+    for mistake in packages.chain(time) {
+        let t = std::time::Instant::now();
+        let noticed = (0..number("SEEDS").unwrap_or(100)).find_map(|seed| {
+            let outcome = run_broken(Plan::new(seed), guard, mistake);
+            outcome.problems.first().map(|problem| (seed, problem.promise, problem.text.clone()))
+        });
+        eprintln!("{mistake:?} {noticed:?} {:?}", t.elapsed());
+    }
 }

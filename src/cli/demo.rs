@@ -1,6 +1,8 @@
 //! `rohrpost demo`: a simulated robot, or the log of a real one.
 
+mod account;
 mod copy;
+mod nodes;
 
 use super::launch::{View, end};
 use super::speech::Speech;
@@ -13,6 +15,7 @@ use rohrpost::interfaces::{CartographerInterface, MapCounts, PlayerInterface, Pr
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::mailbox::{ClassTraffic, saturating_sum};
 use rohrpost::{Class, Name};
+use rohrpost_routers::impair;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -29,7 +32,8 @@ const FIRST_FUNCTION: u16 = 16;
   rohrpost demo                            a simulated robot drives and maps until Ctrl-C
   rohrpost demo --seconds 20
   rohrpost demo --log run.log.gz --speed 10
-Reads config/demo.toml (or config/demo-log.toml) of the present folder if there is one, else its own copy.")]
+  rohrpost demo --nodes 3 --seconds 30 --impair loss=5%,delay=2ms,reorder=5%
+Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml) of the present folder if there is one, else its own copy.")]
 pub(super) struct Arguments {
     /// End by itself after so many seconds.
     #[arg(long, value_name = "SECONDS")]
@@ -40,6 +44,12 @@ pub(super) struct Arguments {
     /// Times the speed at which the log was recorded.
     #[arg(long, default_value_t = 10.0, value_name = "X", requires = "log")]
     speed: f64,
+    /// Over so many computers, each a network namespace of this one.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..), conflicts_with = "log")]
+    nodes: Option<u8>,
+    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed.
+    #[arg(long, value_name = "TEXT", requires = "nodes")]
+    impair: Option<impair::Settings>,
     /// Another configuration.
     #[arg(long, value_name = "FILE", conflicts_with = "log")]
     config: Option<PathBuf>,
@@ -56,6 +66,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.seconds.map(super::units::seconds).transpose()?;
+    if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
+        return nodes::run(arguments, count, long);
+    }
     let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let node = choose_node(&installation, None)?.name.clone();
@@ -69,6 +82,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     outcome?;
     let (text, well) = summary?;
     say(text.trim_end());
+    drawn(drawing, begun);
+    Ok(if well { code } else { ExitCode::FAILURE })
+}
+
+/// Says where the drawing is that was made since.
+fn drawn(drawing: Option<PathBuf>, begun: SystemTime) {
     let is_new = |path: &PathBuf| path.metadata().and_then(|file| file.modified()).is_ok_and(|at| at >= begun);
     if let Some(path) = drawing.filter(is_new) {
         let path = path.canonicalize().unwrap_or(path);
@@ -76,7 +95,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let path = path.strip_prefix(here).unwrap_or(&path).display();
         say(format_args!("drawing: {path} (to open it: rerun {path})"));
     }
-    Ok(if well { code } else { ExitCode::FAILURE })
 }
 
 /// The file that the GUI will write, if it writes one.
@@ -111,13 +129,13 @@ fn watch(arguments: &Arguments, long: Option<Duration>, launch: &mut Launch, spe
 }
 
 /// The module of a class, if it runs.
-fn running(launch: &Launch, class: &str) -> Option<Name> {
-    let class: Class = launch.installation().classes.id(class)?;
-    launch.installation().modules.iter().flat_map(|module| module.names()).find(|name| name.class() == class)
+fn running(installation: &Installation, class: &str) -> Option<Name> {
+    let class: Class = installation.classes.id(class)?;
+    installation.modules.iter().flat_map(|module| module.names()).find(|name| name.class() == class)
 }
 
 fn progress(launch: &mut Launch) -> Option<Progress> {
-    let player = running(launch, PlayerInterface::CLASS)?;
+    let player = running(launch.installation(), PlayerInterface::CLASS)?;
     ask(launch, player, PlayerInterface::hash())
 }
 
@@ -125,6 +143,14 @@ fn progress(launch: &mut Launch) -> Option<Progress> {
 fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interface: u32) -> Option<T> {
     let read = |bytes: &[u8]| rohrpost::macro_support::from_bytes::<T>(bytes);
     launch.tool().call(module, FIRST_FUNCTION, interface, |_| Ok(()), read).ok()
+}
+
+fn map_line(counts: &MapCounts) -> String {
+    let MapCounts { scans, odometries, mapped, without_pose, free, occupied } = counts;
+    format!(
+        "map: {scans} scans and {odometries} odometry received, {mapped} scans mapped ({without_pose} without pose), \
+         {free} cells free, {occupied} occupied\n"
+    )
 }
 
 /// What there is to say at the end: packages, losses and latencies by class, and what came of them; and
@@ -148,13 +174,9 @@ fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
              {malformed} broken\n"
         ));
     }
-    let mapper = running(launch, CartographerInterface::CLASS);
+    let mapper = running(launch.installation(), CartographerInterface::CLASS);
     if let Some(counts) = mapper.and_then(|name| ask::<MapCounts>(launch, name, CartographerInterface::hash())) {
-        let MapCounts { scans, odometries, mapped, without_pose, free, occupied } = counts;
-        text.push_str(&format!(
-            "map: {scans} scans and {odometries} odometry received, {mapped} scans mapped ({without_pose} without pose), \
-             {free} cells free, {occupied} occupied\n"
-        ));
+        text.push_str(&map_line(&counts));
     }
     for module in &survey.modules {
         if let Ok(status) = launch.tool().status(module.name)

@@ -6,7 +6,7 @@ use super::Failure;
 use super::manager::Manager;
 use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
-pub(super) use all::Nodes;
+pub(super) use all::{Nodes, lab};
 use rohrpost::config::Network;
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::survey::Survey;

@@ -19,6 +19,7 @@ mod list;
 mod log;
 mod mailbox;
 mod manager;
+mod net;
 mod new;
 mod param;
 mod ping;
@@ -32,6 +33,7 @@ mod status;
 mod summary;
 mod table;
 mod target;
+mod time;
 mod top;
 mod units;
 mod version;
@@ -90,10 +92,14 @@ enum Command {
     Graph(graph::Arguments),
     /// Measure how long a module takes to answer.
     Ping(ping::Arguments),
+    /// Show how the nodes hear each other, what waits and what is lost.
+    Net(net::Arguments),
     /// Send a command over and over.
     Send(send::Arguments),
     /// Show, set, save and load the parameters of modules.
     Param(param::Arguments),
+    /// Show how well each node knows the common time.
+    Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
     /// Look whether this computer lets a robot run in time.
@@ -135,8 +141,10 @@ pub(crate) fn main() -> ExitCode {
         Command::Delay(arguments) => delay::run(&arguments),
         Command::Graph(arguments) => graph::run(&arguments),
         Command::Ping(arguments) => ping::run(&arguments),
+        Command::Net(arguments) => net::run(&arguments),
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
+        Command::Time(arguments) => time::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

@@ -81,6 +81,21 @@ pub struct ClassCarried {
     pub delivered: u64,
     /// Lost, and why.
     pub lost: Vec<CarriedLoss>,
+    /// How old data from other nodes were when they were put into mailboxes; none without data.
+    pub age: Option<Age>,
+}
+
+/// How old data are, from their stamp, by system time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Age {
+    /// Packages with a stamp.
+    pub packages: u64,
+    /// Half were not older, ns.
+    pub p50_ns: u64,
+    /// 99 of 100 were not older, ns.
+    pub p99_ns: u64,
+    /// The oldest, ns.
+    pub max_ns: u64,
 }
 
 /// Packages lost for one cause.
@@ -120,6 +135,17 @@ pub struct Links {
     pub classes: Vec<ClassCarried>,
     /// Datagrams from addresses of no node, or that are nothing of Rohrpost's.
     pub foreign: u64,
+    /// What this computer said when it was to send a datagram, and how often.
+    pub failures: Vec<SocketFailure>,
+}
+
+/// Why datagrams could not be sent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SocketFailure {
+    /// In a word: `nobody-there` (of an earlier one), `no-way`, `too-long`, `no-room`, `other`.
+    pub cause: String,
+    /// How often.
+    pub times: u64,
 }
 
 /// What a node does for the common time.

@@ -425,9 +425,10 @@ fn passes(error: &NodeError) -> bool {
 
 fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeeper, NodeError> {
     let (source, pace) = match installation.time {
-        // The router writes the master's time into the page as soon as it knows it. Launch begins it, so that nobody is without
-        // one, launch itself included; no module but the router starts before the router is ready.
-        ConfiguredTime::Local | ConfiguredTime::Master { .. } => (TimeSource::Local, 1.0),
+        ConfiguredTime::Local => (TimeSource::Local, 1.0),
+        // The router writes the master's time into the page as soon as it knows it; until then nobody is without a time, launch
+        // itself included. Another launch must not begin another epoch: all nodes would have to.
+        ConfiguredTime::Master { .. } => return TimeKeeper::await_master(node),
         ConfiguredTime::Simulation { speed } => (TimeSource::Simulation, speed),
         ConfiguredTime::Log => (TimeSource::Log, 1.0),
     };

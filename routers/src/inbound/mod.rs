@@ -144,10 +144,11 @@ impl Inbound {
         if !peer.lives(now_ns, head, &way, deliver) {
             return way.peer.received.old.add(1);
         }
-        peer.is_heard(now_ns, &way, deliver);
         if !peer.is_new(head.sequence, &way) {
             return;
         }
+        // A copy says nothing of whether its sender is still there.
+        peer.is_heard(now_ns, &way, deliver);
         way.peer.received.datagrams.add(1);
         way.peer.received.bytes.add(datagram.bytes.len() as u64);
         let is_old = now_ns.saturating_sub(datagram.arrived_ns) > SOCKET_MAX_NS && !broken!(TakesStale);

@@ -1,5 +1,6 @@
 //! The thread that reads the socket and puts what came from other nodes into the mailboxes of this one.
 
+use super::ages::Ages;
 use super::answers::Answers;
 use super::news::News;
 use super::socket::{InSocket, Received};
@@ -59,6 +60,7 @@ pub(super) struct Desk {
     pub(super) ways: Ways,
     pub(super) answers: Answers,
     pub(super) news: News,
+    pub(super) ages: Arc<Ages>,
     /// Bytes that the mailbox takes which refused the last one.
     pub(super) takes_bytes: Option<usize>,
 }
@@ -71,7 +73,10 @@ impl Report for Desk {
 
 impl Deliver for Desk {
     fn deliver(&mut self, _from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
-        let Err(error) = self.ways.send(head, body) else { return Ok(()) };
+        let Err(error) = self.ways.send(head, body) else {
+            self.ages.note(head, body);
+            return Ok(());
+        };
         Err(match error {
             SendError::Full(_) | SendError::InUse(_) => NotDelivered::MailboxFull,
             SendError::TooLarge { max, .. } => {

@@ -13,8 +13,10 @@
 //! Each thread is a participant of its own, since a participant has one bell. Neither waits for the other, takes from the heap for a
 //! package, or makes a system call but for the datagram, for sleep, and to wake whom it brings a package.
 
+mod ages;
 mod answers;
 mod arrivals;
+pub mod clock;
 mod departures;
 mod failure;
 mod news;
@@ -23,6 +25,7 @@ mod threads;
 mod transit;
 mod ways;
 
+pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
 pub use news::difference;
@@ -81,6 +84,7 @@ pub struct Shell {
     settings: Arc<Settings>,
     stats: Arc<Stats>,
     failures: Arc<Failures>,
+    ages: Arc<Ages>,
     shared: Arc<Shared>,
     socket: Arc<InSocket>,
     threads: Vec<JoinHandle<()>>,
@@ -105,6 +109,7 @@ impl Shell {
         let settings = Arc::new(settings);
         let stats = Stats::new(&settings, monotonic_ns());
         let failures = Arc::new(Failures::default());
+        let ages = Arc::new(Ages::new(node));
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         let via = transit::name(name);
         let mailbox = sender.receiver(via, transit::shape())?;
@@ -127,11 +132,12 @@ impl Shell {
                 ways: Ways::new(&receiver, Reach::Here),
                 answers: answers(&receiver),
                 news: News::new(&settings),
+                ages: ages.clone(),
                 takes_bytes: None,
             },
         };
         // From here on, whatever fails ends what has begun.
-        let mut shell = Self { settings, stats, failures, shared, socket, threads: Vec::new() };
+        let mut shell = Self { settings, stats, failures, ages, shared, socket, threads: Vec::new() };
         shell.begin("departures", move || {
             if let Err(error) = threads::schedule() {
                 tracing::warn!(
@@ -169,6 +175,11 @@ impl Shell {
     /// How often datagrams could not be sent.
     pub fn failures(&self) -> &Arc<Failures> {
         &self.failures
+    }
+
+    /// How old data are that come from other nodes.
+    pub fn ages(&self) -> &Arc<Ages> {
+        &self.ages
     }
 
     /// Whether both threads still run: if one has panicked, the process should end and be started again.

@@ -2,6 +2,7 @@
 
 use super::chance::Chance;
 use super::clock::Now;
+use super::modules::DATA_MAILBOXES;
 use super::plan::{Fault, MS, mended};
 use super::station::Arrived;
 use super::world::{Event, World};
@@ -118,7 +119,7 @@ impl World<'_> {
     }
 
     fn mailboxes(&mut self, node: usize, module: rohrpost_mailbox::Name, change: impl Fn(&mut super::host::Mailbox)) {
-        for local in [local::COMMANDS, local::REPLIES, local::DATA] {
+        for local in local::COMMANDS..local::DATA + DATA_MAILBOXES {
             if let Some(mailbox) = self.stations[node].host.boxes.get_mut(&module.with_local(local)) {
                 change(mailbox);
             }

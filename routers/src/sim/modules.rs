@@ -7,6 +7,8 @@ use super::plan::{MS, RECOVERY_NS, US};
 use super::world::{Event, World};
 use rohrpost_mailbox::{Head, Name, Options, Priority, Type, local};
 
+/// Mailboxes for data that a module has.
+pub(super) const DATA_MAILBOXES: u8 = 4;
 /// Bytes of a command and of its answer.
 const CALL_BYTES: (u64, u64) = (8, 200);
 /// A call that is valid for so long is answered, if all is well.
@@ -28,14 +30,13 @@ impl World<'_> {
         }
         for _ in 0..flow.burst {
             let len = self.chance.between(flow.bytes.0, flow.bytes.1) as u16;
-            let head = Head {
-                to: flow.to,
-                from: flow.from,
-                len,
-                kind: Type::data(1),
-                priority: Priority(flow.priority),
-                ..Head::default()
-            };
+            let (mut to, mut priority) = (flow.to, flow.priority);
+            if flow.is_mixed {
+                to = to.with_local(local::DATA + self.chance.below(DATA_MAILBOXES.into()) as u8);
+                priority = self.chance.below(256) as u8;
+            }
+            let head =
+                Head { to, from: flow.from, len, kind: Type::data(1), priority: Priority(priority), ..Head::default() };
             self.post(flow.node, head, Role::Data);
             // The router reads while the sender still writes.
             if self.chance.percent(10) && self.stations[flow.node].runs() {
@@ -92,7 +93,7 @@ impl World<'_> {
             from: its.from.with_local(local::REPLIES),
             len,
             kind: Type::command(16),
-            priority: its.from.class().priority(),
+            priority: Priority(its.priority),
             ..Head::default()
         };
         self.post(its.node, head, Role::Command { call, age_ns });

@@ -6,8 +6,8 @@ use super::plan::{Plan, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::fragment::PARTIAL_MAX;
 use crate::frame::{Frame, NodeIndex};
-use crate::inbound::{self, Datagram, Inbound, WINDOW};
-use crate::link::State;
+use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS};
+use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::settings::{NodeSettings, Settings};
@@ -22,6 +22,8 @@ use std::sync::Arc;
 pub const PORT: Port = 0;
 /// Of the configuration.
 pub(super) const DIGEST: u64 = 0x1234_5678;
+/// A router that did nothing for so long stood still: threads do not wake that late.
+const STILL_NS: u64 = 500_000_000;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
@@ -62,6 +64,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
 
 /// One life of a router's packages.
 pub struct Packages {
+    settings: Settings,
     stats: Arc<Stats>,
     outbound: Outbound,
     inbound: Inbound,
@@ -70,6 +73,11 @@ pub struct Packages {
     queue_bytes_max: u64,
     /// Taken last from the transit mailbox.
     in_hand: Option<Parcel>,
+    /// Since when it runs without standing still, and when it ran last.
+    steady_since_ns: u64,
+    polled_ns: u64,
+    /// When each peer was heard last, or the router began.
+    heard_ns: Vec<u64>,
     /// Losses when all began to be well.
     lost_before: Option<(u64, u64)>,
     /// Commands that could not be delivered here; their callers are to be told.
@@ -88,6 +96,10 @@ impl Packages {
             in_hand: None,
             lost_before: None,
             undelivered: Vec::new(),
+            steady_since_ns: now_ns,
+            polled_ns: now_ns,
+            heard_ns: vec![now_ns; settings.nodes.len()],
+            settings: settings.clone(),
             stats,
         }
     }
@@ -99,17 +111,18 @@ impl Packages {
                 io.book.saw("too old in the transit mailbox");
                 continue;
             }
-            io.book.accepted(io.life, parcel.number);
+            io.book.accepted(io.life, parcel.number, parcel.published_ns);
             io.book.saw("accepted");
             let alone = io.host.transit.is_empty();
             self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone);
+            io.book.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
             self.in_hand = Some(parcel);
         }
     }
 
     fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) {
         let package = Package { head, published_ns, body };
-        let mut watch = Watch { io, is_out: true, undelivered: &mut self.undelivered };
+        let mut watch = Watch { io, arrived_ns: None, is_out: true, undelivered: &mut self.undelivered };
         if let Accepted::Send { to, head } =
             self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch)
         {
@@ -120,10 +133,10 @@ impl Packages {
 
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
         if io.host.unsendable > 0 && io.chance.percent(50) {
-            let mut watch = Watch { io, is_out: true, undelivered: &mut self.undelivered };
+            let mut watch = Watch { io, arrived_ns: None, is_out: true, undelivered: &mut self.undelivered };
             return self.outbound.unsent(&bytes, &[], &mut watch);
         }
-        io.book.leaves(io.now, io.life, &bytes);
+        io.book.leaves(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
         io.sent.push(Sent { port: PORT, to: to.into(), bytes });
     }
@@ -145,7 +158,7 @@ impl Packages {
             };
             let role = Role::Report { call };
             let (number, head, body) = io.book.post(io.now, head, (io.node, to_node.into()), role);
-            io.book.accepted(io.life, number);
+            io.book.accepted(io.life, number, io.now.monotonic_ns);
             io.book.saw("told a caller on another node");
             self.accept(io, head, io.now.monotonic_ns, &body, false);
         }
@@ -172,7 +185,7 @@ impl Packages {
             io.book.broken(io.now, Promise::Accounts, format!("the router counts {out:?}, but did {account:?}"));
         }
         let partial = inn.packages.wrapping_sub(inn.passed + inn.lost);
-        let most = PARTIAL_MAX as u64 * self.stats.waiting.len() as u64;
+        let most = (PARTIAL_MAX * (io.plan.nodes.len() - 1)) as u64;
         if partial > most {
             io.book.broken(io.now, Promise::Bounded, format!("{partial} packages are being put together: {inn:?}"));
         }
@@ -183,8 +196,53 @@ impl Packages {
         }
     }
 
+    /// A datagram of a peer was taken.
+    fn hears(&mut self, io: &mut Io<'_>, source: Option<usize>) {
+        let Some(peer) = source else { return };
+        self.heard_ns[peer] = io.now.monotonic_ns;
+        let heard = (io.now.true_ns, io.life, io.lives[peer]);
+        io.book.heard.insert((io.node, peer), heard);
+    }
+
+    /// What this router says of its peers: a silent one is called so, and one that does not hear us.
+    fn check_links(&self, io: &mut Io<'_>) {
+        let now_ns = io.now.monotonic_ns;
+        if now_ns > self.polled_ns + STILL_NS {
+            return;
+        }
+        for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node) {
+            let state = self.stats.state(peer as NodeIndex, now_ns);
+            let since_ns = |then_ns: u64| now_ns - then_ns.max(self.steady_since_ns);
+            let is_there = matches!(state, State::Unknown | State::Alive);
+            if is_there && since_ns(self.heard_ns[peer]) > SILENT_AFTER_NS + STILL_NS {
+                let text = format!("node {peer} is {state:?} for node {}, which does not hear it", io.node);
+                io.book.broken(io.now, Promise::Links, text);
+            }
+            let (heard_ns, life, own_life) = io.book.heard.get(&(peer, io.node)).copied().unwrap_or_default();
+            let goes_on = life == io.lives[peer] && own_life == io.life;
+            let doubt_ns = io.now.true_ns - heard_ns.min(io.now.true_ns);
+            if is_there && goes_on && doubt_ns > UNHEARD_AFTER_NS + TELL_EVERY_NS + 2 * STILL_NS {
+                let text = format!("node {peer} is {state:?} for node {}, which it does not hear", io.node);
+                io.book.broken(io.now, Promise::Links, text);
+            }
+        }
+    }
+
+    /// At the end all losses on the wire are known.
+    fn check_losses(&self, io: &mut Io<'_>) {
+        for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node) {
+            let missing = io.book.missing(io.life, peer as NodeIndex);
+            let counted = self.stats.peer(peer as NodeIndex).received.missing();
+            if missing.is_some_and(|missing| missing != counted) {
+                let text =
+                    format!("of node {peer} {missing:?} datagrams never came, node {} counts {counted}", io.node);
+                io.book.broken(io.now, Promise::Links, text);
+            }
+        }
+    }
+
     fn check_well(&mut self, io: &mut Io<'_>) {
-        for node in (0..io.nodes).filter(|node| *node != io.node) {
+        for node in (0..io.plan.nodes.len()).filter(|node| *node != io.node) {
             let state = self.stats.state(node as NodeIndex, io.now.monotonic_ns);
             if state != State::Alive {
                 io.book.broken(io.now, Promise::Recovery, format!("for node {}, node {node} is {state:?}", io.node));
@@ -202,13 +260,13 @@ impl Layer for Packages {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let source = arrived.source.filter(|node| *node != io.node);
         let before = self.counted(source);
-        let ended_before = io.book.delivered_or_lost;
         let datagram = Datagram {
             source: arrived.source.map_or(STRANGER, address),
             arrived_ns: arrived.stamp.monotonic_ns,
             bytes: &arrived.bytes,
         };
-        let mut watch = Watch { io, is_out: false, undelivered: &mut self.undelivered };
+        let arrived_ns = Some(datagram.arrived_ns);
+        let mut watch = Watch { io, arrived_ns, is_out: false, undelivered: &mut self.undelivered };
         self.inbound.handle(watch.io.now.monotonic_ns, &datagram, &mut watch);
         let after = self.counted(source);
         let (taken, copies, dropped) = (after.0 - before.0, after.1 - before.1, after.2 - before.2);
@@ -219,15 +277,13 @@ impl Layer for Packages {
             io.book.broken(io.now, Promise::Accounts, text);
         }
         if taken > 0 {
-            io.book.took(io.now, io.life, &arrived.bytes);
+            io.book.took(io.now, io.life, &arrived.bytes, DIGEST);
+            self.hears(io, source);
         } else if copies > 0 {
             io.book.saw("dropped as a copy");
-            io.book.dropped_as_copy(io.now, io.life, &arrived.bytes, WINDOW);
+            io.book.dropped_as_copy(io.now, io.life, &arrived.bytes);
         } else {
             io.book.saw("dropped as wrong or old");
-            if io.book.delivered_or_lost != ended_before && !arrived.damaged {
-                io.book.saw("given up since a new life came");
-            }
         }
         self.answer(io);
     }
@@ -235,13 +291,17 @@ impl Layer for Packages {
     fn left(&mut self, _: &mut Io<'_>, _: u64, _: super::clock::Now) {}
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
+        if io.now.monotonic_ns > self.polled_ns + STILL_NS {
+            self.steady_since_ns = io.now.monotonic_ns;
+        }
+        self.polled_ns = io.now.monotonic_ns;
         self.take_in(io);
         let mut until_ns = u64::MAX;
         loop {
-            let mut watch = Watch { io, is_out: false, undelivered: &mut self.undelivered };
+            let mut watch = Watch { io, arrived_ns: None, is_out: false, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 inbound::Output::Refuse { to, bytes } => {
-                    let node = (0..io.nodes).find(|node| address(*node) == to);
+                    let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
                     if let Some(to) = node {
                         io.book.saw("refused");
                         io.sent.push(Sent { port: PORT, to, bytes: Rc::from(&self.buffer[..bytes]) });
@@ -255,7 +315,7 @@ impl Layer for Packages {
         }
         self.answer(io);
         loop {
-            let mut watch = Watch { io, is_out: true, undelivered: &mut self.undelivered };
+            let mut watch = Watch { io, arrived_ns: None, is_out: true, undelivered: &mut self.undelivered };
             match self.outbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 Output::Send { to, bytes } => {
                     let bytes = Rc::from(&self.buffer[..bytes]);
@@ -279,13 +339,15 @@ impl Layer for Packages {
 
     fn check(&mut self, io: &mut Io<'_>, well: bool) {
         self.check_accounts(io);
+        self.check_links(io);
         if well {
             self.check_well(io);
         }
     }
 
     fn close(&mut self, io: &mut Io<'_>) {
-        io.book.close(io.now, io.life);
+        io.book.close_receipts(io.now, io.life);
+        self.check_losses(io);
     }
 }
 
@@ -310,6 +372,8 @@ impl Sums {
 /// Takes what the cores tell of.
 struct Watch<'a, 'b> {
     io: &'a mut Io<'b>,
+    /// When the datagram came that is being looked at.
+    arrived_ns: Option<u64>,
     is_out: bool,
     undelivered: &'a mut Vec<Head>,
 }
@@ -320,7 +384,7 @@ impl Report for Watch<'_, '_> {
         io.book.saw(cause.word());
         io.line(|| format!("{}: from or to {peer:?}, {head:?}", cause.word()));
         let number = if self.is_out {
-            io.book.lost_before(io.now, io.life, head)
+            io.book.lost_before(io.now, io.life, head, cause)
         } else {
             io.book.lost_behind(io.now, io.life, head)
         };
@@ -345,6 +409,9 @@ impl Deliver for Watch<'_, '_> {
             Closed::Full => NotDelivered::MailboxFull,
         })?;
         io.book.saw("delivered");
+        if self.arrived_ns.is_some_and(|arrived_ns| io.now.monotonic_ns.saturating_sub(arrived_ns) > SOCKET_MAX_NS) {
+            io.book.broken(io.now, Promise::Fresh, format!("package {number} waited in the socket, and is delivered"));
+        }
         io.book.delivered(io.now, io.life, number, head.options.has(Options::REDELIVERED));
         Ok(())
     }

@@ -34,6 +34,9 @@ pub const WIRE_NS_MAX: u64 = 100 * MS;
 /// So many intervals after the last fault, and one for each that may be master, all nodes follow one.
 pub const TIMED_INTERVALS: u64 = 12;
 
+/// Nodes of two parts that were far off each other step, but a master begins an epoch only after such a pause.
+pub const EPOCH_PAUSE_NS: u64 = 10 * S;
+
 /// Classes of the modules that may stand on a node; the first is not real time.
 const CLASSES: [u8; 6] = [10, 40, 90, 140, 200, 254];
 
@@ -84,6 +87,8 @@ pub struct Flow {
     pub period_ns: u64,
     /// Shortest and longest body.
     pub bytes: (u64, u64),
+    /// Each package has any priority and one of several mailboxes.
+    pub is_mixed: bool,
     /// Packages at once; a flood has more than one, and ends with the faults.
     pub burst: u64,
 }
@@ -101,6 +106,8 @@ pub struct Calls {
     pub period_ns: u64,
     /// How long a command is valid, ns.
     pub valid_for_ns: u64,
+    /// With what priority its commands are posted; they leave with the caller's class at most.
+    pub priority: u8,
 }
 
 /// What goes wrong.
@@ -226,6 +233,8 @@ pub struct Plan {
     pub mended_ns: u64,
     /// From then on all nodes follow one master, ns.
     pub timed_ns: u64,
+    /// From then on they also have its time, ns; may be after the end.
+    pub stepped_ns: u64,
     /// No data and no call after this, ns.
     pub traffic_end_ns: u64,
     /// The end, ns.
@@ -247,6 +256,7 @@ impl Plan {
         let mended_ns = chance.between(2 * S, 6 * S);
         let masters = masters(count, &mut chance);
         let timed_ns = mended_ns + (TIMED_INTERVALS + masters.len() as u64) * shape.interval_ns;
+        let stepped_ns = timed_ns + EPOCH_PAUSE_NS;
         let traffic_end_ns = mended_ns + RECOVERY_NS + WELL_NS;
         let mut plan = Self {
             seed,
@@ -258,8 +268,13 @@ impl Plan {
             checksum: chance.percent(90),
             mended_ns,
             traffic_end_ns,
-            end_ns: (traffic_end_ns + DRAIN_NS).max(timed_ns + S),
+            end_ns: (traffic_end_ns + DRAIN_NS).max(timed_ns + S).max(if chance.percent(10) {
+                stepped_ns + S
+            } else {
+                0
+            }),
             timed_ns,
+            stepped_ns,
             masters,
             has_stamps: chance.percent(80),
             nodes,
@@ -293,17 +308,18 @@ impl Plan {
         let share_bytes_s = self.shape.rate_bytes_s / (4 * count);
         for _ in 0..count {
             let (node, from, to) = self.pair(chance);
-            let large = chance.percent(15);
+            let large = chance.percent(25);
             let most = if large { chance.between(2_000, 60_000) } else { chance.scale(16, 1400) };
             let least_period_ns = (most + 100) * S / share_bytes_s;
             let period_ns = least_period_ns.max(if large { 100 * MS } else { chance.scale(8 * MS, 200 * MS) });
-            let flood = chance.percent(20);
+            let flood = chance.percent(30);
             self.flows.push(Flow {
                 node,
                 from,
                 to: to.with_local(rohrpost_mailbox::local::DATA),
                 priority: if chance.percent(50) { from.class().0 } else { chance.below(256) as u8 },
                 period_ns: if flood { chance.between(50 * MS, 700 * MS) } else { period_ns },
+                is_mixed: chance.percent(20),
                 bytes: (if large { most / 2 } else { 8 }, most),
                 burst: if flood { chance.scale(16, 256) } else { 1 },
             });
@@ -315,12 +331,13 @@ impl Plan {
             let (node, from, to) = self.pair(chance);
             let period_ns = chance.scale(20 * MS, 300 * MS);
             let valid_for_ns = chance.between(30, 2500) * MS;
-            self.calls.push(Calls { node, from, to, period_ns, valid_for_ns });
+            let priority = if chance.percent(20) { u8::MAX } else { from.class().0 };
+            self.calls.push(Calls { node, from, to, period_ns, valid_for_ns, priority });
         }
     }
 
     fn draw_faults(&mut self, chance: &mut Chance) {
-        let count = if chance.percent(10) { 0 } else { chance.below(4 + self.nodes.len() as u64) };
+        let count = if chance.percent(10) { 0 } else { chance.below(6 + 2 * self.nodes.len() as u64) };
         for _ in 0..count {
             let fault = self.fault(chance);
             // A refusal is said up to a second later, and holds for three.
@@ -336,10 +353,10 @@ impl Plan {
         let node = chance.below(self.nodes.len() as u64) as usize;
         let to = (node + 1 + chance.below(self.nodes.len() as u64 - 1) as usize) % self.nodes.len();
         let module = chance.pick(&self.nodes[node].modules);
-        match chance.below(18) {
-            0 | 1 => Fault::Freeze { node, whole: chance.percent(30) },
+        match chance.below(20) {
+            0 | 1 | 18 => Fault::Freeze { node, whole: chance.percent(30) },
             2..5 => Fault::Restart { node },
-            5 => Fault::Cut { from: node, to },
+            5 | 19 => Fault::Cut { from: node, to },
             6 => Fault::Split { side: chance.bits() },
             7..9 => Fault::Bad { from: node, to, quality: bad(chance) },
             9 => Fault::Absent { node, module },

@@ -23,21 +23,45 @@ pub struct Outcome {
 
 /// Runs a plan.
 pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
+    run_with(plan, guard, trace, |_| {})
+}
+
+/// Runs a plan in which every router makes a mistake.
+#[cfg(any(test, feature = "broken-variants"))]
+pub fn run_broken(plan: Plan, guard: NewGuard, mistake: Mistake) -> Outcome {
+    match mistake {
+        Mistake::Packages(broken) => crate::broken::with(broken, || run(plan, guard, false)),
+        Mistake::Time(broken) => run_with(plan, guard, false, move |ticking| ticking.clock().break_it(broken)),
+    }
+}
+
+/// A mistake of a core.
+#[cfg(any(test, feature = "broken-variants"))]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Mistake {
+    /// Of those that carry packages.
+    Packages(crate::broken::Broken),
+    /// Of the one that keeps time.
+    Time(crate::time::Broken),
+}
+
+fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticking) + 'static) -> Outcome {
     let plan = Rc::new(plan);
-    let layers = routers(&plan);
+    let layers = routers(&plan, change);
     let mut world = World::new(plan, guard, layers, trace);
     world.run();
     Outcome { problems: world.book.problems, seen: world.book.seen, trace: world.trace.lines }
 }
 
 /// Routers as this version has them.
-fn routers(plan: &Rc<Plan>) -> NewLayers<'static> {
+fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayers<'static> {
     let plan = plan.clone();
     Box::new(move |node, life, now, page| {
         // Never the same again, and in no order.
         let incarnation = (plan.seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let packages = Packages::new(&settings(&plan, node, incarnation), now.monotonic_ns);
-        let ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
+        let mut ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
+        change(&mut ticking);
         vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]
     })
 }

@@ -7,6 +7,7 @@ use super::book::Book;
 use super::chance::Chance;
 use super::clock::{Clock, Now};
 use super::host::Host;
+use super::plan::Plan;
 use super::trace::Trace;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -24,12 +25,12 @@ pub struct Io<'a> {
     pub now: Now,
     /// The node's index.
     pub node: usize,
-    /// Nodes in all.
-    pub nodes: usize,
-    /// From then on all nodes have one time, true ns.
-    pub timed_ns: u64,
+    /// What was planned.
+    pub plan: &'a Plan,
     /// Counts the router's lives, over all nodes.
     pub life: u32,
+    /// The life of each node's router; 0: none.
+    pub lives: &'a [u32],
     /// Its computer.
     pub host: &'a mut Host,
     /// The books.

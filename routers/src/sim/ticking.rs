@@ -114,7 +114,7 @@ impl Layer for Ticking {
 
     fn check(&mut self, io: &mut Io<'_>, _: bool) {
         io.book.times.read(io.now, io.node, &mut io.book.problems);
-        if io.now.true_ns < io.timed_ns {
+        if io.now.true_ns < io.plan.timed_ns {
             return;
         }
         let reading = self.clock.reading(io.now.monotonic_ns);
@@ -122,7 +122,8 @@ impl Layer for Ticking {
         io.line(|| format!("time: {:?} of {own:?}, {reading:?}", self.clock.role()));
         let agreed = *io.book.master.get_or_insert(own);
         let role = if own.0.map(usize::from) == Some(io.node) { Role::Master } else { Role::Slave };
-        if agreed != own || self.clock.role() != role || !reading.synchronised || reading.term != own.1 {
+        let has_time = (reading.synchronised && reading.term == own.1) || io.now.true_ns < io.plan.stepped_ns;
+        if agreed != own || self.clock.role() != role || !has_time {
             let text = format!(
                 "node {} is {:?} of {own:?}, others of {agreed:?}; it says {reading:?}",
                 io.node,

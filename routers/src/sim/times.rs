@@ -5,8 +5,8 @@
 
 use super::book::{Problem, Promise};
 use super::clock::{Clock, Now};
-use crate::time::{Clock as Core, Role, Term, UNSYNCHRONISED_NS};
-use rohrpost_mailbox::TimeRecord;
+use crate::time::{Clock as Core, Role, Term};
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord};
 use std::collections::BTreeMap;
 
 /// The line of a term.
@@ -74,7 +74,7 @@ impl Times {
             problems.push(broken(Promise::TimeForward, text));
         }
         let term = page.term;
-        let Some(line) = self.lines.get(&term.0).filter(|_| record.error_ns < UNSYNCHRONISED_NS) else { return };
+        let Some(line) = self.lines.get(&term.0).filter(|_| record.error_ns < ERROR_UNKNOWN_NS) else { return };
         let off_ns = (i128::from(time.ns) - self.at(line, now.true_ns)).unsigned_abs();
         if off_ns > time.error.as_nanos() {
             let text = format!("node {node} is {off_ns} ns off the time of {term:?}, and says {time:?}");

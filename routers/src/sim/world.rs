@@ -7,6 +7,7 @@ use super::chance::Chance;
 use super::clock::{Clock, Now};
 use super::faults::damage;
 use super::link::Link;
+use super::modules::DATA_MAILBOXES;
 use super::plan::{MS, Plan, S, US};
 use super::station::{Arrived, Io, Layer, Port, Router, Sent, Station};
 use super::times::Times;
@@ -92,6 +93,8 @@ pub struct World<'a> {
     pub trace: Trace,
     new_layers: NewLayers<'a>,
     lives: u32,
+    /// The life of each node's router.
+    living: Vec<u32>,
     /// Datagrams that routers had, of which some come again: port, receiver, its life.
     pub(super) old: Vec<(Port, usize, u32, Arrived)>,
     sent: Vec<Sent>,
@@ -114,7 +117,7 @@ impl<'a> World<'a> {
             station.down = 1;
             for module in &node.modules {
                 servers.insert(*module, Server::new(guard, station.clock.at(0)));
-                for local in [local::COMMANDS, local::REPLIES, local::DATA] {
+                for local in local::COMMANDS..local::DATA + DATA_MAILBOXES {
                     station.host.boxes.insert(module.with_local(local), Default::default());
                 }
             }
@@ -135,6 +138,7 @@ impl<'a> World<'a> {
             trace: Trace::new(trace),
             new_layers: layers,
             lives: 0,
+            living: vec![0; count],
             old: Vec::new(),
             sent: Vec::new(),
             chance: chance.fork(),
@@ -221,8 +225,8 @@ impl<'a> World<'a> {
         let now = station.clock.at(self.now_ns);
         let Some(router) = station.router.as_mut().filter(|router| router.life == life) else { return };
         let mut io = Io {
-            nodes: self.plan.nodes.len(),
-            timed_ns: self.plan.timed_ns,
+            plan: &self.plan,
+            lives: &self.living,
             now,
             node,
             life,
@@ -289,9 +293,12 @@ impl<'a> World<'a> {
 
     fn hand_in(&mut self, node: usize, port: Port, arrived: &Arrived) {
         let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { return };
-        self.book.damaged += u64::from(arrived.damaged);
-        if self.chance.below(50) == 0 && self.old.len() < OLD_MAX && arrived.source.is_some() {
+        if self.chance.below(50) == 0 && arrived.source.is_some() {
             self.old.push((port, node, life, arrived.clone()));
+            if self.old.len() > OLD_MAX {
+                let gone = self.chance.below(OLD_MAX as u64) as usize;
+                self.old.swap_remove(gone);
+            }
         }
         self.with_router(node, life, |router, io| {
             if let Some(layer) = router.layers.get_mut(port) {
@@ -350,6 +357,7 @@ impl<'a> World<'a> {
         }
         self.lives += 1;
         let life = self.lives;
+        self.living[node] = life;
         let now = self.now(node);
         let layers = (self.new_layers)(node, life, now, self.book.times.page(node));
         self.stations[node].router = Some(Router { life, layers, sent: Default::default() });
@@ -365,6 +373,7 @@ impl<'a> World<'a> {
         let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { return };
         self.trace.line(self.now_ns, || format!("{node}/{life} the router dies"));
         self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.dies(io)));
+        self.living[node] = 0;
         let station = &mut self.stations[node];
         station.router = None;
         station.sockets.iter_mut().for_each(|socket| socket.clear());

@@ -3,9 +3,9 @@
 use super::broken::Broken;
 use super::election::{Election, Followed, Heard, State};
 use super::history::{Estimate, History, Sample};
-use super::line::{EVEN_PPB, Line};
+use super::line::{EVEN_PPB, Line, wander_ns_s};
 use super::message::{Message, Reply, Request, Sync};
-use super::{RATE_MAX_PPB, STEP_MIN_NS, Stamp, TIME_BYTES, Term, WANDER_PPB_S};
+use super::{RATE_MAX_PPB, STEP_MIN_NS, Stamp, TIME_BYTES, Term};
 use crate::frame::{BadFrame, FrameHead, HEAD_BYTES, NodeIndex};
 use rohrpost_mailbox::{SystemTime, TimeRecord, TimeSource};
 use std::collections::VecDeque;
@@ -221,7 +221,7 @@ impl Clock {
             Some(page)
                 if page.source == TimeSource::Master && page.monotonic_ns <= now_ns.saturating_add(SECOND_NS) =>
             {
-                Line::adopted(page)
+                Line::adopted(now_ns, page)
             }
             Some(page) => Line::unsynchronised(now_ns, wall_ns, page.epoch.saturating_add(1)),
             None => Line::unsynchronised(now_ns, wall_ns, 0),
@@ -372,6 +372,11 @@ impl Clock {
     /// How far the page lay off the best guess when the master was last measured, ns.
     pub fn offset_ns(&self) -> i64 {
         self.offset_ns
+    }
+
+    /// How much faster than this node's clock system time runs, as last known, ns a second.
+    pub fn rate_ppb(&self) -> i64 {
+        (self.usual_rate * 1e9).round() as i64
     }
 
     /// Delay of both ways together in the best exchange that counts, ns.
@@ -536,7 +541,7 @@ impl Clock {
             self.line.restate(self.line.record().error_ns, 0);
         } else if until_ns <= now_ns && self.is_held_over() {
             let record = self.line.record();
-            let drift_ns_s = record.drift_ns_s + wander_ns_s(span_ns);
+            let drift_ns_s = record.drift_ns_s.saturating_add(wander_ns_s(span_ns));
             self.line.restate(record.error_ns, drift_ns_s.min(2 * RATE_MAX_PPB.unsigned_abs()));
             self.stated = (now_ns.saturating_add(span_ns), span_ns.saturating_mul(2));
         }
@@ -750,11 +755,6 @@ fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<Sample> {
         low_ns: low_ns.saturating_sub(doubt_ns),
         high_ns: high_ns.saturating_add(doubt_ns),
     })
-}
-
-fn wander_ns_s(span_ns: u64) -> u64 {
-    let ns_s = u128::from(span_ns) * WANDER_PPB_S as u128 / 2 / 1_000_000_000;
-    ns_s as u64 + 1
 }
 
 fn rate_of(pace_ppb: u64) -> f64 {

@@ -10,6 +10,9 @@ use super::{RATE_MAX_PPB, WANDER_PPB_S};
 const BUCKETS: usize = 16;
 const GUESS_BUCKETS: usize = 8;
 const SLOPES: usize = GUESS_BUCKETS * (GUESS_BUCKETS - 1) / 2;
+/// A bucket whose best frames took so many times as long as the best of all, and so much more, is not asked for a guess.
+const WAITED_TIMES: i64 = 2;
+const WAITED_NS: i64 = 1_000;
 const RATE_MAX: f64 = RATE_MAX_PPB as f64 * 1e-9;
 /// Per nanosecond, so that times a span in ns it is a rate.
 const WANDER: f64 = WANDER_PPB_S as f64 * 1e-18;
@@ -102,9 +105,10 @@ impl History {
         let newest = self.buckets.last()?;
         let (rate_low, rate_high) = self.rate_interval(local_ns)?;
         let (low_ns, high_ns) = self.interval(local_ns, rate_low, rate_high)?;
-        let rate = self.slope().unwrap_or(usual_rate).clamp(rate_low, rate_high);
+        let mut recent = [Sample::default(); GUESS_BUCKETS];
+        let recent = self.recent(&mut recent);
+        let rate = self.slope(recent).unwrap_or(usual_rate).clamp(rate_low, rate_high);
         let mut guesses = [0.0; GUESS_BUCKETS];
-        let recent = self.recent();
         for (guess, sample) in guesses.iter_mut().zip(recent) {
             // Relative to the newest: as whole numbers these are larger than a double counts.
             let middle = (sample.middle_ns() - newest.low_ns) as f64;
@@ -114,13 +118,21 @@ impl History {
         Some(Estimate { offset_ns: guess_ns.clamp(low_ns, high_ns), low_ns, high_ns, rate, rate_low, rate_high })
     }
 
-    fn recent(&self) -> &[Sample] {
-        &self.buckets[self.buckets.len().saturating_sub(GUESS_BUCKETS)..]
+    /// The newest, without those of a time in which all frames waited: these say little of where in their interval the truth is.
+    fn recent<'a>(&self, room: &'a mut [Sample; GUESS_BUCKETS]) -> &'a [Sample] {
+        let newest = &self.buckets[self.buckets.len().saturating_sub(GUESS_BUCKETS)..];
+        let narrowest_ns = newest.iter().map(Sample::width_ns).min().unwrap_or(0);
+        let waited = |sample: &&Sample| sample.width_ns() > WAITED_TIMES * narrowest_ns + WAITED_NS;
+        let mut count = 0;
+        for (place, sample) in room.iter_mut().zip(newest.iter().filter(|sample| !waited(sample))) {
+            *place = *sample;
+            count += 1;
+        }
+        &room[..count]
     }
 
     /// Theil and Sen: the median of the slopes between all pairs.
-    fn slope(&self) -> Option<f64> {
-        let recent = self.recent();
+    fn slope(&self, recent: &[Sample]) -> Option<f64> {
         let (mut slopes, mut count) = ([0.0; SLOPES], 0);
         for (at, later) in recent.iter().enumerate() {
             for earlier in &recent[..at] {

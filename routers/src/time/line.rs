@@ -1,10 +1,7 @@
 //! The line that a node's system time follows: what stands in its page. It has no corner within an epoch, only bends.
 
-use super::SLEW_MAX_PPB;
-use rohrpost_mailbox::{SystemTime, TimeRecord, TimeSource};
-
-/// The bound of a node that does not know the time: 292 years.
-pub const UNSYNCHRONISED_NS: u64 = i64::MAX as u64;
+use super::{RATE_MAX_PPB, SLEW_MAX_PPB, WANDER_PPB_S};
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemTime, TimeRecord, TimeSource};
 
 /// A slower line begins so far ahead: readers go by the old one until the new one is in the page.
 const SLOWER_LEAD_NS: u64 = 1_000_000;
@@ -18,8 +15,18 @@ pub(super) const EVEN_PPB: u64 = 1_000_000_000;
 #[derive(Debug)]
 pub(super) struct Line {
     record: TimeRecord,
-    /// When slewing is over, and the pace from then on.
-    slew: Option<(u64, u64)>,
+    slew: Option<Slew>,
+}
+
+/// The line is bent for a while.
+#[derive(Clone, Copy, Debug)]
+struct Slew {
+    /// When that is over.
+    end_ns: u64,
+    /// The pace from then on.
+    pace_ppb: u64,
+    /// By how much the bound grows faster until then, ns a second: whoever is to straighten the line may die, or stand still.
+    drift_ns_s: u64,
 }
 
 impl Line {
@@ -31,15 +38,19 @@ impl Line {
             monotonic_ns: now_ns,
             system_ns: wall_ns,
             pace_ppb: EVEN_PPB,
-            error_ns: UNSYNCHRONISED_NS,
+            error_ns: ERROR_UNKNOWN_NS,
             drift_ns_s: 0,
         };
         Self { record, slew: None }
     }
 
-    /// What an earlier life of this router left.
-    pub(super) fn adopted(record: TimeRecord) -> Self {
-        Self { record, slew: None }
+    /// What an earlier life of this router left. A slave that nobody heard for long may drift faster than was stated then; a master's time
+    /// is what others go by, and drifts from nothing.
+    pub(super) fn adopted(now_ns: u64, record: TimeRecord) -> Self {
+        let age_ns = now_ns.saturating_sub(record.monotonic_ns);
+        let drift_ns_s = record.drift_ns_s.saturating_add(wander_ns_s(age_ns)).min(2 * RATE_MAX_PPB.unsigned_abs());
+        let drift_ns_s = if record.drift_ns_s == 0 { 0 } else { drift_ns_s.max(record.drift_ns_s) };
+        Self { record: TimeRecord { drift_ns_s, ..record }, slew: None }
     }
 
     pub(super) fn record(&self) -> &TimeRecord {
@@ -51,11 +62,11 @@ impl Line {
     }
 
     pub(super) fn is_synchronised(&self) -> bool {
-        self.record.error_ns < UNSYNCHRONISED_NS
+        self.record.error_ns < ERROR_UNKNOWN_NS
     }
 
     pub(super) fn slew_end_ns(&self) -> Option<u64> {
-        self.slew.map(|(end_ns, _)| end_ns)
+        self.slew.map(|slew| slew.end_ns)
     }
 
     /// The bound just now, ns.
@@ -101,30 +112,33 @@ impl Line {
             (u128::from(slew_ppb.unsigned_abs()) * 2 * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128);
         let error_ns = error_ns.saturating_add(overshoot_ns as u64).saturating_add(ROUNDING_NS);
         self.turn(now_ns, now_ns, pace_ppb.saturating_add_signed(slew_ppb));
-        self.record = TimeRecord { error_ns: error_ns.min(UNSYNCHRONISED_NS), drift_ns_s, ..self.record };
+        let slew_drift_ns_s = slew_ppb.unsigned_abs();
+        let error_ns = error_ns.min(ERROR_UNKNOWN_NS);
+        self.record = TimeRecord { error_ns, drift_ns_s: drift_ns_s + slew_drift_ns_s, ..self.record };
         self.slew = (slew_ppb != 0).then(|| {
             let takes_ns = i128::from(by_ns) * BILLION / i128::from(slew_ppb);
-            (now_ns.saturating_add(takes_ns as u64), pace_ppb)
+            Slew { end_ns: now_ns.saturating_add(takes_ns as u64), pace_ppb, drift_ns_s: slew_drift_ns_s }
         });
     }
 
     /// Straightens the line when slewing is over.
     pub(super) fn end_slew(&mut self, now_ns: u64) {
-        if let Some((_, pace_ppb)) = self.slew.take_if(|(end_ns, _)| *end_ns <= now_ns) {
-            self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
+        if self.slew.is_some_and(|slew| slew.end_ns <= now_ns) {
+            self.stop_slew(now_ns);
         }
     }
 
     /// Stops slewing, however far it came.
     pub(super) fn stop_slew(&mut self, now_ns: u64) {
-        if let Some((_, pace_ppb)) = self.slew.take() {
+        if let Some(Slew { pace_ppb, drift_ns_s, .. }) = self.slew.take() {
             self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
+            self.record.drift_ns_s = self.record.drift_ns_s.saturating_sub(drift_ns_s);
         }
     }
 
     /// From now on it is the line by which the others go: it cannot drift from itself.
     pub(super) fn become_reference(&mut self, now_ns: u64) {
-        let error_ns = self.error_ns(now_ns).saturating_add(ROUNDING_NS).min(UNSYNCHRONISED_NS - 1);
+        let error_ns = self.error_ns(now_ns).saturating_add(ROUNDING_NS).min(ERROR_UNKNOWN_NS - 1);
         self.turn(now_ns, now_ns, self.record.pace_ppb);
         self.restate(error_ns, 0);
     }
@@ -153,4 +167,10 @@ impl Line {
         let system_ns = u64::try_from(system_ns).unwrap_or(0);
         self.record = TimeRecord { monotonic_ns: base_ns, system_ns, pace_ppb, ..self.record };
     }
+}
+
+/// How much faster a bound grows, ns a second, if nobody looks for so long: the rate may change meanwhile.
+pub(super) fn wander_ns_s(span_ns: u64) -> u64 {
+    let ns_s = u128::from(span_ns) * WANDER_PPB_S as u128 / 2 / BILLION as u128;
+    u64::try_from(ns_s).unwrap_or(u64::MAX).saturating_add(1)
 }

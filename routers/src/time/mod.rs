@@ -31,6 +31,10 @@
 //!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
+#[cfg_attr(
+    not(any(test, feature = "broken-variants")),
+    allow(dead_code, unreachable_pub, reason = "mistakes are asked for, and none is made")
+)]
 mod broken;
 mod clock;
 mod election;
@@ -43,7 +47,9 @@ mod tests;
 #[cfg(any(test, feature = "broken-variants"))]
 pub use broken::Broken;
 pub use clock::{Clock, Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
-pub use line::UNSYNCHRONISED_NS;
+
+/// The bound of a node that does not know the time.
+pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;
 
 use crate::frame::HEAD_BYTES;
 

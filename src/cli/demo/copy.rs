@@ -9,11 +9,16 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
 
 const SIMULATION: &str = include_str!("../../../config/demo.toml");
 const LOG: &str = include_str!("../../../config/demo-log.toml");
+const NODES: &str = include_str!("../../../config/demo-nodes.toml");
 const BUILDING: &str = include_str!("../../../config/building.map");
 
 /// What runs. A copy is written into `temporary`.
 pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<Installation, Failure> {
-    let (name, text) = if arguments.log.is_some() { ("demo-log.toml", LOG) } else { ("demo.toml", SIMULATION) };
+    let (name, text) = match (&arguments.log, arguments.nodes) {
+        (Some(_), _) => ("demo-log.toml", LOG),
+        (None, Some(2..)) => ("demo-nodes.toml", NODES),
+        (None, _) => ("demo.toml", SIMULATION),
+    };
     let own = arguments.config.clone().unwrap_or_else(|| Path::new("config").join(name));
     let there = own.exists();
     if arguments.config.is_some() && !there {

@@ -1,7 +1,7 @@
 //! What is read of a computer: files below a root, and the few things that no file tells.
 
-use rohrpost::config::{FIFO_MAX, Installation, Scheduling, find_program};
-use rohrpost::launch::{LaunchError, choose_node};
+use super::network::Lan;
+use rohrpost::config::{FIFO_MAX, Installation, Node as NodeConfig, Scheduling, find_program};
 use rohrpost::mailbox::sys::{self, Room};
 use rohrpost::mailbox::{Node, NodeError, base_directory};
 use std::path::{Path, PathBuf};
@@ -27,20 +27,19 @@ impl Default for Needs {
 }
 
 impl Needs {
-    pub(super) fn of(installation: &Installation, node: Option<&str>) -> Result<Self, LaunchError> {
-        let node = choose_node(installation, node)?;
+    pub(super) fn of(installation: &Installation, node: &NodeConfig) -> Self {
         let modules = || installation.modules_on(&node.name);
         let priority = |module: &rohrpost::config::Module| match installation.scheduling(module.name.class()) {
             Scheduling::Fifo { priority } => priority,
             Scheduling::Normal { .. } => 0,
         };
-        Ok(Self {
+        Self {
             priority: modules().map(priority).max().unwrap_or(0),
             memory: modules().map(|module| module.memory()).sum(),
             gui: !installation.gui.show.is_empty(),
             processes: modules().count(),
             from: Some(installation.path.clone()),
-        })
+        }
     }
 }
 
@@ -61,6 +60,8 @@ pub(super) struct Asked {
     pub(super) nodes: Vec<NodeFound>,
     pub(super) bridge: Option<PathBuf>,
     pub(super) viewer: Option<PathBuf>,
+    /// The network of a configuration of several nodes.
+    pub(super) lan: Option<Lan>,
 }
 
 /// A node's directory.
@@ -85,7 +86,7 @@ pub(super) enum Seen {
 
 impl Machine {
     /// This computer.
-    pub(super) fn this(needs: &Needs) -> Self {
+    pub(super) fn this(needs: &Needs, lan: Option<Lan>) -> Self {
         let base = base_directory();
         let beside = std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned())).unwrap_or_default();
         let program = |name| find_program(name, Path::new("."), &beside);
@@ -97,6 +98,7 @@ impl Machine {
             nodes: nodes(&base),
             bridge: program("rohrpost-gui-bridge"),
             viewer: program("rerun"),
+            lan,
             base,
         };
         Self { root: "/".into(), asked }

@@ -1,12 +1,15 @@
 //! A router's counters, as it publishes them.
 
-use rohrpost::interfaces::{Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink};
-use rohrpost::mailbox::{Priority, monotonic_ns};
+use rohrpost::interfaces::{
+    Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink, SocketFailure,
+};
+use rohrpost::mailbox::{Class, Latency, Priority, monotonic_ns};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::link::State;
-use rohrpost_routers::shell::{Shell, difference};
+use rohrpost_routers::shell::{Failure, Shell, difference};
 use rohrpost_routers::stats::{Cause, ClassCounts};
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// How it stands now.
 pub(super) fn of(shell: &Shell) -> Links {
@@ -21,7 +24,13 @@ pub(super) fn of(shell: &Shell) -> Links {
         waiting_bytes: stats.waiting_bytes.get(),
         classes: classes(shell),
         foreign: stats.foreign.get(),
+        failures: failures(shell),
     }
+}
+
+fn failures(shell: &Shell) -> Vec<SocketFailure> {
+    let all = Failure::ALL.into_iter().map(|failure| (failure.word(), shell.failures().of(failure)));
+    all.filter(|(_, times)| *times > 0).map(|(cause, times)| SocketFailure { cause: cause.into(), times }).collect()
 }
 
 fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
@@ -79,9 +88,18 @@ fn classes(shell: &Shell) -> Vec<ClassCarried> {
     };
     stats.out.classes().for_each(|(class, counts)| both(class, |c| [&mut c.taken, &mut c.sent], counts));
     stats.inn.classes().for_each(|(class, counts)| both(class, |c| [&mut c.came, &mut c.delivered], counts));
+    for entry in classes.values_mut() {
+        entry.age = age(&shell.ages().of(Class(entry.class)));
+    }
     classes.into_values().rev().collect()
 }
 
+fn age(ages: &Latency) -> Option<Age> {
+    let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+    let (p50_ns, p99_ns) = (ns(ages.quantile(0.5)?), ns(ages.quantile(0.99)?));
+    Some(Age { packages: ages.count(), p50_ns, p99_ns, max_ns: ns(ages.max) })
+}
+
 fn empty(class: u8) -> ClassCarried {
-    ClassCarried { class, taken: 0, sent: 0, came: 0, delivered: 0, lost: Vec::new() }
+    ClassCarried { class, taken: 0, sent: 0, came: 0, delivered: 0, lost: Vec::new(), age: None }
 }

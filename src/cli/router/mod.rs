@@ -1,5 +1,6 @@
 //! `rohrpost router`: carries packages between this node and the others of its system. Launch starts one on each node.
 
+mod clock;
 mod faults;
 mod links;
 
@@ -11,6 +12,7 @@ use rohrpost::{Context, Module, ModuleError, Start};
 use rohrpost_modules::runtime::{exit, run_started};
 use rohrpost_routers::impair;
 use rohrpost_routers::settings::Settings;
+use rohrpost_routers::shell::clock::{ClockParts, ClockService};
 use rohrpost_routers::shell::{Parts, Shell};
 use serde::Deserialize;
 use std::process::ExitCode;
@@ -40,6 +42,7 @@ struct NoSettings {}
 
 struct RouterModule {
     shell: Shell,
+    clock: Option<ClockService>,
 }
 
 impl Router for RouterModule {}
@@ -59,15 +62,21 @@ impl Module for RouterModule {
         }
         let faults = Arc::new(faults::Encoded::new(settings.digest));
         let node = context.link().borrow().participant().node().clone();
+        let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
+        let clock = clock.map(ClockService::start).transpose()?;
         let shell = Shell::start(Parts { node: &node, name: context.me(), settings, faults, impair })?;
         context.set_period(PERIOD);
-        Ok(Self { shell })
+        Ok(Self { shell, clock })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         // Without one of its threads it is of no use; started again, it is.
         assert!(self.shell.is_well(), "a thread of the router has ended");
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
+        if let Some(clock) = &self.clock {
+            assert!(clock.is_well(), "the thread of the clock has ended");
+            context.publish_now(RouterInterface::CLOCK, &clock::of(&self.shell, clock))?;
+        }
         Ok(())
     }
 }

@@ -13,13 +13,16 @@
 mod calls;
 mod config;
 mod descriptions;
+mod frames;
 mod head;
+mod impairments;
 mod lines;
 mod logs;
 mod maps;
 mod names;
 mod parameters;
 mod planted;
+mod routers;
 mod segments;
 mod split;
 
@@ -33,7 +36,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 10] = [
+pub const TARGETS: [Target; 13] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -44,6 +47,9 @@ pub const TARGETS: [Target; 10] = [
     Target { name: "logs", run: logs::run },
     Target { name: "maps", run: maps::run },
     Target { name: "segments", run: segments::run },
+    Target { name: "frames", run: frames::run },
+    Target { name: "routers", run: routers::run },
+    Target { name: "impairments", run: impairments::run },
 ];
 
 /// A target that must fail: it shows that the fuzzer finds what is to be found.

@@ -149,7 +149,7 @@ impl Robot {
             assert!(flow.is_same(&flow.clone()));
             let _ = (flow.rate_since(None), flow.rate_since(Some(&flow.clone())), flow.is_publication());
         }
-        let _ = (node.launcher(), node.registry_epoch(), node.state_of(MAILBOX, std::process::id()));
+        let _ = (node.launcher(), node.registry_epoch(), node.route(OTHER), node.state_of(MAILBOX, std::process::id()));
         if let Ok(survey) = Survey::new(node, &INSTALLATION, "main") {
             let _ = (survey.received_per_s(&survey, MAILBOX), survey.module(MAILBOX).map(|module| module.lost));
         }
@@ -204,6 +204,7 @@ impl Robot {
     fn file(&self, which: u8) -> PathBuf {
         let mailbox = |name: Name, kind: &str| format!("{:08x}.{kind}", name.raw());
         let name = match which % 7 {
+            _ if which == u8::MAX => "routes".into(),
             0 | 1 => mailbox(MAILBOX, "mbx"),
             2 => mailbox(OTHER, "mbx"),
             3 => "node".into(),

@@ -426,7 +426,7 @@ impl World {
                 ns.wrapping_sub(time.ns)
             ));
         }
-        let truth = self.terms.get(&term.0).filter(|_| page.error_ns < crate::time::UNSYNCHRONISED_NS);
+        let truth = self.terms.get(&term.0).filter(|_| page.error_ns < rohrpost_mailbox::ERROR_UNKNOWN_NS);
         let Some(truth) = truth else { return };
         let off_ns = (i128::from(time.ns) - truth.at(now)).unsigned_abs();
         if off_ns > time.error.as_nanos() {

@@ -1,0 +1,139 @@
+//! The socket of time: what it sends and takes is stamped by the kernel, where that can.
+//!
+//! The stamp of a datagram that left comes back by the socket's queue of errors, with the datagram itself: so which one it is needs no
+//! counting.
+
+use crate::frame::{FrameHead, NodeIndex};
+use crate::time::{SentId, TIME_BYTES};
+use nix::errno::Errno;
+use nix::sys::socket::{
+    ControlMessageOwned, MsgFlags, SockaddrStorage, TimestampingFlag, recvmsg, sendto, setsockopt, sockopt,
+};
+use nix::sys::time::TimeSpec;
+use socket2::{Domain, Protocol, Socket, Type};
+use std::io::{self, IoSliceMut};
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
+
+/// Expedited forwarding, and the priority in this computer's queues, as the router's packages have.
+const TRAFFIC_CLASS: u32 = 46 << 2;
+const PRIORITY: u32 = 6;
+/// A datagram that comes back has the heads of lower layers before it.
+const RETURNED_BYTES: usize = TIME_BYTES + 128;
+const CONTROL_BYTES: usize = 512;
+
+/// What a socket has.
+pub(super) struct TimeSocket {
+    socket: UdpSocket,
+    peers: Vec<SockaddrStorage>,
+    addresses: Vec<IpAddr>,
+    control: Box<[u8]>,
+}
+
+/// A datagram that came.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Came {
+    pub(super) bytes: usize,
+    pub(super) source: IpAddr,
+    /// CLOCK_REALTIME when the kernel took it in.
+    pub(super) realtime_ns: Option<u64>,
+}
+
+impl TimeSocket {
+    /// Binds `own`; peers are reached at the port given with them.
+    pub(super) fn open(own: SocketAddr, peers: &[SocketAddr]) -> io::Result<Self> {
+        let socket = Socket::new(Domain::for_address(own), Type::DGRAM, Some(Protocol::UDP))?;
+        if own.is_ipv6() {
+            socket.set_only_v6(true)?;
+        }
+        // Refusals are not worth a failure: the network then treats these datagrams as all others.
+        let _ = if own.is_ipv4() { socket.set_tos_v4(TRAFFIC_CLASS) } else { socket.set_tclass_v6(TRAFFIC_CLASS) };
+        let _ = socket.set_priority(PRIORITY);
+        let wanted = TimestampingFlag::SOF_TIMESTAMPING_TX_SOFTWARE
+            | TimestampingFlag::SOF_TIMESTAMPING_RX_SOFTWARE
+            | TimestampingFlag::SOF_TIMESTAMPING_SOFTWARE;
+        // Without them the clock stamps by itself, and says so.
+        let _ = setsockopt(&socket, sockopt::Timestamping, &wanted);
+        socket.set_nonblocking(true)?;
+        socket.bind(&own.into())?;
+        Ok(Self {
+            socket: socket.into(),
+            peers: peers.iter().copied().map(SockaddrStorage::from).collect(),
+            addresses: peers.iter().map(SocketAddr::ip).collect(),
+            control: vec![0; CONTROL_BYTES].into(),
+        })
+    }
+
+    /// Whether a datagram of this node comes from its address.
+    pub(super) fn is_from(&self, node: NodeIndex, source: IpAddr) -> bool {
+        self.addresses.get(usize::from(node)) == Some(&source)
+    }
+
+    /// Hands a datagram to the kernel. One that it does not take is lost, as on the wire; an error that an earlier one brought
+    /// back is not in its way.
+    pub(super) fn send(&self, to: NodeIndex, datagram: &[u8]) -> bool {
+        let Some(peer) = self.peers.get(usize::from(to)) else { return false };
+        let send = || sendto(self.socket.as_raw_fd(), datagram, peer, MsgFlags::MSG_DONTWAIT);
+        match send() {
+            Err(Errno::ECONNREFUSED | Errno::EINTR) => send().is_ok(),
+            sent => sent.is_ok(),
+        }
+    }
+
+    /// The next datagram that came.
+    pub(super) fn receive(&mut self, datagram: &mut [u8]) -> Option<Came> {
+        let mut parts = [IoSliceMut::new(datagram)];
+        let fd = self.socket.as_raw_fd();
+        let message = loop {
+            match recvmsg::<SockaddrStorage>(fd, &mut parts, Some(&mut self.control), MsgFlags::MSG_DONTWAIT) {
+                // What an earlier datagram brought back: nobody listens there. It is told once.
+                Err(Errno::ECONNREFUSED | Errno::EINTR) => {}
+                Err(_) => return None,
+                Ok(message) => break message,
+            }
+        };
+        let bytes = if message.flags.contains(MsgFlags::MSG_TRUNC) { 0 } else { message.bytes };
+        let source = message.address.as_ref().and_then(address)?;
+        Some(Came { bytes, source, realtime_ns: stamp(message.cmsgs().ok()?) })
+    }
+
+    /// The next datagram that left: which it was, and CLOCK_REALTIME then.
+    pub(super) fn sent(&mut self) -> Option<(SentId, u64)> {
+        let mut returned = [0; RETURNED_BYTES];
+        loop {
+            let mut parts = [IoSliceMut::new(&mut returned)];
+            let flags = MsgFlags::MSG_ERRQUEUE | MsgFlags::MSG_DONTWAIT;
+            let message =
+                recvmsg::<SockaddrStorage>(self.socket.as_raw_fd(), &mut parts, Some(&mut self.control), flags).ok()?;
+            let (bytes, stamp) = (message.bytes, stamp(message.cmsgs().ok()?));
+            let datagram = bytes.checked_sub(TIME_BYTES).map(|heads| &returned[heads..bytes]);
+            if let (Some(realtime_ns), Some(Ok((head, _)))) = (stamp, datagram.map(FrameHead::parse)) {
+                return Some((SentId { to: head.to, sequence: head.sequence }, realtime_ns));
+            }
+        }
+    }
+}
+
+impl AsFd for TimeSocket {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
+
+fn address(of: &SockaddrStorage) -> Option<IpAddr> {
+    let v4 = of.as_sockaddr_in().map(|address| IpAddr::V4(address.ip()));
+    v4.or_else(|| of.as_sockaddr_in6().map(|address| IpAddr::V6(address.ip())))
+}
+
+fn stamp(mut messages: impl Iterator<Item = ControlMessageOwned>) -> Option<u64> {
+    messages.find_map(|message| match message {
+        ControlMessageOwned::ScmTimestampsns(stamps) => ns(stamps.system),
+        _ => None,
+    })
+}
+
+fn ns(time: TimeSpec) -> Option<u64> {
+    let seconds = u64::try_from(time.tv_sec()).ok()?;
+    let ns = seconds.checked_mul(1_000_000_000)?.checked_add(u64::try_from(time.tv_nsec()).ok()?)?;
+    (ns != 0).then_some(ns)
+}

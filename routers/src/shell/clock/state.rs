@@ -1,0 +1,85 @@
+//! What a clock's thread lets others see.
+
+use crate::frame::NodeIndex;
+use crate::time::{Clock, Reading, Role, Term};
+use rohrpost_mailbox::TimeRecord;
+use std::sync::{Mutex, PoisonError};
+
+/// How it stands with system time on this node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Snapshot {
+    /// What the node does for the common time.
+    pub role: Role,
+    /// The master that it follows, or itself.
+    pub master: Option<NodeIndex>,
+    /// The term that its time follows.
+    pub term: Term,
+    /// What its page says; by it others compute time, epoch and bound.
+    pub record: TimeRecord,
+    /// Whether the bound says anything.
+    pub synchronised: bool,
+    /// How far the page lay from the best guess at the last exchange, ns; positive: it was behind.
+    pub offset_ns: i64,
+    /// How much faster than its own clock the master's runs, ns a second.
+    pub rate_ppb: i64,
+    /// Shortest way there and back of late, ns.
+    pub delay_ns: Option<u64>,
+    /// When the master was heard last, monotonic ns.
+    pub heard_ns: Option<u64>,
+    /// Exchanges so far; and how often a clock did what it must not.
+    pub exchanges: u64,
+    /// See [`Clock::contradictions`].
+    pub contradictions: u64,
+    /// Of the last exchange: whether all its stamps were the kernel's.
+    pub by_kernel: bool,
+    /// Datagrams that were not taken.
+    pub ignored: u64,
+    /// Whether the thread runs in real time.
+    pub real_time: bool,
+}
+
+impl Snapshot {
+    pub(super) fn of(clock: &Clock, now_ns: u64) -> Self {
+        let Reading { term, synchronised, .. } = clock.reading(now_ns);
+        Self {
+            role: clock.role(),
+            master: clock.master(),
+            term,
+            record: *clock.record(),
+            synchronised,
+            offset_ns: clock.offset_ns(),
+            rate_ppb: clock.rate_ppb(),
+            delay_ns: clock.delay_ns(),
+            heard_ns: clock.heard_ns(now_ns),
+            exchanges: 0,
+            contradictions: clock.contradictions(),
+            by_kernel: false,
+            ignored: 0,
+            real_time: false,
+        }
+    }
+}
+
+/// Shared by the clock's thread and whoever wants to know.
+#[derive(Debug)]
+pub struct ClockState {
+    snapshot: Mutex<Snapshot>,
+}
+
+impl ClockState {
+    pub(super) fn new(snapshot: Snapshot) -> Self {
+        Self { snapshot: Mutex::new(snapshot) }
+    }
+
+    /// How it stands. For tools: modules read the node's page.
+    pub fn snapshot(&self) -> Snapshot {
+        *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Of the clock's thread. It never waits for who looks: then the next one is shown.
+    pub(super) fn show(&self, snapshot: &Snapshot) {
+        if let Ok(mut shown) = self.snapshot.try_lock() {
+            *shown = *snapshot;
+        }
+    }
+}

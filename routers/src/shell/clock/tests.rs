@@ -1,0 +1,117 @@
+//! Clocks on this computer, each with a wrong monotonic clock of its own: so the true error of each reading is known.
+
+use super::{ClockParts, ClockService, Skew, Snapshot};
+use crate::time::{Exchange, Role, TimeSettings};
+use rohrpost_mailbox::monotonic_ns;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::{Duration, Instant};
+
+const MS: u64 = 1_000_000;
+
+/// Nodes 0 and up on addresses 127.9.x.1 and up; each with its skew.
+struct Clocks {
+    services: Vec<Option<ClockService>>,
+    parts: Vec<(Skew, SocketAddr)>,
+    exchanges: Vec<Receiver<Exchange>>,
+    interval: Duration,
+}
+
+impl Clocks {
+    fn new(nodes: u8, interval: Duration) -> Self {
+        let address = |node: u8| IpAddr::V4(Ipv4Addr::new(127, 9, 0, node + 1));
+        // The same port on all, as in an installation: one that is free on the last is free on the others.
+        let port = UdpSocket::bind((address(nodes - 1), 0)).unwrap().local_addr().unwrap().port();
+        let begin_ns = monotonic_ns();
+        let skew = |node: u8| Skew {
+            offset_ns: u64::from(node) * 1_234 * MS,
+            rate_ppb: i64::from(node) * 30_000,
+            wander_ppb: if node == 0 { 0.0 } else { 500.0 },
+            begin_ns,
+        };
+        let parts = (0..nodes).map(|node| (skew(node), SocketAddr::new(address(node), port))).collect();
+        let mut clocks = Self { services: Vec::new(), parts, exchanges: Vec::new(), interval };
+        for node in 0..nodes {
+            clocks.services.push(None);
+            clocks.exchanges.push(sync_channel(0).1);
+            clocks.start(node);
+        }
+        clocks
+    }
+
+    fn start(&mut self, node: u8) {
+        let (observer, exchanges) = sync_channel(1 << 16);
+        let settings = TimeSettings {
+            system: 1,
+            own: node,
+            nodes: self.parts.len() as u8,
+            masters: vec![0, 1],
+            interval: self.interval,
+            digest: 7,
+            incarnation: monotonic_ns(),
+        };
+        let service = ClockService::start(ClockParts {
+            settings,
+            nodes: self.parts.iter().map(|(_, address)| *address).collect(),
+            node: None,
+            impair: None,
+            skew: Some(self.parts[usize::from(node)].0),
+            observer: Some(observer),
+        });
+        self.services[usize::from(node)] = Some(service.unwrap());
+        self.exchanges[usize::from(node)] = exchanges;
+    }
+
+    fn snapshot(&self, node: u8) -> Snapshot {
+        self.services[usize::from(node)].as_ref().unwrap().state().snapshot()
+    }
+
+    /// What a node takes for now, and how far off it says it is at most, ns.
+    fn read(&self, node: u8, true_ns: u64) -> (i128, u128) {
+        let time = self.snapshot(node).record.at(self.parts[usize::from(node)].0.local_ns(true_ns));
+        (time.ns.into(), time.error.as_nanos())
+    }
+
+    fn wait(&self, what: &str, is: impl Fn() -> bool) {
+        let end = Instant::now() + Duration::from_secs(20);
+        while !is() {
+            let snapshots: Vec<Snapshot> = (0..self.parts.len() as u8)
+                .filter(|node| self.services[usize::from(*node)].is_some())
+                .map(|node| self.snapshot(node))
+                .collect();
+            assert!(Instant::now() < end, "{what}: {snapshots:#?}");
+            std::thread::yield_now();
+        }
+    }
+
+    fn follow(&self, slaves: &[u8], master: u8) {
+        let follows = |node: &u8| {
+            let seen = self.snapshot(*node);
+            seen.synchronised && seen.role == Role::Slave && seen.term == self.snapshot(master).term
+        };
+        self.wait("slaves follow", || self.snapshot(master).role == Role::Master && slaves.iter().all(follows));
+    }
+}
+
+#[test]
+fn slaves_know_the_masters_time_within_their_bounds_and_go_on_when_it_ends() {
+    let mut clocks = Clocks::new(3, Duration::from_millis(50));
+    clocks.follow(&[1, 2], 0);
+    clocks.wait("exchanges", || clocks.snapshot(1).exchanges > 30 && clocks.snapshot(2).exchanges > 30);
+    for _ in 0..1000 {
+        for slave in [1, 2] {
+            let now_ns = monotonic_ns();
+            let ((own, error), (master, _)) = (clocks.read(slave, now_ns), clocks.read(0, now_ns));
+            assert!((own - master).unsigned_abs() <= error, "{} ns off, bound {error}", own - master);
+            assert!(error < 50 * u128::from(MS), "{error}");
+        }
+    }
+    clocks.services[0] = None;
+    let before = clocks.read(2, monotonic_ns()).0;
+    clocks.follow(&[2], 1);
+    let after = clocks.read(2, monotonic_ns()).0;
+    assert!(after > before && clocks.snapshot(2).record.epoch == 1);
+    clocks.start(0);
+    clocks.follow(&[0, 2], 1);
+    assert!(clocks.snapshot(2).ignored < 10, "{:?}", clocks.snapshot(2));
+}

@@ -1,0 +1,121 @@
+//! The datagrams of `docs/src/wire.md` are what the code writes, and reads.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_routers::frame::{Alive, Fragment, Frame, FrameHead, Kind, Reason, Refusal, VERSION};
+use rohrpost_routers::time::Term;
+use rohrpost_routers::time::message::{Message, Reply, Request, Sync};
+
+const PAGE: &str = include_str!("../../docs/src/wire.md");
+
+/// The bytes of a block: each line begins with pairs of digits, then two spaces and words.
+fn block(name: &str) -> Vec<u8> {
+    let fence = format!("\n```hex datagram-{name}\n");
+    let text = PAGE.split(&fence).nth(1).unwrap_or_else(|| panic!("no ```hex datagram-{name}"));
+    let lines = text.split("\n```").next().unwrap().lines();
+    let pairs = lines.flat_map(|line| line.split("  ").next().unwrap_or_default().split(' '));
+    pairs.map(|pair| u8::from_str_radix(pair, 16).unwrap_or_else(|_| panic!("{name}: `{pair}`"))).collect()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x} ")).collect()
+}
+
+const HEAD: FrameHead = FrameHead {
+    kind: Kind::Packages,
+    system: 1,
+    from: 1,
+    to: 0,
+    digest: 0x1122_3344_5566_7788,
+    incarnation: 1_234_567_890,
+    sequence: 0,
+};
+const PILOT: Name = Name::new(1, 140, 0, 0);
+const MOTOR: Name = Name::new(1, 200, 0, 0);
+
+/// Reads a block, and compares it with what is written.
+fn check(name: &str, head: FrameHead, rest: &[u8], read: impl FnOnce(Frame<'_>)) {
+    let there = block(name);
+    let (head_there, frame) = Frame::parse(&there).unwrap_or_else(|error| panic!("{name}: {error}"));
+    assert_eq!(head_there, head, "{name}");
+    read(frame);
+    // The heads of packages are as a little-endian computer writes them, whatever this one is.
+    if cfg!(target_endian = "little") {
+        let written = [&head.to_bytes(&[rest])[..], rest].concat();
+        assert_eq!(hex(&there), hex(&written), "{name}: left the page, right the code");
+    }
+}
+
+fn data(len: u16) -> Head {
+    let to = PILOT.with_local(2);
+    Head { to, from: MOTOR, len, kind: Type::data(1), id: 5, priority: Priority(140), ..Head::default() }
+}
+
+#[test]
+fn packages_have_the_documented_bytes() {
+    let command = Head { to: PILOT, from: MOTOR.with_local(1), kind: Type::command(1), id: 6, ..data(0) };
+    let rest = [&data(3).to_bytes()[..], &[1, 2, 3], &command.to_bytes()].concat();
+    check("packages", FrameHead { sequence: 7, ..HEAD }, &rest, |frame| {
+        let Frame::Packages(packages) = frame else { panic!("{frame:?}") };
+        assert_eq!(packages.collect::<Vec<_>>(), [(data(3), &[1, 2, 3][..]), (command, &[])]);
+    });
+}
+
+#[test]
+fn a_fragment_has_the_documented_bytes() {
+    let part = Fragment { first: 8, index: 1, count: 2, offset: 3, head: data(5), bytes: b"lo" };
+    let rest = [&part.head_bytes()[..], part.bytes].concat();
+    let head = FrameHead { kind: Kind::Fragment, sequence: 9, ..HEAD };
+    check("fragment", head, &rest, |frame| assert_eq!(frame, Frame::Fragment(part)));
+}
+
+#[test]
+fn what_carries_no_package_has_the_documented_bytes() {
+    let alive = Alive { heard_incarnation: 987_654_321, heard_next: 41, heard_lost: 2 };
+    let head = FrameHead { kind: Kind::Alive, sequence: 10, ..HEAD };
+    check("alive", head, &alive.to_bytes(), |frame| assert_eq!(frame, Frame::Alive(alive)));
+    let refusal = Refusal { version: VERSION, reason: Reason::Digest, digest: HEAD.digest };
+    let head = FrameHead { kind: Kind::Refusal, ..HEAD };
+    check("refusal", head, &refusal.to_bytes(), |frame| assert_eq!(frame, Frame::Refusal(refusal)));
+}
+
+#[test]
+fn time_has_the_documented_bytes() {
+    const NOMINAL_NS: u64 = 1_700_000_000_000_000_000;
+    let (term, epoch) = (Term::new(1, 0), 1);
+    let sync = Message::Sync(Sync {
+        id: 99,
+        cycle: 1_700_000_000,
+        nominal_ns: NOMINAL_NS,
+        sent_ns: NOMINAL_NS + 1500,
+        error_ns: 0,
+        epoch,
+        term,
+        began: term,
+        followed: true,
+    });
+    let request =
+        Message::Request(Request { id: 99, error_ns: 20_000, epoch, term, eager: false, far: false, timed: true });
+    let reply = Message::Reply(Reply {
+        id: 99,
+        sync_ns: NOMINAL_NS + 9_000,
+        request_ns: NOMINAL_NS + 250_000,
+        sent_ns: NOMINAL_NS + 300_000,
+        error_ns: 0,
+        epoch,
+        term,
+        began: term,
+        doubt_ns: 700,
+        sync_by_kernel: true,
+        request_by_kernel: true,
+    });
+    for (name, from, sequence, message) in [("sync", 0, 3, sync), ("request", 1, 4, request), ("reply", 0, 4, reply)] {
+        let kind = message.kind();
+        let head = FrameHead { kind, from, to: 1 - from, sequence, ..HEAD };
+        check(name, head, &message.to_bytes(), |frame| {
+            let Frame::Time(rest) = frame else { panic!("{frame:?}") };
+            assert_eq!(Message::parse(kind, rest), Ok(message), "{name}");
+        });
+    }
+}

@@ -1,0 +1,187 @@
+//! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
+
+use super::account::{self, Balance};
+use super::{Arguments, FIRST_FUNCTION, copy, drawn};
+use crate::cli::launch::{Nodes, lab};
+use crate::cli::speech::Speech;
+use crate::cli::summary::print_classes;
+use crate::cli::{Failure, say};
+use rohrpost::common::{GET_DATA, State};
+use rohrpost::config::{Installation, Network};
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::{CartographerInterface, Links, MapCounts, RouterInterface};
+use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
+use rohrpost::survey::Survey;
+use rohrpost::{CallError, ToolLink};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+
+/// Modules answer within this time.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Routers tell what they count twice a second; when all that was on its way has come, it stays as it is.
+const SETTLE: Duration = Duration::from_secs(8);
+const LOOK: Duration = Duration::from_millis(600);
+
+pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> Result<ExitCode, Failure> {
+    let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
+    let installation = Arc::new(copy::installation(arguments, folder.path())?);
+    let nodes = installation.nodes.len();
+    if nodes != usize::from(count) {
+        return Err(format!("{} has {nodes} nodes; say --nodes {nodes}", installation.shown.display()).into());
+    }
+    let (drawing, begun) = (super::drawing(&installation), SystemTime::now());
+    // Before the first thread, of which the speech has two.
+    let lab = lab(&installation)?;
+    let speech = Speech::begin()?;
+    speech.say(Network::UNPROTECTED);
+    let mut nodes = Nodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
+    let summary = watch(&mut nodes, long).then(|| summary(&installation));
+    let code = nodes.stop();
+    speech.settle();
+    let Some(summary) = summary else { return Ok(ExitCode::FAILURE) };
+    let (text, well) = summary?;
+    say(text.trim_end());
+    drawn(drawing, begun);
+    Ok(if well { code } else { ExitCode::FAILURE })
+}
+
+/// Until the time is over, which begins when all modules are on, or it is told to stop; false if not all ran.
+fn watch(nodes: &mut Nodes<'_>, long: Option<Duration>) -> bool {
+    let mut deadline = None;
+    let left = |deadline: Option<Instant>| {
+        deadline.map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()))
+    };
+    while nodes.watch(left(deadline)) {
+        if nodes.all_run() {
+            deadline = deadline.or(long.map(|long| Instant::now() + long));
+        }
+        if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+            break;
+        }
+    }
+    nodes.all_run()
+}
+
+/// All there is to say at the end, and whether all is well.
+fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> {
+    let open = |node: &rohrpost::config::Node| Node::open(&node_directory(&installation.name, &node.name));
+    let nodes = installation.nodes.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let (first, name) = (&nodes[0], &installation.nodes[0].name);
+    let mut tool = ToolLink::join(installation, first, name, PATIENCE)?;
+    let map = map(installation, &mut tool);
+    let errors = in_error(installation, &mut tool);
+    let (clocks, clocks_hold) = clocks(installation, &nodes);
+    let survey = |(node, config): (&Arc<Node>, &rohrpost::config::Node)| Survey::new(node, installation, &config.name);
+    let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
+    let links = settled(installation, &mut tool)?;
+    tool.close();
+    let balance = Balance::of(&links, installation.classes.tool().0);
+    let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
+    text += &print_classes(installation, &classes(&surveys));
+    text += "(data and replies carry the class of the module that asked for them)\n";
+    text += "\nOver the network, by class and node; age: from the stamp of data to the mailbox on the other node:\n\n";
+    text += &account::by_class(installation, &links);
+    text += "\nOn the wire:\n\n";
+    text += &account::by_link(&links);
+    text += &format!("\n{balance}\n{clocks}");
+    text += &map;
+    for error in &errors {
+        text += &format!("{error}\n");
+    }
+    Ok((text, errors.is_empty() && clocks_hold && balance.holds()))
+}
+
+/// What the mailboxes of all nodes did.
+fn classes(surveys: &[Survey]) -> Vec<ClassTraffic> {
+    let mut classes: Vec<ClassTraffic> = Vec::new();
+    for traffic in surveys.iter().flat_map(|survey| &survey.classes) {
+        match classes.iter_mut().find(|known| known.class == traffic.class) {
+            Some(known) => known.add(traffic),
+            None => classes.push(traffic.clone()),
+        }
+    }
+    classes.sort_by_key(|traffic| std::cmp::Reverse(traffic.class));
+    classes
+}
+
+fn map(installation: &Installation, tool: &mut ToolLink) -> String {
+    let read = |bytes: &[u8]| from_bytes::<MapCounts>(bytes);
+    let mapper = super::running(installation, CartographerInterface::CLASS);
+    let counts = mapper.map(|name| tool.call(name, FIRST_FUNCTION, CartographerInterface::hash(), |_| Ok(()), read));
+    match counts {
+        Some(Ok(counts)) => super::map_line(&counts),
+        Some(Err(error)) => format!("map: {error}\n"),
+        None => String::new(),
+    }
+}
+
+/// Modules that are in error, or do not answer.
+fn in_error(installation: &Installation, tool: &mut ToolLink) -> Vec<String> {
+    let told = |module: &rohrpost::config::Module| {
+        let name = installation.classes.format(module.name);
+        match tool.status(module.name) {
+            Ok(status) if status.state == State::Error => Some(format!("{name} is in error: {}", status.error)),
+            Err(error) if !module.optional => Some(format!("{name} does not say how it is: {error}")),
+            _ => None,
+        }
+    };
+    installation.modules.iter().filter_map(told).collect()
+}
+
+/// How far apart the clocks of the nodes are. All of them run on one computer here, so that it is known exactly: their pages are read at
+/// one moment of the one monotonic clock. False if one says that it is better than it is.
+fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
+    let clocks: Vec<SystemClock> = nodes.iter().map(|node| SystemClock::open(node)).collect();
+    let moment = monotonic_ns();
+    let times: Vec<_> = clocks.iter().map(|clock| clock.at(moment)).collect();
+    // Who is master is sure of its time, since it is that of all.
+    let master = (0..times.len()).min_by_key(|index| times[*index].error).unwrap_or(0);
+    let (mut text, mut holds) = (String::new(), true);
+    for (index, node) in installation.nodes.iter().enumerate() {
+        let by_master = clocks[index].record().is_some_and(|record| record.source == TimeSource::Master);
+        let off_ns = i128::from(times[index].ns) - i128::from(times[master].ns);
+        let stated_ns = (times[index].error + times[master].error).as_nanos();
+        let name = &node.name;
+        text += &match (by_master, index == master) {
+            (false, _) => format!("clock of {name}: its own, no master was heard\n"),
+            (true, true) => format!("clock of {name}: the master's\n"),
+            (true, false) => {
+                holds &= off_ns.unsigned_abs() <= stated_ns;
+                let (off_us, stated_us) = (off_ns as f64 / 1e3, stated_ns as f64 / 1e3);
+                format!("clock of {name}: {off_us:+.1} µs off the master's, at most {stated_us:.1} µs as it says\n")
+            }
+        };
+    }
+    if !holds {
+        text += "a clock is further off than it says\n";
+    }
+    (text, holds)
+}
+
+/// What routers counted when all that was on its way had come: the modules that send are switched off first.
+fn settled(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Links>, Failure> {
+    for module in installation.modules.iter().filter(|module| module.is_in_file()) {
+        // One that does not answer was told of above.
+        let _ = tool.switch(module.name, false);
+    }
+    let deadline = Instant::now() + SETTLE;
+    loop {
+        let links = installation.nodes.iter().map(|node| links(installation, tool, &node.name));
+        let links = links.collect::<Result<Vec<_>, _>>()?;
+        if Balance::of(&links, installation.classes.tool().0).holds() || Instant::now() >= deadline {
+            return Ok(links);
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+fn links(installation: &Installation, tool: &mut ToolLink, node: &str) -> Result<Links, Failure> {
+    let router = installation.router_of(node).ok_or("no router")?;
+    let write = |body: &mut Vec<u8>| append(body, &(RouterInterface::LINKS.number,));
+    let read = |bytes: &[u8]| from_bytes::<(u64, Links)>(bytes);
+    let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
+    let told = |error: CallError| format!("router of {node}: {error}");
+    Ok(answer.map(|(_, links)| links).map_err(told)?)
+}

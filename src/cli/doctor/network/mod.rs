@@ -1,0 +1,234 @@
+//! The network between the nodes of a configuration: address, ports, packet size, peers, time stamps.
+
+mod ask;
+
+pub(super) use ask::ask;
+
+use super::machine::{Machine, Needs};
+use super::{Finding, State};
+use std::net::IpAddr;
+
+/// What a router asks the kernel for, to hold what comes while nobody reads.
+const RECEIVE_BYTES: u64 = 8 << 20;
+/// Below it, a burst of one large package from each of a few nodes is lost.
+const RECEIVE_BYTES_LEAST: u64 = 1 << 20;
+
+/// The network of a node, as its configuration has it and as this computer sees it.
+#[derive(Clone, Debug)]
+pub(super) struct Lan {
+    pub(super) node: String,
+    pub(super) address: IpAddr,
+    pub(super) mtu: u16,
+    /// Whether this computer has the address.
+    pub(super) is_here: bool,
+    /// The addresses that it has, and on which device.
+    pub(super) addresses: Vec<(String, IpAddr)>,
+    /// That of packages, and that of time.
+    pub(super) ports: [Port; 2],
+    /// A router of this node runs here.
+    pub(super) runs: bool,
+    pub(super) stamps: Stamps,
+    pub(super) peers: Vec<Peer>,
+}
+
+/// A port that a router needs.
+#[derive(Clone, Debug)]
+pub(super) struct Port {
+    pub(super) number: u16,
+    pub(super) state: PortState,
+}
+
+/// Whether a port can be had.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum PortState {
+    Free,
+    InUse,
+    /// Not known, since the address is not here.
+    Unknown,
+    Refused(String),
+}
+
+/// Which times of datagrams the kernel tells.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Stamps {
+    Both,
+    /// Not those of leaving.
+    NoSent,
+    None(String),
+    /// There was no peer to send anything to.
+    Unknown,
+}
+
+/// Another node.
+#[derive(Clone, Debug)]
+pub(super) struct Peer {
+    pub(super) name: String,
+    pub(super) address: IpAddr,
+    /// Largest packet on the way there, as far as this computer knows.
+    pub(super) mtu: Option<u32>,
+    pub(super) reach: Reach,
+}
+
+/// What came back from a peer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// It is there, and nobody has its port.
+    NoRouter,
+    /// It is there; its router, if that was it, answers nobody who says nothing.
+    Neighbour,
+    /// Nothing.
+    Silent,
+    /// The system sends nothing there.
+    NoWay(String),
+}
+
+pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
+    let Some(lan) = &machine.asked.lan else { return Vec::new() };
+    let from = needs.from.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+    let mut findings = vec![security(&from), address(lan, &from)];
+    findings.extend(lan.ports.iter().map(|port| self::port(lan, port, &from)));
+    findings.extend(buffers(machine));
+    findings.extend(stamps(lan));
+    for peer in &lan.peers {
+        findings.push(reach(peer, lan));
+        findings.extend(mtu(peer, lan, &from));
+    }
+    findings
+}
+
+fn security(from: &str) -> Finding {
+    Finding::not(
+        State::Warn,
+        "network security",
+        format!("none, as {from} says"),
+        "packages between nodes are neither sealed nor signed: who reaches the network can read, change and send them",
+        "a network of the robot's own, without a way in from others",
+    )
+}
+
+fn address(lan: &Lan, from: &str) -> Finding {
+    let (what, why) = ("node address", "other nodes send to it, and take nothing from any other");
+    if lan.is_here {
+        let device = lan.addresses.iter().find(|(_, address)| *address == lan.address);
+        let device = device.map_or(String::new(), |(device, _)| format!(", device {device}"));
+        return Finding::ok(what, format!("{}{device}", lan.address), why);
+    }
+    let others: Vec<String> = lan.addresses.iter().map(|(device, address)| format!("{address} ({device})")).collect();
+    let others = if others.is_empty() { "none".into() } else { others.join(", ") };
+    Finding::not(
+        State::Bad,
+        what,
+        format!("{} is not one of this computer, which has {others}", lan.address),
+        why,
+        format!(
+            "run it on node {}'s own computer, or `--node` with the name of this one; or correct `address` in {from}; or give this \
+             computer the address: sudo ip address add {}/24 dev DEVICE",
+            lan.node, lan.address
+        ),
+    )
+}
+
+fn port(lan: &Lan, port: &Port, from: &str) -> Finding {
+    let what = if port.number == lan.ports[0].number { "port of packages" } else { "port of time" };
+    let why = "the node's router takes datagrams there; a firewall must let them in from all nodes";
+    let number = port.number;
+    match &port.state {
+        PortState::Free => Finding::ok(what, format!("UDP {number}, free"), why),
+        PortState::InUse if lan.runs => Finding::ok(what, format!("UDP {number}, this node's router has it"), why),
+        PortState::InUse => Finding::not(
+            State::Bad,
+            what,
+            format!("UDP {number}, another program has it"),
+            why,
+            format!(
+                "`ss -ulpn sport = {number}` names the program: stop it, or write another `port` into [network] of {from}, the same on all nodes"
+            ),
+        ),
+        PortState::Unknown => Finding::not(
+            State::Warn,
+            what,
+            format!("UDP {number}, not tried"),
+            why,
+            "first the node's address, then this again",
+        ),
+        PortState::Refused(error) => Finding::not(
+            State::Bad,
+            what,
+            format!("UDP {number}, refused: {error}"),
+            why,
+            format!("write another `port` into [network] of {from}"),
+        ),
+    }
+}
+
+fn buffers(machine: &Machine) -> Option<Finding> {
+    let (what, why) = (
+        "socket buffers",
+        "they hold what comes in while the router's thread waits for a core; what finds no room is lost",
+    );
+    let limit = machine.number("/proc/sys/net/core/rmem_max")?;
+    let is = format!("at most {} KiB for who is not root", limit >> 10);
+    Some(if limit >= RECEIVE_BYTES_LEAST {
+        Finding::ok(what, is, why)
+    } else {
+        Finding::not(State::Warn, what, is, why, format!("sudo sysctl -w net.core.rmem_max={RECEIVE_BYTES}"))
+    })
+}
+
+fn stamps(lan: &Lan) -> Option<Finding> {
+    let (what, why) = (
+        "time stamps",
+        "clocks of nodes are compared by when the kernel sent and received; else by when a thread came to run",
+    );
+    let mend = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and software-receive";
+    Some(match &lan.stamps {
+        Stamps::Both => Finding::ok(what, "sending and receiving", why),
+        Stamps::NoSent => Finding::not(State::Warn, what, "receiving only", why, mend),
+        Stamps::None(error) => Finding::not(State::Warn, what, format!("none ({error})"), why, mend),
+        Stamps::Unknown => return None,
+    })
+}
+
+fn reach(peer: &Peer, lan: &Lan) -> Finding {
+    let (what, why) = ("peer", "each node's router sends to each other one");
+    let node = format!("{} at {}", peer.name, peer.address);
+    let port = lan.ports[0].number;
+    match &peer.reach {
+        Reach::NoRouter => Finding::ok(what, format!("{node}: is there; no router runs on it yet"), why),
+        Reach::Neighbour => Finding::ok(what, format!("{node}: is there"), why),
+        Reach::Silent => Finding::not(
+            State::Warn,
+            what,
+            format!("{node}: does not answer"),
+            why,
+            format!(
+                "switch it on; look after cables and `ping {}`; a firewall must let UDP {port} and {} through (there: \
+                 `sudo nft list ruleset`)",
+                peer.address, lan.ports[1].number
+            ),
+        ),
+        Reach::NoWay(error) => Finding::not(
+            State::Bad,
+            what,
+            format!("{node}: {error}"),
+            why,
+            format!("an address in the same network as {}, or a route: `ip route get {}`", lan.address, peer.address),
+        ),
+    }
+}
+
+fn mtu(peer: &Peer, lan: &Lan, from: &str) -> Option<Finding> {
+    let (what, why) = ("packet size", "a datagram that does not fit on the way is lost, or refused by the kernel");
+    let way = peer.mtu?;
+    Some(if way >= lan.mtu.into() {
+        Finding::ok(what, format!("{} B of the {way} B that go to {}", lan.mtu, peer.name), why)
+    } else {
+        Finding::not(
+            State::Bad,
+            what,
+            format!("{} B, and only {way} B go to {}", lan.mtu, peer.name),
+            why,
+            format!("write `mtu = {way}` into [network] of {from}; or sudo ip link set dev DEVICE mtu {}", lan.mtu),
+        )
+    })
+}

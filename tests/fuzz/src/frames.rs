@@ -1,0 +1,54 @@
+//! Datagrams of routers: what one says of itself was checked as a whole, so what was read is written again, byte for byte.
+
+use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
+use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, PARTS_MAX, VERSION};
+use rohrpost_routers::time::message::Message;
+
+pub(crate) fn run(data: &[u8]) {
+    judge(data);
+    // A fuzzer does not find the check by trying, so it is given, as by a sender that makes mistakes of its own.
+    if let Some((head, rest)) = data.split_first_chunk::<HEAD_BYTES>() {
+        judge(&[&checked(head, rest)[..], rest].concat());
+    }
+}
+
+/// The head with the check that belongs to it.
+pub(crate) fn checked(head: &[u8; HEAD_BYTES], rest: &[u8]) -> [u8; HEAD_BYTES] {
+    let mut head = *head;
+    let (before, _) = head.split_at(HEAD_BYTES - 4);
+    let check = crc32fast::hash(&[before, rest].concat());
+    head[HEAD_BYTES - 4..].copy_from_slice(&check.to_le_bytes());
+    head
+}
+
+fn judge(datagram: &[u8]) {
+    let (head, frame) = match Frame::parse(datagram) {
+        Ok(read) => read,
+        Err(error) => return assert!(!error.to_string().is_empty()),
+    };
+    let rest = &datagram[HEAD_BYTES..];
+    match frame {
+        Frame::Packages(packages) => {
+            let sizes: usize = packages.map(|(_, body)| PACKAGE_HEAD_BYTES + body.len()).sum();
+            assert_eq!(sizes, rest.len(), "all of it");
+            assert!(packages.into_iter().all(|(head, body)| usize::from(head.len) == body.len()));
+        }
+        Frame::Fragment(part) => {
+            let end = part.offset as usize + part.bytes.len();
+            assert!(part.index < part.count && part.count <= PARTS_MAX && end <= usize::from(part.head.len));
+            assert_eq!(part.head_bytes()[..PACKAGE_HEAD_BYTES], rest[..PACKAGE_HEAD_BYTES]);
+            assert_eq!(Head::from_bytes(&part.head_bytes()[PACKAGE_HEAD_BYTES..]), Ok(part.head));
+        }
+        Frame::Alive(alive) => assert_eq!(alive.to_bytes(), rest),
+        Frame::Refusal(refusal) => assert_eq!(refusal.to_bytes(), rest),
+        Frame::Time(time) => {
+            if let Ok(message) = Message::parse(head.kind, time) {
+                assert_eq!((message.kind(), &message.to_bytes()[..]), (head.kind, time));
+            }
+        }
+    }
+    if datagram[2] == VERSION {
+        assert_eq!(head.to_bytes(&[rest]), datagram[..HEAD_BYTES]);
+        assert_eq!(FrameHead::parse(datagram), Ok((head, rest)));
+    }
+}
