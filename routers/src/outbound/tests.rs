@@ -52,6 +52,18 @@ fn an_idle_network_takes_a_package_from_where_it_lies() {
     assert_eq!((end.stats.waiting_in_all(), end.stats.waiting_bytes.get()), (0, 0));
 }
 
+#[test]
+fn a_package_that_no_second_could_join_waits_for_no_company() {
+    let mut end = End::new(0, |_| {});
+    // Of datagrams of 1472 B.
+    let half = (1472 - frame::HEAD_BYTES) / 2 - PACKAGE_HEAD_BYTES;
+    assert!(end.send(START, to(1, 90), &vec![0; half + 1], false).is_some());
+    assert_eq!(end.send(START, to(1, 90), &vec![0; half], false), None, "two of these fit");
+    assert_eq!(end.send(START, to(1, 90), &vec![0; half + 1], false), None, "not before the other");
+    assert_eq!(sent(&mut end, START), [(1, vec![1]), (1, vec![2])]);
+    end.assert_balanced();
+}
+
 fn check_order_on_the_wire() {
     let mut end = End::new(0, |_| {});
     for (peer, priority, len) in
