@@ -23,7 +23,7 @@ pub const PORT: Port = 0;
 /// Of the configuration.
 pub(super) const DIGEST: u64 = 0x1234_5678;
 /// A router that did nothing for so long stood still: threads do not wake that late.
-const STILL_NS: u64 = 500_000_000;
+const STILL_NS: u64 = 400_000_000;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
@@ -220,7 +220,7 @@ impl Packages {
             }
             let (heard_ns, life, own_life) = io.book.heard.get(&(peer, io.node)).copied().unwrap_or_default();
             let goes_on = life == io.lives[peer] && own_life == io.life;
-            let doubt_ns = io.now.true_ns - heard_ns.min(io.now.true_ns);
+            let doubt_ns = (io.now.true_ns - heard_ns.min(io.now.true_ns)).min(now_ns - self.steady_since_ns);
             if is_there && goes_on && doubt_ns > UNHEARD_AFTER_NS + TELL_EVERY_NS + 2 * STILL_NS {
                 let text = format!("node {peer} is {state:?} for node {}, which it does not hear", io.node);
                 io.book.broken(io.now, Promise::Links, text);
