@@ -395,7 +395,7 @@ fn shape(chance: &mut Chance) -> Shape {
     }
 }
 
-fn node(index: usize, chance: &mut Chance) -> NodePlan {
+pub(super) fn node(index: usize, chance: &mut Chance) -> NodePlan {
     let mut classes = CLASSES.to_vec();
     let kept = 1 + chance.below(4) as usize;
     while classes.len() > kept {

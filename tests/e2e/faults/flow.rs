@@ -108,7 +108,7 @@ pub(super) struct Accounts {
 }
 
 /// Waits until nothing of a class is under way, and has every package accounted for: what was sent is what came, and what each on the
-/// way counts as lost. `delayed` are further classes whose packages have datagrams of their own.
+/// way counts as lost.
 pub(super) fn balance(field: &Field, source: &Source, sink: &mut Sink, class: Class) -> Accounts {
     let (base, arm) = (field.robot("base"), field.robot("arm"));
     let transit = base.name(&router_of("base")).with_local(local::TRANSIT);

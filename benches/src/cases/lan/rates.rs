@@ -67,7 +67,14 @@ impl Case for Rate {
         let mtu = if self.packs { WHOLE } else { one };
         let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" });
         let losses = Losses::default();
-        let raw = Flow { bytes: self.bytes, messages: messages(settings), window: None, sender: End::Ping, sender_fifo: 50, cap: TURN };
+        let raw = Flow {
+            bytes: self.bytes,
+            messages: messages(settings),
+            window: None,
+            sender: End::Ping,
+            sender_fifo: 50,
+            cap: TURN,
+        };
         let beside = Flow { window: Some(WINDOW), ..raw };
         let apart = Flow { sender: End::Pong, sender_fifo: SENDER_FIFO, ..beside };
         let ours = |ours: &Flow| {

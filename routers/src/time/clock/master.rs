@@ -65,6 +65,15 @@ impl Clock {
         }
     }
 
+    /// Another master that must yield, and does not know of this one: it is told soon.
+    pub(super) fn answer_master(&mut self, now_ns: u64, other: NodeIndex) {
+        if matches!(self.election.state(), State::Master(_)) {
+            let soon_ns = now_ns.saturating_add(self.exchange_ns);
+            let slave = &mut self.slaves[usize::from(other)];
+            slave.next_ns = slave.next_ns.min(soon_ns);
+        }
+    }
+
     /// Somebody is too far off to slew, or has seen a later epoch.
     pub(super) fn begin_epoch(&mut self, now_ns: u64, theirs: u64) {
         let own = self.line.record().epoch;

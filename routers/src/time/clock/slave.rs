@@ -29,6 +29,7 @@ impl Clock {
         match self.election.sync(head.from, head.incarnation, sync, received.ns, followed) {
             Heard::Ignored => {
                 self.keep_term();
+                self.answer_master(now_ns, head.from);
                 return Err(Ignored::Late);
             }
             Heard::Turned => {
@@ -50,7 +51,8 @@ impl Clock {
         let exchange = Exchange { id: sync.id, sync_sent_ns: sync.sent_ns, sync_came: received, ..Exchange::default() };
         self.asked.rotate_right(1);
         self.asked[0] = Asked { exchange, ..Asked::default() };
-        self.drafts.retain(|(_, draft)| !matches!(draft, Draft::Request { .. }));
+        // The newest question is enough, when several Syncs came at once.
+        self.drafts.clear();
         self.drafts.push_back((head.from, Draft::WarmUp));
         self.drafts.push_back((head.from, Draft::Request { id: sync.id }));
         Ok(())
