@@ -15,7 +15,7 @@ use crate::impair::{self, Impairment};
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
 use crate::report::Report;
 use crate::settings::Settings;
-use crate::stats::Cause;
+use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{Head, Receiver, monotonic_ns, wait_any};
 use std::io::IoSlice;
 use std::sync::Arc;
@@ -24,15 +24,12 @@ use std::time::{Duration, Instant};
 
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
 const BURST: usize = 64;
-/// To wait for less than this, it sleeps with a timeout, which is exact but costs a timer of the kernel; for longer waits the thread
-/// that receives rings, within its own patience.
-const EXACT: Duration = Duration::from_millis(10);
-
 /// What the sending thread has.
 pub(super) struct Departures {
     pub(super) shared: Arc<Shared>,
     pub(super) transit: Receiver,
     pub(super) outbound: Outbound,
+    pub(super) stats: Arc<Stats>,
     pub(super) answers: Answers,
     pub(super) wire: Wire,
     /// Room for the largest datagram.
@@ -56,8 +53,9 @@ impl Departures {
                 Output::Send { to, bytes } => self.send(to, bytes),
                 Output::Wait { .. } if taken == BURST => {}
                 Output::Wait { until_ns } => {
-                    let until_ns = until_ns.min(self.wire.deliver(now_ns));
-                    self.sleep(now_ns, until_ns);
+                    let delivery_ns = self.wire.deliver(now_ns);
+                    let waits = self.stats.waiting_bytes.get() > 0 || delivery_ns < u64::MAX;
+                    self.sleep(now_ns, until_ns.min(delivery_ns), waits);
                 }
             }
             awake.pause_if_long(now_ns);
@@ -90,10 +88,10 @@ impl Departures {
         }
     }
 
-    /// Sleeps until a package comes, or until then.
-    fn sleep(&mut self, now_ns: u64, until_ns: u64) {
-        let wait = Duration::from_nanos(until_ns.saturating_sub(now_ns));
-        let deadline = if wait < EXACT { Some(Instant::now() + wait) } else { None };
+    /// Sleeps until a package comes, or until then. If something `waits` to leave, that is exact, and costs a timer of the kernel; else
+    /// the thread that receives rings, within its own patience.
+    fn sleep(&mut self, now_ns: u64, until_ns: u64, waits: bool) {
+        let deadline = waits.then(|| Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns)));
         // Before the look at the mailbox: who rings because of this time changes the bell that is slept on.
         self.shared.departures_due_ns.store(until_ns, Ordering::Release);
         wait_any(&mut [&mut self.transit], deadline, || self.shared.ends());

@@ -120,6 +120,7 @@ impl Shell {
             shared: shared.clone(),
             transit: mailbox,
             outbound: Outbound::new(&settings, stats.clone()),
+            stats: stats.clone(),
             answers: answers(&sender),
             wire: Wire::new(&settings, impair, &failures),
             datagram: vec![0; settings.network.datagram_bytes_max].into(),
