@@ -4,16 +4,17 @@
 //! mailboxes are empty soon, whatever a viewer does; and if they were not, it would be the bridge that misses something, and
 //! never a sender that waits.
 
+use crate::nodes::Nodes;
 use crate::pen::{self, Pen, Turn};
 use crate::sink::CloseError;
 use crate::store::DrawingCounts;
 use crate::subjects::{NEWEST, Subjects};
 use crate::view::Views;
 use crate::{RATE_HZ, RATE_HZ_MIN, Scene, Sink, views};
-use rohrpost::config::MailboxSpec;
+use rohrpost::config::{MailboxSpec, ROUTER};
 use rohrpost::interface::{Interface, Proxy};
 use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
-use rohrpost::mailbox::{Full, ModuleState, Node, Shape};
+use rohrpost::mailbox::{Full, Latency, ModuleState, Node, Shape};
 use rohrpost::survey::Survey;
 use rohrpost::{Context, Module, ModuleError, Name, Received};
 use serde::Deserialize;
@@ -24,6 +25,8 @@ use std::time::{Duration, Instant};
 
 /// States and charts are drawn so often.
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
+/// What comes of other nodes, page by page, is taken so often.
+const COLLECT_PERIOD: Duration = Duration::from_millis(25);
 /// Data whose newest values may wait while the bridge stands still; of more, the least important go missing.
 const NEWEST_SLOTS: u16 = 64;
 /// The collector answers within this time, or its earlier lines are not drawn.
@@ -81,7 +84,9 @@ pub struct Bridge<V> {
     lines_wanted: bool,
     node: Arc<Node>,
     node_name: String,
-    last: Option<Survey>,
+    nodes: Nodes,
+    /// When states and charts are drawn next.
+    survey_at: Instant,
     views: PhantomData<V>,
 }
 
@@ -114,7 +119,8 @@ impl<V: Views> Module for Bridge<V> {
         let node = context.link().borrow().participant().node().clone();
         context.open_mailbox(NEWEST, newest)?;
         let subjects = Subjects::new(V::make(), context);
-        context.set_period(SURVEY_PERIOD);
+        let nodes = Nodes::new(node.clone(), &node_name, context.installation());
+        context.set_period(if nodes.are_several() { COLLECT_PERIOD } else { SURVEY_PERIOD });
         Ok(Self {
             sink,
             rate_hz,
@@ -126,7 +132,8 @@ impl<V: Views> Module for Bridge<V> {
             lines_wanted: false,
             node,
             node_name,
-            last: None,
+            nodes,
+            survey_at: Instant::now(),
             views: PhantomData,
         })
     }
@@ -139,7 +146,8 @@ impl<V: Views> Module for Bridge<V> {
         // The new drawing knows nothing of what the last one knew.
         self.subjects.want_repair();
         self.lines_wanted = true;
-        let survey = Survey::new(&self.node, context.installation(), &self.node_name)?;
+        self.nodes.look(context)?;
+        let survey = self.nodes.survey(context.installation());
         self.find(context, &survey)
     }
 
@@ -149,7 +157,14 @@ impl<V: Views> Module for Bridge<V> {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        let survey = Survey::new(&self.node, context.installation(), &self.node_name)?;
+        self.nodes.collect(context);
+        let now = Instant::now();
+        if now < self.survey_at {
+            return Ok(());
+        }
+        self.survey_at = now + SURVEY_PERIOD - COLLECT_PERIOD;
+        self.nodes.look(context)?;
+        let survey = self.nodes.survey(context.installation());
         self.find(context, &survey)?;
         self.subjects.repair(context);
         let now_ns = context.now().ns;
@@ -159,10 +174,7 @@ impl<V: Views> Module for Bridge<V> {
         }
         scene.set_time(now_ns);
         states(scene, &survey, context);
-        if let Some(last) = &self.last {
-            charts(scene, &survey, last, context);
-        }
-        self.last = Some(survey);
+        charts(scene, &self.nodes, context);
         Ok(())
     }
 
@@ -203,7 +215,7 @@ impl<V> Bridge<V> {
             let process = survey.module(name).and_then(|module| module.process.as_ref());
             process.is_some_and(|process| matches!(process.state, Some(ModuleState::On | ModuleState::Off)))
         };
-        let more = self.subjects.find(context, &self.node, runs, |name| {
+        let more = self.subjects.find(context, &self.node, &self.node_name, runs, |name| {
             if Some(name.class()) == collector {
                 self.collector = Some(name);
             }
@@ -252,23 +264,25 @@ fn states(scene: &mut Scene, survey: &Survey, context: &Context) {
         let name = context.installation().classes.format(module.name);
         let state = match &module.process {
             Some(process) => process.state.map_or("starting", ModuleState::name),
+            None if module.at_ns.is_none() => "silent",
             None => "dead",
         };
         scene.module_state(&name, state, "");
     }
 }
 
-fn charts(scene: &mut Scene, survey: &Survey, last: &Survey, context: &Context) {
-    let seconds = survey.at.duration_since(last.at).as_secs_f64();
-    for class in &survey.classes {
-        let name = class.class.and_then(|id| context.installation().classes.name(id)).unwrap_or("others");
-        let before = last.classes.iter().find(|earlier| earlier.class == class.class);
-        let received = class.received - before.map_or(0, |before| before.received.min(class.received));
-        scene.traffic(name, received as f64 / seconds, class.lost_in_all());
-        let waited = before.map_or(class.latency.clone(), |before| class.latency.since(&before.latency));
-        let us = |share| waited.quantile(share).map(|time| time.as_secs_f64() * 1e6);
-        if let (Some(p50_us), Some(p99_us)) = (us(0.5), us(0.99)) {
+fn charts(scene: &mut Scene, nodes: &Nodes, context: &Context) {
+    let installation = context.installation();
+    for (class, figures) in nodes.figures(installation.classes.id(ROUTER)) {
+        let name = class.and_then(|id| installation.classes.name(id)).unwrap_or("others");
+        scene.traffic(name, figures.received_per_s, figures.lost);
+        let us = |waited: &Latency, share| waited.quantile(share).map(|time| time.as_secs_f64() * 1e6);
+        let (p50_us, p99_us) = (us(&figures.at_end, 0.5), us(&figures.at_end, 0.99));
+        if let (Some(p50_us), Some(p99_us)) = (p50_us, p99_us) {
             scene.latency(name, p50_us, p99_us);
+        }
+        if installation.nodes.len() > 1 {
+            scene.hops(name, us(&figures.in_transit, 0.99), p99_us);
         }
     }
 }

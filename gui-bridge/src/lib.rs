@@ -15,6 +15,7 @@
 //! and, while a drawing that was switched off does not end, that one's store.
 #![forbid(unsafe_code)]
 
+mod asking;
 mod blueprint;
 mod bridge;
 mod charts;
@@ -22,6 +23,8 @@ mod feeder;
 mod files;
 pub mod generic;
 mod line;
+mod network;
+mod nodes;
 mod palette;
 mod pen;
 mod scene;

@@ -7,12 +7,13 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The states of a module, and their colours as 0xRRGGBBAA.
-const STATES: [(&str, u32); 5] = [
+const STATES: [(&str, u32); 6] = [
     ("starting", 0x5B8D_EFFF),
     ("off", 0x6B74_80FF),
     ("on", 0x3FA7_60FF),
     ("error", 0xE6A0_1FFF),
     ("dead", 0xD643_4EFF),
+    ("silent", 0xA97B_D6FF),
 ];
 
 /// A line is cut after this many bytes.
@@ -74,7 +75,8 @@ impl States {
 }
 
 impl Scene {
-    /// `module` is in this state: `starting`, `off`, `on`, `error` or `dead`. Said again it changes nothing, so it may
+    /// `module` is in this state: `starting`, `off`, `on`, `error`, `dead`, or `silent`: its node
+    /// does not answer. Said again it changes nothing, so it may
     /// come with every poll. `text` says why, and becomes a line of output; leave it empty if there is nothing to say.
     pub fn module_state(&mut self, module: &str, state: &str, text: &str) {
         let lane = entity(&["modules", module]);

@@ -1,5 +1,6 @@
 //! What the bridge draws of which module: wanted by the configuration, described by the module, drawn by a view.
 
+use crate::asking::Asking;
 use crate::blueprint::{Layout, Tab};
 use crate::view::{Datum, View};
 use crate::{Scene, views};
@@ -8,6 +9,7 @@ use rohrpost::description::{DataItem, Description};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
 use rohrpost::mailbox::{Node, local};
+use rohrpost::survey::node_of;
 use rohrpost::{Context, ContextError, Name, Rate, Received, Subscription};
 use std::time::{Duration, Instant};
 
@@ -26,6 +28,8 @@ struct Entry {
     rate: Option<Rate>,
     /// Its module has described itself.
     answered: bool,
+    /// It is on another node, and being asked.
+    asking: Option<Asking>,
 }
 
 /// Data that are subscribed to.
@@ -67,6 +71,7 @@ impl Subjects {
             data: show.data.clone(),
             rate: show.rate.map(Rate::hz),
             answered: false,
+            asking: None,
         };
         let mut entries: Vec<Entry> = installation.gui.show.iter().map(entry).collect();
         if let Some(class) = installation.classes.id(CollectorInterface::CLASS) {
@@ -78,26 +83,39 @@ impl Subjects {
                     data: Some("line".into()),
                     rate: None,
                     answered: false,
+                    asking: None,
                 });
             }
+        }
+        // With one node there are none.
+        let routers = installation.nodes.iter().filter_map(|node| installation.router_of(&node.name));
+        for (router, data) in routers.flat_map(|router| [(router, "links"), (router, "clock")]) {
+            let (module, data) = (text(router), Some(data.into()));
+            entries.push(Entry { from: router, module, data, rate: None, answered: false, asking: None });
         }
         let views = own.into_iter().chain(views::built_in()).collect();
         Self { views, entries, subjects: Vec::new() }
     }
 
     /// Reads the descriptions that are missing of modules that run, and subscribes to what they tell; whether there is more than
-    /// before. Modules note their descriptions beside their mailboxes, so nobody is asked, and nobody waited for.
+    /// before. Modules note their descriptions beside their mailboxes; those of other nodes are asked. Nobody is waited for.
     pub(crate) fn find(
         &mut self,
         context: &mut Context,
         node: &Node,
+        own: &str,
         runs: impl Fn(Name) -> bool,
         mut found: impl FnMut(Name),
     ) -> Result<bool, ContextError> {
         let before = self.subjects.len();
         for entry in self.entries.iter_mut().filter(|entry| !entry.answered && runs(entry.from)) {
-            let Some(description) = Description::noted(node, entry.from) else { continue };
-            entry.answered = true;
+            let is_own = node_of(context.installation(), entry.from) == Some(own);
+            let description = match is_own {
+                true => Description::noted(node, entry.from),
+                false => entry.asking.get_or_insert_default().poll(context, entry.from),
+            };
+            let Some(description) = description else { continue };
+            (entry.answered, entry.asking) = (true, None);
             let items = entry.items(&description, &self.views);
             for item in items {
                 let known = |subject: &Subject| subject.from == entry.from && subject.item.number == item.number;

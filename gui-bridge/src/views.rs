@@ -1,6 +1,7 @@
 //! The views that are built in: a scan is a scan, whoever sends it, and what nobody knows is drawn by its description.
 
 use crate::blueprint::Tab;
+use crate::network::{Clocks, Network};
 use crate::scene::{DrawError, Scene};
 use crate::states::Level;
 use crate::view::{Datum, View, Wish};
@@ -13,10 +14,19 @@ use rohrpost::value::Data;
 
 /// All of them; the last wants everything.
 pub(crate) fn built_in() -> Vec<Box<dyn View>> {
-    vec![Box::new(Laser), Box::new(Wheels), Box::new(Mapper), Box::new(Localisation), Box::new(Output), Box::new(Other)]
+    vec![
+        Box::new(Laser),
+        Box::new(Wheels),
+        Box::new(Mapper),
+        Box::new(Localisation),
+        Box::new(Output),
+        Box::new(Network::default()),
+        Box::new(Clocks),
+        Box::new(Other),
+    ]
 }
 
-fn is<T: Data>(item: &DataItem) -> bool {
+pub(crate) fn is<T: Data>(item: &DataItem) -> bool {
     item.ty == T::schema()
 }
 

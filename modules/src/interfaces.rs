@@ -5,7 +5,7 @@ mod router;
 
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
-    RouterInterface, RouterProxy,
+    RouterInterface, RouterProxy, SocketFailure,
 };
 
 use crate::interface;

@@ -160,10 +160,11 @@ impl Survey {
             flows: Vec::new(),
         };
         for survey in surveys {
+            let node = survey.node;
             all.modules.extend(survey.modules);
             all.mailboxes.extend(survey.mailboxes);
             add(&mut all.classes, &survey.classes);
-            let counts = |flow: &FlowInfo| !is_hop(installation, flow) || is_of(installation, flow.from, silent);
+            let counts = |flow: &FlowInfo| !is_hop(installation, &node, flow) || is_of(installation, flow.from, silent);
             all.flows.extend(survey.flows.into_iter().filter(counts));
         }
         for node in silent {
@@ -212,8 +213,9 @@ fn survey(
     let own: Vec<&MailboxInfo> = mailboxes.iter().filter(own).collect();
     let classes = || own.iter().flat_map(|mailbox| &mailbox.classes);
     let process = participants.iter().find(|participant| participant.module == name).cloned();
-    let incarnation = process.as_ref().map(|process| process.incarnation);
-    let sends = |flow: &&FlowInfo| Some(flow.incarnation) == incarnation && !flow.is_publication();
+    // Not by its incarnation alone: threads that send take part on their own.
+    let pid = process.as_ref().map(|process| process.pid);
+    let sends = |flow: &&FlowInfo| Some(flow.pid) == pid && !flow.is_publication();
     let mut waited = Latency::default();
     classes().for_each(|class| waited.add(&class.latency));
     ModuleSurvey {
@@ -280,11 +282,10 @@ fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<Cl
     sum(&mailboxes)
 }
 
-/// Whether a flow is the last part of the way of packages that came from another node: a router sends them under the name of
-/// their sender, which counts them itself.
-pub fn is_hop(installation: &Installation, flow: &FlowInfo) -> bool {
-    let router = installation.classes.id(ROUTER);
-    flow.module != Name::NONE && Some(flow.module.class()) == router && flow.from.module() != flow.module
+/// Whether a flow that was seen on this node is the last part of the way of packages that came from another one: a router sends them
+/// under the name of their sender, which counts them itself on its own node.
+pub fn is_hop(installation: &Installation, node: &str, flow: &FlowInfo) -> bool {
+    node_of(installation, flow.from).is_some_and(|origin| origin != node)
 }
 
 /// A mailbox down to its slots.

@@ -45,9 +45,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let module = watched.module;
         let flows = survey.flows.into_iter().filter(|flow| !flow.is_publication());
         // All that comes in is counted on the module's node: what comes from another one, by the router that delivers it.
-        let installation = &watched.running.installation;
-        let counts =
-            |flow: &FlowInfo| flow.to.module() == module || flow.from.module() == module && !is_hop(installation, flow);
+        let (installation, node) = (&watched.running.installation, survey.node.as_str());
+        let counts = |flow: &FlowInfo| {
+            flow.to.module() == module || flow.from.module() == module && !is_hop(installation, node, flow)
+        };
         watched.tracks.look(survey.at_ns, flows.filter(counts));
         Ok(())
     };

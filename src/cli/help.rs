@@ -3,13 +3,14 @@
 use clap::{Command, CommandFactory};
 
 /// Headings and their subcommands, in the order of a newcomer's days.
-const GROUPS: [(&str, &[&str]); 6] = [
+const GROUPS: [(&str, &[&str]); 7] = [
     ("To begin", &["demo", "new", "check", "launch"]),
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
     ("One of its modules", &["restart", "stop", "start"]),
     ("To measure", &["hz", "bw", "delay", "mailbox", "graph", "ping", "send"]),
+    ("Several nodes", &["net"]),
     ("This computer", &["doctor", "bench", "clean", "completions", "version"]),
-    ("Else", &["run", "help"]),
+    ("Else", &["run", "router", "help"]),
 ];
 
 /// The command line, with its subcommands in groups.

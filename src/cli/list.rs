@@ -53,11 +53,17 @@ struct NodeLine {
     node: String,
     /// Why not, if it does not.
     silent: Option<String>,
+    /// For how long, as far as it is known.
+    silent_s: Option<f64>,
 }
 
 fn node_line(node: &str, silent: &[Silence]) -> NodeLine {
     let silence = silent.iter().find(|silence| silence.node == node);
-    NodeLine { node: node.into(), silent: silence.map(|silence| silence.why.clone()) }
+    NodeLine {
+        node: node.into(),
+        silent: silence.map(|silence| silence.why.clone()),
+        silent_s: silence.and_then(|silence| silence.silent_s),
+    }
 }
 
 #[derive(Serialize)]

@@ -19,6 +19,7 @@ mod list;
 mod log;
 mod mailbox;
 mod manager;
+mod net;
 mod new;
 mod param;
 mod ping;
@@ -91,6 +92,8 @@ enum Command {
     Graph(graph::Arguments),
     /// Measure how long a module takes to answer.
     Ping(ping::Arguments),
+    /// Show how the nodes hear each other, what waits and what is lost.
+    Net(net::Arguments),
     /// Send a command over and over.
     Send(send::Arguments),
     /// Show, set, save and load the parameters of modules.
@@ -138,6 +141,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Delay(arguments) => delay::run(&arguments),
         Command::Graph(arguments) => graph::run(&arguments),
         Command::Ping(arguments) => ping::run(&arguments),
+        Command::Net(arguments) => net::run(&arguments),
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
         Command::Time(arguments) => time::run(&arguments),

@@ -4,12 +4,17 @@
 use super::Failure;
 use super::summary::is_left_out;
 use super::target::Running;
-use rohrpost::ToolLink;
+use super::units::short;
+use rohrpost::common::GET_DATA;
 use rohrpost::config::Installation;
 use rohrpost::description::Description;
+use rohrpost::interfaces::{LinkState, Links, RouterInterface};
 use rohrpost::launch::{Look, launcher_of};
-use rohrpost::mailbox::{InspectError, Name};
+use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::mailbox::{InspectError, Name, SendError, realtime_ns};
+use rohrpost::output::iso;
 use rohrpost::survey::{LookFailure, MailboxLook, Scope, Seen, Survey, look_at_all};
+use rohrpost::{CallError, Fault, ToolLink};
 use serde::Serialize;
 use std::cell::RefCell;
 use std::time::Duration;
@@ -46,11 +51,26 @@ pub(super) struct Silence {
     pub(super) node: String,
     /// Why, in words.
     pub(super) why: String,
+    /// For how long, as far as it is known.
+    pub(super) silent_s: Option<f64>,
 }
 
 impl Silence {
+    pub(super) fn new(node: &str, why: impl Into<String>) -> Self {
+        Self { node: node.into(), why: why.into(), silent_s: None }
+    }
+
+    /// Silent, and since when: a moment of today, or of the day that it was.
+    pub(super) fn since(&self) -> String {
+        self.silent_s.map_or("silent".into(), |silent_s| {
+            let now_ns = realtime_ns();
+            let since = iso(now_ns.saturating_sub((silent_s * 1e9) as u64));
+            format!("silent since {} ({})", since.split('.').next().unwrap_or_default(), short(silent_s))
+        })
+    }
+
     pub(super) fn text(&self) -> String {
-        format!("node {} is silent: {}", self.node, self.why)
+        format!("node {} is {}: {}", self.node, self.since(), self.why)
     }
 }
 
@@ -75,9 +95,7 @@ impl Running {
             Ok(match seen.next() {
                 Some(Ok(Seen::Survey(survey))) => Ok(*survey),
                 Some(Err(failure)) => Err(silence(&self.installation, node, &failure)),
-                Some(Ok(Seen::Mailbox(_))) | None => {
-                    Err(Silence { node: (*node).into(), why: "it was not asked".into() })
-                }
+                Some(Ok(Seen::Mailbox(_))) | None => Err(Silence::new(node, "it was not asked")),
             })
         };
         nodes.iter().map(look).collect()
@@ -101,8 +119,35 @@ impl Running {
                 Err(silence) => silent.push(silence),
             }
         }
+        self.add_since(&mut silent);
         let names: Vec<&str> = silent.iter().map(|silence| silence.node.as_str()).collect();
         Ok((Survey::joined(surveys, &names, &self.installation), silent))
+    }
+
+    /// Since when nodes are silent, if the own router knows it.
+    fn add_since(&self, silent: &mut [Silence]) {
+        if silent.is_empty() {
+            return;
+        }
+        let Some(links) = self.links() else { return };
+        for silence in silent {
+            let link = links.peers.iter().find(|link| link.node == silence.node);
+            let quiet = link.filter(|link| link.state != LinkState::Alive).and_then(|link| link.heard_ms);
+            silence.silent_s = quiet.map(|heard_ms| heard_ms as f64 / 1e3);
+        }
+    }
+
+    /// What the own node's router says of its links; none without a router that answers.
+    fn links(&self) -> Option<Links> {
+        let router = self.installation.router_of(&self.node_name)?;
+        let port = RouterInterface::LINKS;
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let read = |bytes: &[u8]| from_bytes::<(u64, Links)>(bytes);
+        self.sight
+            .with(self, |tool| tool.call(router, GET_DATA, (port.hash)(), write, read))
+            .ok()?
+            .map(|(_, links)| links)
+            .ok()
     }
 
     /// The modules of all nodes that are meant, but for those that need not run; with why, those that cannot be asked.
@@ -146,5 +191,18 @@ impl Running {
 /// Why a node does not show itself, without the number of its launch.
 pub(super) fn silence(installation: &Installation, node: &str, failure: &LookFailure) -> Silence {
     let launch = launcher_of(installation, node).map(|name| name.to_string()).unwrap_or_default();
-    Silence { node: node.into(), why: failure.to_string().replace(&launch, "its launch") }
+    let why = match failure {
+        // A router has found out.
+        LookFailure::Call(CallError::Fault(_, Fault::NodeSilent { .. })) => {
+            "nothing comes from it; is it on, does its router run, and is it reached at its address? (`rohrpost net`)"
+                .into()
+        }
+        LookFailure::Call(CallError::Fault(_, Fault::NoMailbox)) => "it has no launch; is it launched?".into(),
+        LookFailure::Call(CallError::Fault(_, fault)) => fault.to_string(),
+        LookFailure::Call(CallError::NotSent(SendError::NoMailbox(_) | SendError::NoRouter { .. })) => {
+            "the router of this node does not run (`rohrpost list`)".into()
+        }
+        other => other.to_string().replace(&launch, "its launch"),
+    };
+    Silence::new(node, why)
 }

@@ -1,6 +1,6 @@
 //! The demo, as its user sees it.
 
-use crate::harness::{Place, probe, runs, wait};
+use crate::harness::{Place, probe, runs, skipped, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 
@@ -32,6 +32,26 @@ fn the_simulated_robot_maps_and_says_what_came_of_it() {
     assert_eq!(number(&said, " lost\n"), 0, "{said}");
     assert!(number(&said, " scans mapped (") > 5, "{said}");
     assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+    place.assert_empty();
+}
+
+/// The same robot over three nodes, on a network that loses, delays and reorders.
+#[test]
+fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_for() {
+    let place = Place::new();
+    let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
+    let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "--impair", bad]);
+    if said.err.contains("network namespaces cannot be made here") {
+        return skipped(&said.err);
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let said = said.out;
+    assert!(said.contains("the accounts balance\n"), "{said}");
+    assert!(number(&said, " scans mapped (") > 5, "{said}");
+    assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+    let lost = said.lines().find_map(|line| line.strip_prefix("base → brain"));
+    let lost: Vec<u64> = lost.unwrap().split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    assert!(lost[4] > 0, "5 % of some hundred datagrams:\n{said}");
     place.assert_empty();
 }
 

@@ -185,6 +185,14 @@ impl Place {
         Robot { installation, node, node_name: node_name.into() }
     }
 
+    /// A node that is there, whoever launched it.
+    pub(crate) fn robot_at(&self, config: &Path, node_name: &str) -> Robot {
+        let installation = Installation::load(config).unwrap();
+        let base = node_directory(&installation.name, node_name);
+        let node = Node::open(&self.memory().join(base.file_name().unwrap())).unwrap();
+        Robot { installation, node, node_name: node_name.into() }
+    }
+
     /// Nothing of any node is left.
     #[track_caller]
     pub(crate) fn assert_empty(&self) {

@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod all_nodes;
 mod bench;
 mod boot;
 mod check;
@@ -14,8 +15,10 @@ mod control;
 mod crash;
 mod demo;
 mod doctor;
+mod faults;
 mod harness;
 mod lan;
+mod lan_tools;
 mod launch;
 mod looks;
 mod mailbox;

@@ -62,6 +62,8 @@ pub struct PeerLink {
     pub damaged: u64,
     /// Datagrams from it that came after later ones.
     pub overtaken: u64,
+    /// Datagrams with its address that were not taken: of another version or configuration, or of another life of its router.
+    pub refused: u64,
     /// Times that its router was started anew.
     pub restarts: u64,
 }
@@ -135,6 +137,17 @@ pub struct Links {
     pub classes: Vec<ClassCarried>,
     /// Datagrams from addresses of no node, or that are nothing of Rohrpost's.
     pub foreign: u64,
+    /// What this computer said when it was to send a datagram, and how often.
+    pub failures: Vec<SocketFailure>,
+}
+
+/// Why datagrams could not be sent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SocketFailure {
+    /// In a word: `nobody-there` (of an earlier one), `no-way`, `too-long`, `no-room`, `other`.
+    pub cause: String,
+    /// How often.
+    pub times: u64,
 }
 
 /// What a node does for the common time.

@@ -77,8 +77,8 @@ pub(super) struct Output {
     suppressed: AtomicU64,
     out: Arc<Out>,
     print: Print,
-    /// Whether the configuration has a collector on this node. Where there is none, nothing waits for it: what is said is
-    /// counted as lost, and errors are printed.
+    /// Whether the configuration has a collector, on whichever node: routers lead there. Where there is none, nothing waits for it:
+    /// what is said is counted as lost, and errors are printed.
     collected: bool,
 }
 
@@ -122,7 +122,7 @@ impl Output {
             suppressed: AtomicU64::new(0),
             out,
             print,
-            collected: installation.module(to).is_some_and(|to| Some(to.node.as_str()) == installation.node_of(me)),
+            collected: installation.module(to).is_some(),
         })
     }
 }
@@ -403,7 +403,7 @@ impl Output {
             self.lose(&line);
             return true;
         }
-        let gone = matches!(error, SendError::NoMailbox(_));
+        let gone = matches!(error, SendError::NoMailbox(_) | SendError::NoRouter { .. });
         if gone {
             way.sender = None;
         }

@@ -1,6 +1,6 @@
 //! The subscribing side of continuous data: asks, renews, and sees gaps.
 
-use crate::call::{CallError, Link};
+use crate::call::{CallError, Fault, Link};
 use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use crate::interface::append;
 use rohrpost_mailbox::Name;
@@ -153,8 +153,13 @@ impl Followed {
             Err(error) => {
                 self.next = now + RETRY;
                 let text = error.to_string();
-                // A module that is not there yet is the usual case at the start, and not worth a warning.
-                let early = matches!(error, CallError::NotSent(_) | CallError::Timeout(..));
+                // A module or node that is not there yet is the usual case at the start, and not worth a warning.
+                let early = matches!(
+                    error,
+                    CallError::NotSent(_)
+                        | CallError::Timeout(..)
+                        | CallError::Fault(_, Fault::NoMailbox | Fault::NodeSilent { .. })
+                );
                 if self.refusal.as_ref() != Some(&text) {
                     if early {
                         tracing::debug!("subscription to data {} of {}: {text}", self.wish.number, self.from);

@@ -9,8 +9,10 @@ use crate::launch::{LOOK, LOOK_BYTES_MAX, LOOK_ON, LauncherInterface, Look, Look
 use rohrpost_mailbox::{Name, wait_any};
 use std::time::{Duration, Instant};
 
-/// Bytes of a page: with head, envelope and frame it is one datagram of an Ethernet.
-const PAGE_BYTES: u16 = 1_200;
+/// Most bytes of a page: with head, envelope and frame it is one datagram of an Ethernet.
+const PAGE_BYTES_MAX: u16 = 1_200;
+/// What a reply has besides: its envelope, and what says which page it is.
+const PAGE_MARGIN: u16 = 32;
 /// Pages that are asked for at a time.
 const AHEAD: usize = 4;
 /// A page is asked for again after a third of this, and anew after it.
@@ -36,6 +38,8 @@ pub struct Distant {
     what: Look,
     /// Pages that are asked for at a time.
     ahead: usize,
+    /// Bytes of a page, such that it fits the reply mailbox.
+    page: u16,
     began: Instant,
     timeout: Duration,
     /// The look that pages are of; none until the first has come.
@@ -60,11 +64,14 @@ impl Distant {
     pub fn new(launcher: Name, what: Look, timeout: Duration, nodes: usize) -> Self {
         let ahead = (AHEAD / nodes.max(1)).max(1);
         let (look, bytes, there, next) = (None, Vec::new(), 0, 0);
-        Self { launcher, what, ahead, began: Instant::now(), timeout, look, bytes, there, next, under_way: Vec::new() }
+        let (page, began) = (PAGE_BYTES_MAX, Instant::now());
+        Self { launcher, what, ahead, page, began, timeout, look, bytes, there, next, under_way: Vec::new() }
     }
 
     /// What was seen, or why nothing was; none while it is under way. Asks for what is missing.
     pub fn poll(&mut self, link: &mut Link) -> Option<Result<Seen, LookFailure>> {
+        let fits = link.replies().shape().body_bytes_max.saturating_sub(PAGE_MARGIN);
+        self.page = PAGE_BYTES_MAX.min(fits);
         let step = self.collect(link).and_then(|()| self.ask(link));
         let outcome = match step {
             Err(failure) => Err(failure),
@@ -112,7 +119,7 @@ impl Distant {
     fn take(&mut self, asked: &Asked, page: &LookPage, link: &mut Link) -> Result<(), LookFailure> {
         let total = page.total as usize;
         let fits = |known: usize| {
-            let long = known.saturating_sub(asked.from).min(PAGE_BYTES.into());
+            let long = known.saturating_sub(asked.from).min(self.page.into());
             known > 0 && known <= LOOK_BYTES_MAX && page.from as usize == asked.from && page.bytes.len() == long
         };
         let bad = || CallError::BadReply(self.launcher, "a page of another look than was asked for".into());
@@ -142,7 +149,7 @@ impl Distant {
         }
         while self.under_way.len() < self.ahead && self.next < self.bytes.len() {
             let from = self.next;
-            self.next += usize::from(PAGE_BYTES);
+            self.next += usize::from(self.page);
             self.ask_for(from, link)?;
         }
         Ok(())
@@ -153,11 +160,11 @@ impl Distant {
         if left.is_zero() {
             return Ok(());
         }
-        let (what, look) = (self.what, self.look);
+        let (what, look, page) = (self.what, self.look, self.page);
         let function = if look.is_some() { LOOK_ON } else { LOOK };
         let write = |body: &mut Vec<u8>| match look {
-            Some(look) => append(body, &(look, from as u32, PAGE_BYTES)),
-            None => append(body, &(what, Seen::format(), PAGE_BYTES)),
+            Some(look) => append(body, &(look, from as u32, page)),
+            None => append(body, &(what, Seen::format(), page)),
         };
         let patience = left.min(PAGE_PATIENCE);
         let sequence = link.begin(self.launcher, function, LauncherInterface::hash(), patience, write)?;

@@ -45,6 +45,17 @@ impl Failure {
         !matches!(self, Self::NobodyThere)
     }
 
+    /// One word for people and programs.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::NobodyThere => "nobody-there",
+            Self::NoWay => "no-way",
+            Self::TooLong => "too-long",
+            Self::NoRoom => "no-room",
+            Self::Other => "other",
+        }
+    }
+
     /// What happened, and what to do.
     pub const fn words(self) -> &'static str {
         match self {

@@ -162,6 +162,7 @@ mod tests {
             copies: 0,
             damaged: 0,
             overtaken: 0,
+            refused: 0,
             restarts: 0,
         };
         Links {
@@ -173,6 +174,7 @@ mod tests {
             waiting_bytes: 0,
             classes,
             foreign: 0,
+            failures: Vec::new(),
         }
     }
 

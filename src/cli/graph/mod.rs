@@ -150,8 +150,12 @@ impl Graph {
         let mut edges: Vec<Edge> = Vec::new();
         // What a router delivers for a node that is seen too is counted there.
         let is_seen = |node: &str| nodes.contains(&node) && !away_names.contains(&node);
-        let counts = |flow: &FlowInfo| !is_hop(&running.installation, flow) || !is_seen(running.node_of(flow.from));
-        for (flow, figures) in tracks.iter().flat_map(Tracks::figures).filter(|(flow, _)| counts(flow)) {
+        let counts = |node: &str, flow: &FlowInfo| {
+            !is_hop(&running.installation, node, flow) || !is_seen(running.node_of(flow.from))
+        };
+        let all =
+            nodes.iter().zip(&tracks).flat_map(|(node, tracks)| tracks.figures().map(move |found| (*node, found)));
+        for (_, (flow, figures)) in all.filter(|(node, (flow, _))| counts(node, flow)) {
             if !silent && figures.packages == 0 && figures.refused == 0 {
                 continue;
             }

@@ -64,6 +64,8 @@ pub(crate) struct Nodes<'a> {
     speech: &'a Speech,
     /// Words to stop so far.
     words: u32,
+    /// The nodes are being stopped, so that their ends are no news.
+    stopping: bool,
     lab: Lab,
 }
 
@@ -115,7 +117,8 @@ impl<'a> Nodes<'a> {
         let (sender, happenings) = sync_channel(LINES_MAX);
         listen(sender.clone())?;
         let executable = std::env::current_exe()?;
-        let mut all = Self { installation, nodes: Vec::new(), happenings, open: 0, speech, words: 0, lab };
+        let mut all =
+            Self { installation, nodes: Vec::new(), happenings, open: 0, speech, words: 0, stopping: false, lab };
         for index in 0..all.installation.nodes.len() {
             let started = all.start(index, &executable, bad, &sender);
             if let Err(error) = started {
@@ -190,7 +193,7 @@ impl<'a> Nodes<'a> {
     fn look_for_ended(&mut self) {
         for node in self.nodes.iter_mut().filter(|node| node.ended.is_none()) {
             node.ended = node.child.try_wait().ok().flatten();
-            if let Some(status) = node.ended.filter(|_| self.words == 0) {
+            if let Some(status) = node.ended.filter(|_| !self.stopping) {
                 let how = if node.runs { "ended" } else { "did not start" };
                 self.speech.complain(&format!("node {} {how}: {status}", node.name));
             }
@@ -199,8 +202,10 @@ impl<'a> Nodes<'a> {
 
     /// Stops all nodes, the last first; all at once when another word to stop comes. A node that failed makes the exit code.
     pub(crate) fn stop(mut self) -> ExitCode {
-        let words = self.words;
+        // What ended before is told.
         self.look_for_ended();
+        self.stopping = true;
+        let words = self.words;
         while let Some(last) = self.nodes.iter().rposition(|node| node.ended.is_none()) {
             let hurry = self.words > words;
             for (index, node) in self.nodes.iter_mut().enumerate() {

@@ -1,10 +1,12 @@
 //! A router's counters, as it publishes them.
 
-use rohrpost::interfaces::{Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink};
+use rohrpost::interfaces::{
+    Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink, SocketFailure,
+};
 use rohrpost::mailbox::{Class, Latency, Priority, monotonic_ns};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::link::State;
-use rohrpost_routers::shell::{Shell, difference};
+use rohrpost_routers::shell::{Failure, Shell, difference};
 use rohrpost_routers::stats::{Cause, ClassCounts};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -22,7 +24,13 @@ pub(super) fn of(shell: &Shell) -> Links {
         waiting_bytes: stats.waiting_bytes.get(),
         classes: classes(shell),
         foreign: stats.foreign.get(),
+        failures: failures(shell),
     }
+}
+
+fn failures(shell: &Shell) -> Vec<SocketFailure> {
+    let all = Failure::ALL.into_iter().map(|failure| (failure.word(), shell.failures().of(failure)));
+    all.filter(|(_, times)| *times > 0).map(|(cause, times)| SocketFailure { cause: cause.into(), times }).collect()
 }
 
 fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
@@ -63,6 +71,7 @@ fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
         copies: received.copies.get(),
         damaged: received.damaged.get(),
         overtaken: received.overtaken.get(),
+        refused: received.refused.get() + received.old.get(),
         restarts: received.restarts.get(),
     }
 }

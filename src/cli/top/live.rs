@@ -100,7 +100,7 @@ fn others(running: &Running) -> impl Iterator<Item = &str> {
 }
 
 fn not_seen_yet(running: &Running) -> Seen {
-    others(running).map(|node| Err(Silence { node: node.into(), why: "it was not heard yet".into() })).collect()
+    others(running).map(|node| Err(Silence::new(node, "it was not heard yet"))).collect()
 }
 
 /// What all nodes that are meant show, in the order of the configuration.
@@ -230,7 +230,7 @@ impl Live {
         let mut others = self.others.clone();
         for silence in others.iter_mut().filter_map(|seen| seen.as_mut().err()) {
             if let Some(since) = self.silent_since.get(&silence.node) {
-                silence.why = format!("{}, for {} s", silence.why, since.elapsed().as_secs());
+                silence.silent_s = Some(since.elapsed().as_secs_f64());
             }
         }
         let seen = in_order(&self.running, sample::own(&self.running)?, &others);

@@ -61,7 +61,7 @@ pub(super) fn head(model: &Model) -> [String; 2] {
     if !model.launched {
         first.push("NOT LAUNCHED".into());
     }
-    first.extend(model.silent.iter().map(|silence| format!("{} SILENT: {}", silence.node, silence.why)));
+    first.extend(model.silent.iter().map(|silence| format!("{} {}", silence.node, silence.since().to_uppercase())));
     let mut states: Vec<(&String, &usize)> = model.states.iter().collect();
     states.sort_by_key(|(state, _)| severity(state));
     let states: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();

@@ -29,7 +29,7 @@ fn judge(datagram: &[u8]) {
     let rest = &datagram[HEAD_BYTES..];
     match frame {
         Frame::Packages(packages) => {
-            let sizes: usize = packages.clone().map(|(_, body)| PACKAGE_HEAD_BYTES + body.len()).sum();
+            let sizes: usize = packages.map(|(_, body)| PACKAGE_HEAD_BYTES + body.len()).sum();
             assert_eq!(sizes, rest.len(), "all of it");
             assert!(packages.into_iter().all(|(head, body)| usize::from(head.len) == body.len()));
         }

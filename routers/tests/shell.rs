@@ -1,0 +1,164 @@
+//! Two routers with real sockets, threads and mailboxes: what is undeliverable is answered, what waits outlives a router, and what is not
+//! a node's own is refused.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+#[path = "shell_common/mod.rs"]
+mod common;
+
+use common::{PATIENCE, Pair, Side, label, module};
+use rohrpost_mailbox::monotonic_ns;
+use rohrpost_mailbox::{Kind, Name, Options, Receiver, SendError, Shape, Type, local};
+use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
+use rohrpost_routers::link::State;
+use rohrpost_routers::shell::Shell;
+use std::net::{IpAddr, Ipv4Addr, UdpSocket};
+use std::time::{Duration, Instant};
+
+fn until(what: &str, mut done: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !done() {
+        assert!(began.elapsed() < PATIENCE, "waited too long until {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+impl Side {
+    fn shell(&self) -> &Shell {
+        self.shell.as_ref().unwrap()
+    }
+
+    fn sees(&self, peer: u8) -> State {
+        self.shell().stats().state(peer, monotonic_ns())
+    }
+}
+
+/// Of node 0: where answers come to.
+fn replies(pair: &Pair) -> Receiver {
+    pair.sides[0].receiver(module(0).with_local(local::REPLIES), Shape { slots: 64, ..Shape::default() })
+}
+
+/// Sends commands to a mailbox of node 1 until one is answered by a router; the answer.
+fn answer(pair: &Pair, replies: &mut Receiver, to: Name, body: &[u8]) -> String {
+    let mut sender = pair.sides[0].sender(to);
+    let (from, began) = (replies.name(), Instant::now());
+    while began.elapsed() < PATIENCE {
+        sender.send(&label(from, 100, 5), &[body]).unwrap();
+        let Some(package) = replies.receive_timeout(Duration::from_millis(50)) else { continue };
+        let head = package.head();
+        assert_eq!((head.to, head.from, head.kind.kind()), (from, to, Kind::Reply(16)));
+        assert!(head.options.has(Options::ERROR) && head.id == 5);
+        return String::from_utf8(package.body().to_vec()).unwrap();
+    }
+    panic!("nobody answers a command to {to}");
+}
+
+#[test]
+fn an_undeliverable_command_comes_back_and_says_why() {
+    let mut pair = Pair::new();
+    let mut replies = replies(&pair);
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call and arguments"), "callno-mailbox");
+    let small = Shape { slots: 2, body_bytes_max: 8, ..Shape::default() };
+    let mut receiver = pair.sides[1].receiver(module(1), small);
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call and arguments"), "calltoo-large");
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callmailbox-full");
+    assert!(receiver.try_receive().is_some());
+    let elsewhere = module(1).with_local(9);
+    assert_eq!(answer(&pair, &mut replies, elsewhere, b"call"), "callno-mailbox", "a mailbox that the module has not");
+    pair.sides[1].shell = None;
+    until("node 1 is silent", || pair.sides[0].sees(1) == State::Silent);
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callsilent");
+    // Data are counted, and nobody is told.
+    let data = rohrpost_mailbox::Label { kind: Type::data(1), ..label(replies.name(), 90, 5) };
+    pair.sides[0].sender(module(1)).send(&data, &[b"data"]).unwrap();
+    until("it is counted", || {
+        let mut classes = pair.sides[0].shell().stats().out.classes();
+        classes.any(|(priority, class)| priority.0 == 90 && class.lost_in_all() == 1)
+    });
+    assert!(replies.try_receive().is_none());
+}
+
+#[test]
+fn packages_in_the_routers_mailbox_outlive_it() {
+    let mut pair = Pair::new();
+    let mut receiver = pair.sides[1].receiver(module(1), Shape { slots: 64, ..Shape::default() });
+    let mut sender = pair.sides[0].sender(module(1));
+    let mut id = 0;
+    for _ in 0..5 {
+        pair.sides[0].shell = None;
+        for _ in 0..10 {
+            sender.send(&label(module(0), 100, id), &[b"waits"]).unwrap();
+            id += 1;
+        }
+        pair.sides[0].start();
+        for wanted in id - 10..id {
+            assert_eq!(receiver.receive_timeout(PATIENCE).unwrap().head().id, wanted);
+        }
+    }
+    assert!(receiver.try_receive().is_none());
+    let restarts = pair.sides[1].shell().stats().peer(0).received.restarts.get();
+    assert!((1..=5).contains(&restarts), "seen as one that was started anew: {restarts}");
+}
+
+#[test]
+fn a_router_with_another_digest_is_refused_by_both_and_taken_when_it_is_mended() {
+    let mut pair = Pair::new();
+    let mut replies = replies(&pair);
+    pair.sides[1].settings.digest = 8;
+    pair.sides[1].start();
+    for (side, theirs) in [(0, 8), (1, 7)] {
+        until("each refuses the other", || match pair.sides[side].sees(1 - side as u8) {
+            State::Refused(mismatch) => mismatch.digest == Some(theirs),
+            _ => false,
+        });
+    }
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callrefused");
+    pair.sides[1].settings.digest = 7;
+    pair.sides[1].start();
+    until("they hear each other", || (0..2).all(|side| pair.sides[side].sees(1 - side as u8) == State::Alive));
+}
+
+#[test]
+fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
+    let pair = Pair::new();
+    let here = &pair.sides[0];
+    let to = (here.settings.nodes[0].address, here.settings.network.port);
+    let refused = |peer: u8| here.shell().stats().peer(peer).received.refused.get();
+    let foreign = || here.shell().stats().foreign.get();
+    let head = FrameHead { kind: FrameKind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation: 99, sequence: 0 };
+    let told = [0; 24];
+    let claims = [&head.to_bytes(&[&told])[..HEAD_BYTES], &told].concat();
+    let before = foreign();
+    let stranger = UdpSocket::bind((IpAddr::V4(Ipv4Addr::new(127, 127, 127, 127)), 0)).unwrap();
+    for bytes in [&claims[..], b"anything", b""] {
+        stranger.send_to(bytes, to).unwrap();
+    }
+    until("all are counted", || foreign() == before + 3);
+    assert_eq!(here.shell().stats().peer(1).link.incarnation.get(), 2, "the peer's own life still is the known one");
+    // From the node's address, but of another system.
+    let own = UdpSocket::bind((here.settings.nodes[1].address, 0)).unwrap();
+    let head = FrameHead { system: 2, ..head };
+    own.send_to(&[&head.to_bytes(&[&told])[..], &told].concat(), to).unwrap();
+    until("it is counted", || refused(1) == 1);
+}
+
+#[test]
+fn without_the_right_to_the_address_a_router_does_not_start_and_leaves_the_node_as_it_was() {
+    let pair = Pair::new();
+    let mut second = Pair::new();
+    second.sides[0].settings.nodes = pair.sides[0].settings.nodes.clone();
+    let side = &mut second.sides[0];
+    side.shell = None;
+    let parts = rohrpost_routers::shell::Parts {
+        node: &side.node,
+        name: Name::new(1, 250, 0, 0),
+        settings: side.settings.clone(),
+        faults: std::sync::Arc::new(common::Words),
+        impair: None,
+    };
+    let error = Shell::start(parts).err().unwrap().to_string();
+    assert!(error.contains("is in use"), "{error}");
+    // What is sent meanwhile waits.
+    let mut sender = side.sender(module(1));
+    assert!(!matches!(sender.send(&label(module(0), 1, 1), &[]), Err(SendError::NoRouter { .. })));
+}

@@ -1,0 +1,110 @@
+//! Two nodes in one process, each with its router, at addresses of the loopback.
+
+use rohrpost_config::{Network, Route};
+use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
+use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Duration;
+
+/// What takes longer does not come any more, however busy the computer is.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
+
+/// The module of a node; its mailboxes are what packages go to.
+pub(crate) fn module(node: u8) -> Name {
+    Name::new(1, 100, node, 0)
+}
+
+/// Answers with the cause's word, behind the first bytes of the command.
+pub(crate) struct Words;
+
+impl Faults for Words {
+    fn write(&self, call: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool {
+        answer.extend_from_slice(&call[..call.len().min(4)]);
+        answer.extend_from_slice(why.cause.word().as_bytes());
+        true
+    }
+}
+
+/// A node of two.
+pub(crate) struct Side {
+    pub(crate) node: Arc<Node>,
+    pub(crate) settings: Settings,
+    pub(crate) shell: Option<Shell>,
+}
+
+impl Side {
+    /// Ends its router, if it has one, and starts it anew.
+    pub(crate) fn start(&mut self) {
+        self.shell = None;
+        self.settings.incarnation += 1;
+        let name = Name::new(1, 250, self.settings.own, 0);
+        let (settings, faults) = (self.settings.clone(), Arc::new(Words));
+        self.shell = Some(Shell::start(Parts { node: &self.node, name, settings, faults, impair: None }).unwrap());
+    }
+
+    pub(crate) fn join(&self) -> Arc<Participant> {
+        Participant::join(&self.node, Name::NONE).unwrap()
+    }
+
+    pub(crate) fn receiver(&self, name: Name, shape: Shape) -> Receiver {
+        self.join().receiver(name, shape).unwrap()
+    }
+
+    pub(crate) fn sender(&self, to: Name) -> Sender {
+        self.join().sender(to).unwrap()
+    }
+}
+
+/// Two nodes; their directories go with this.
+pub(crate) struct Pair {
+    pub(crate) sides: [Side; 2],
+    _folder: tempfile::TempDir,
+}
+
+impl Pair {
+    pub(crate) fn new() -> Self {
+        static COUNT: AtomicU8 = AtomicU8::new(0);
+        let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        // Addresses that no other test has, by process and count.
+        let address = |node: u8| {
+            IpAddr::V4(Ipv4Addr::new(127, 128 + (pid / 250 % 120) as u8, (pid % 250) as u8, 2 * (1 + count) + node))
+        };
+        let folder = tempfile::Builder::new().prefix("rohrpost-shell-").tempdir_in("/dev/shm").unwrap();
+        let nodes = || [0, 1].map(|node| NodeSettings { name: format!("node{node}"), address: address(node) });
+        let network = Network {
+            port: 21_117,
+            mtu: 1500,
+            datagram_bytes_max: 1472,
+            rate_bytes_s: 1 << 30,
+            quota_bytes: 1 << 20,
+            bulk_below: 16,
+        };
+        let sides = [0, 1].map(|own| {
+            let there = module(1 - own);
+            let mut side = Side {
+                node: Node::create(&folder.path().join(format!("node{own}")), 0o700).unwrap(),
+                settings: Settings {
+                    system: 1,
+                    own,
+                    nodes: nodes().into(),
+                    digest: 7,
+                    incarnation: 1,
+                    network,
+                    routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
+                    senders: vec![vec![module(own)]],
+                },
+                shell: None,
+            };
+            side.start();
+            side
+        });
+        Self { sides, _folder: folder }
+    }
+}
+
+pub(crate) fn label(from: Name, priority: u8, id: u16) -> Label {
+    Label { from, kind: Type::command(16), id, priority: Priority(priority), ..Label::default() }
+}

@@ -1,0 +1,78 @@
+//! A package on its way through two routers takes nothing from the heap: neither alone, nor in a crowd, nor in parts.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+#[path = "shell_common/mod.rs"]
+mod common;
+
+use common::{PATIENCE, Pair, label, module};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Uses of the heap by all threads: those of the routers, and the test's, which makes none while it counts.
+static USES: AtomicU64 = AtomicU64::new(0);
+
+struct Counting;
+
+#[global_allocator]
+static HEAP: Counting = Counting;
+
+// SAFETY: hands all on to the system's.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        USES.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: as promised by our caller.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        USES.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: as promised by our caller.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// Sends even if the router's mailbox is full just now.
+fn send(sender: &mut Sender, priority: u8, id: u16, body: &[u8]) {
+    loop {
+        match sender.send(&label(module(0), priority, id), &[body]) {
+            Ok(()) => return,
+            Err(SendError::Full(_)) => std::thread::yield_now(),
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+fn round(sender: &mut Sender, receiver: &mut Receiver, large: &[u8]) {
+    // Alone, so it leaves at once.
+    send(sender, 100, 0, b"alone");
+    assert_eq!(receiver.receive_timeout(PATIENCE).unwrap().body(), b"alone");
+    // Together, so some wait and share a datagram, while a large one leaves in parts.
+    send(sender, 20, 1, large);
+    (0..40).for_each(|id| send(sender, 100, id, b"one of many"));
+    let mut bytes = 0;
+    for _ in 0..41 {
+        bytes += receiver.receive_timeout(PATIENCE).unwrap().body().len();
+    }
+    assert_eq!(bytes, large.len() + 40 * 11);
+}
+
+#[test]
+fn no_package_takes_from_the_heap() {
+    let pair = Pair::new();
+    let shape = Shape { slots: 128, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };
+    let mut receiver = pair.sides[1].receiver(module(1), shape);
+    let mut sender = pair.sides[0].sender(module(1));
+    let large = vec![7; 40_000];
+    // Ways are opened, and room for parts is taken, once.
+    (0..50).for_each(|_| round(&mut sender, &mut receiver, &large));
+    let before = USES.load(Ordering::SeqCst);
+    assert!(before > 0, "counts");
+    (0..500).for_each(|_| round(&mut sender, &mut receiver, &large));
+    assert_eq!(USES.load(Ordering::SeqCst), before);
+    let stats = pair.sides[0].shell.as_ref().unwrap().stats();
+    let sent = &stats.peer(1).sent;
+    assert!(sent.fragments.get() > 500, "in parts");
+    assert!(sent.datagrams.get() - sent.fragments.get() < 550 * 41, "some shared a datagram");
+}

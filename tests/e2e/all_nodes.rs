@@ -1,0 +1,243 @@
+//! `launch --all`: all nodes of a configuration on this computer, in network namespaces.
+
+use crate::harness::{NETWORK, OUTPUT, Place, probe, runs, skipped, wait};
+use crate::process::{Running, Said};
+use nix::sys::signal::Signal;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::os::unix::fs::chown;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+const NODES: &str =
+    "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\ntools = [16, 31]\n";
+
+/// probe.0 on `base`, and on `arm` probe.1, with further settings and keys.
+fn configured(place: &Place, settings: &str, keys: &str) -> PathBuf {
+    let modules =
+        [probe("probe.0", "", "node = \"base\""), probe("probe.1", settings, &format!("node = \"arm\"\n{keys}"))];
+    place.config_of("test", &format!("{NODES}{NETWORK}"), &[&modules[0], &modules[1]])
+}
+
+fn all(place: &Place, config: &Path, further: &[&str]) -> Running {
+    Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"], further].concat()))
+}
+
+/// Whether namespaces may be made here.
+fn is_allowed() -> bool {
+    let place = Place::new();
+    let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
+    let told = all(&place, &config, &[]).said().err;
+    if told.contains("network namespaces cannot be made here") {
+        skipped(&told);
+        return false;
+    }
+    true
+}
+
+/// Waits until all modules of both nodes are on.
+fn wait_until_both_run(launch: &mut Running) {
+    for node in ["base", "arm"] {
+        launch.wait_for(&format!("│ node {node} of test runs: 2 modules"));
+    }
+}
+
+/// A command of a person on a node.
+fn say(place: &Place, config: &Path, node: &str, arguments: &[&str]) -> Said {
+    let (command, rest) = arguments.split_first().unwrap();
+    place.say(&[&[*command, "--config", config.to_str().unwrap(), "--node", node], rest].concat())
+}
+
+/// Processes that a process has started, and those that they have.
+fn below(pid: u32) -> Vec<u32> {
+    let text = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap_or_default();
+    let children: Vec<u32> = text.split_whitespace().filter_map(|pid| pid.parse().ok()).collect();
+    children.iter().flat_map(|pid| std::iter::once(*pid).chain(below(*pid))).collect()
+}
+
+fn devices() -> BTreeSet<std::ffi::OsString> {
+    std::fs::read_dir("/sys/class/net").into_iter().flatten().flatten().map(|entry| entry.file_name()).collect()
+}
+
+#[test]
+fn nodes_start_talk_and_are_stopped() {
+    if !is_allowed() {
+        return;
+    }
+    let (place, before) = (Place::new(), devices());
+    let config = configured(&place, "", "");
+    let mut launch = all(&place, &config, &[]);
+    wait_until_both_run(&mut launch);
+    assert!(launch.out().starts_with("security = \"none\": packages between nodes are neither sealed nor signed"));
+    assert_eq!(say(&place, &config, "base", &["call", "probe.1", "count", "1"]).ok(), "1\n");
+    assert_eq!(say(&place, &config, "arm", &["call", "probe.0", "count", "2"]).ok(), "1\n");
+    assert_eq!(devices(), before, "the lab's devices are in the lab");
+    let processes = below(launch.pid());
+    assert_eq!(processes.len(), 6, "two launches, two routers, two probes");
+    launch.stop();
+    assert_eq!(launch.err(), "", "nothing to complain of");
+    let record = place.record();
+    let ends: Vec<&str> = record.iter().filter_map(|line| line.strip_suffix(" off")).collect();
+    assert_eq!(ends, ["probe.1", "probe.0"], "the last node first");
+    assert!(processes.iter().all(|pid| !runs(*pid)));
+    place.assert_empty();
+}
+
+#[test]
+fn nothing_is_left_when_it_is_killed() {
+    if !is_allowed() {
+        return;
+    }
+    let place = Place::new();
+    let config = configured(&place, "", "");
+    let mut launch = all(&place, &config, &[]);
+    wait_until_both_run(&mut launch);
+    let processes = below(launch.pid());
+    assert_eq!(processes.len(), 6);
+    launch.signal(Signal::SIGKILL);
+    launch.end();
+    wait("all that it started ends", || processes.iter().all(|pid| !runs(*pid)).then_some(()));
+    place.assert_empty();
+}
+
+#[test]
+fn a_node_that_does_not_start_ends_them_all() {
+    if !is_allowed() {
+        return;
+    }
+    let place = Place::new();
+    let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
+    let told = all(&place, &config, &[]).said().fails();
+    assert!(told.contains("arm │ module probe.1 did not become ready"), "{told}");
+    assert!(told.contains("node arm did not start: exit status: 1"), "{told}");
+    place.assert_empty();
+}
+
+/// A killed node is told of, and the others go on.
+#[test]
+fn a_node_that_ends_leaves_the_others_alone() {
+    if !is_allowed() {
+        return;
+    }
+    let place = Place::new();
+    let config = configured(&place, "", "");
+    let mut launch = all(&place, &config, &[]);
+    wait_until_both_run(&mut launch);
+    let arm = place.robot_at(&config, "arm").node.launcher().unwrap();
+    crate::harness::signal(arm, Signal::SIGKILL);
+    wait("its end is told", || launch.err().contains("node arm ended: signal: 9").then_some(()));
+    assert_eq!(say(&place, &config, "base", &["call", "probe.0", "count", "1"]).ok(), "1\n");
+    launch.signal(Signal::SIGINT);
+    assert_eq!(launch.end().code(), Some(1), "a node failed");
+    // Its modules go when their launch has gone; what that had no time to remove is for `clean`.
+    wait("nothing of it lives", || {
+        place.say(&["clean"]).ok();
+        std::fs::read_dir(place.memory()).unwrap().next().is_none().then_some(())
+    });
+}
+
+#[test]
+fn calls_are_counted_once_over_a_bad_network() {
+    if !is_allowed() {
+        return;
+    }
+    let place = Place::new();
+    let config = configured(&place, "", "");
+    let bad = "loss=10%,delay=1ms,jitter=500us,duplicate=5%,reorder=10%,seed=3";
+    let mut launch = all(&place, &config, &["--impair", bad]);
+    wait_until_both_run(&mut launch);
+    let mut expected = Vec::new();
+    for number in 1..=12 {
+        let said = say(&place, &config, "base", &["call", "probe.1", "count", &number.to_string()]);
+        // One that fails says so, and may have been run; none is run twice.
+        if said.code == Some(0) {
+            expected.push(number);
+        }
+    }
+    let counted = place.counted();
+    let once: BTreeSet<u32> = counted.iter().copied().collect();
+    assert_eq!(once.len(), counted.len(), "twice: {counted:?}");
+    assert!(expected.len() >= 10 && expected.iter().all(|number| once.contains(number)), "{expected:?} {counted:?}");
+    launch.stop();
+    place.assert_empty();
+}
+
+#[test]
+fn what_cannot_be_launched_is_told_with_its_remedy() {
+    let place = Place::new();
+    let one = place.config(&[OUTPUT]);
+    let one = one.to_str().unwrap();
+    let told = place.say(&["launch", one, "--all"]).fails();
+    assert_eq!(told, format!("{one} has one node; launch it without --all: rohrpost launch {one}\n"));
+    let config = configured(&place, "", "");
+    let config = config.to_str().unwrap();
+    let told = place.say(&["launch", config, "--node", "roof"]).fails();
+    assert!(told.contains("roof") && told.contains("base, arm"), "{told}");
+    for (arguments, words) in [
+        (&["--all", "--node", "base"][..], "cannot be used with"),
+        (&["--impair", "loss=5%"], "--all"),
+        (&["--all", "--impair", "loss=5"], "write a share from 0% to 100%, such as loss=5%"),
+    ] {
+        let said = place.say(&[&["launch", config], arguments].concat());
+        assert!(said.code == Some(2) && said.err.contains(words), "{said:?}");
+    }
+    place.assert_empty();
+}
+
+/// Of tests that run as root: a user who is not launches all nodes, too, if users may make namespaces.
+#[test]
+fn a_user_without_rights_launches_all_nodes() {
+    const NOBODY: u32 = 65_534;
+    if !nix::unistd::geteuid().is_root() {
+        return skipped("root alone can be somebody else; the other tests ran without its rights");
+    }
+    let place = Place::new();
+    // No program of the tests' own: nobody may be allowed to read the folder that it is in.
+    let config = place.config_of("test", &format!("{NODES}{NETWORK}"), &[&format!("{OUTPUT}node = \"arm\"\n")]);
+    let launch = place.command(&["launch", config.to_str().unwrap(), "--all"]);
+    let program = place.path("rohrpost");
+    std::fs::copy(launch.get_program(), &program).unwrap();
+    for path in [place.memory(), config.parent().unwrap()] {
+        chown(path, Some(NOBODY), Some(NOBODY)).unwrap();
+    }
+    let mut command = Command::new(&program);
+    command.args(launch.get_args()).env("ROHRPOST_DIR", place.memory()).current_dir(config.parent().unwrap());
+    command.uid(NOBODY).gid(NOBODY).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut launch = Running::start(command);
+    wait("it runs, or may not", || {
+        let runs = ["base of test runs: 1 module", "arm of test runs: 2 modules"];
+        (launch.ended().is_some() || runs.iter().all(|runs| launch.out().contains(runs))).then_some(())
+    });
+    if launch.err().contains("network namespaces cannot be made here") {
+        return skipped(&launch.err());
+    }
+    launch.stop();
+    place.assert_empty();
+}
+
+/// As on a computer that lets nobody make them: a user namespace with a limit of none.
+#[test]
+fn without_the_right_to_namespaces_it_says_what_gives_it() {
+    let place = Place::new();
+    let config = configured(&place, "", "");
+    let launch = place.command(&["launch", config.to_str().unwrap(), "--all"]);
+    let mut script = String::from("echo 0 > /proc/sys/user/max_net_namespaces && exec \"$@\"");
+    // A marker that the limit was set, since not every computer has the program or the right.
+    let _ = write!(script, " || exit 99");
+    let mut limited = Command::new("unshare");
+    limited
+        .args(["--user", "--map-root-user", "sh", "-c", &script, "sh"])
+        .arg(launch.get_program())
+        .args(launch.get_args());
+    limited.env("ROHRPOST_DIR", place.memory()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let Ok(child) = limited.spawn() else { return skipped("there is no `unshare`") };
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(99) || told.starts_with("unshare:") {
+        return skipped("users make no namespaces here");
+    }
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.starts_with("network namespaces cannot be made here (") && told.contains("run it as root"), "{told}");
+    place.assert_empty();
+}

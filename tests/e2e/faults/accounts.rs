@@ -1,0 +1,49 @@
+//! A bad network: what is lost, delayed, doubled and overtaken, every package of it accounted for.
+
+use super::Field;
+use super::calls::{Calls, assert_once};
+use super::flow::{PLAIN, Sink, Source, balance};
+use std::time::Duration;
+
+const IMPAIR: &str = "loss=5%,delay=2ms,reorder=5%,duplicate=1%,seed=7";
+const PACKAGES: u64 = 3000;
+/// One call after so many packages.
+const CALL_EVERY: u64 = 30;
+/// Repeated after a third of it.
+const CALL: Duration = Duration::from_millis(900);
+
+#[test]
+fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
+    let Some(mut field) = Field::new(2, "") else { return };
+    field.launch(&["base", "arm"], &[("ROHRPOST_IMPAIR", IMPAIR)]);
+    let mut sink = Sink::new(field.robot("arm"), "arm");
+    let mut source = Source::new(field.robot("base"), "base", "arm", PLAIN);
+    let mut calls = Calls::new(&field, "base", "probe.1", CALL);
+    let mut last = 0;
+    while source.sent < PACKAGES {
+        if source.send() && source.sent % CALL_EVERY == 0 {
+            last += 1;
+            calls.begin(last);
+        }
+        calls.look();
+        sink.take(Duration::from_micros(500));
+    }
+    calls.settle();
+    let accounts = balance(&field, &source, &mut sink, PLAIN);
+
+    let numbers = sink.numbers(PLAIN);
+    assert!(numbers.is_sorted_by(|one, next| one < next), "in order, none twice");
+    // Of a twentieth that the network lost, every one is known; and what else is missing there never carried a package.
+    assert!((PACKAGES / 40..PACKAGES / 10).contains(&accounts.wire), "{accounts:?}");
+    let peer = field.peer("arm", "base");
+    assert!(accounts.datagrams_lost - accounts.wire <= accounts.datagrams_alive + u64::from(last), "{accounts:?}");
+    assert!(peer.copies > 0 && peer.overtaken > 0, "{peer:?}");
+    let late = accounts.arm.lost.iter().find(|loss| loss.cause == "late").map_or(0, |loss| loss.packages);
+    assert!(late > 0, "what was overtaken is not delivered: {accounts:?}");
+
+    // Each has three tries: of a tenth that is lost on the way there or back, hardly any is lost three times.
+    assert!(calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);
+    assert_once(&field, "probe.1", &calls.close());
+    drop((source, sink));
+    field.stop();
+}

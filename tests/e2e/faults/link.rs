@@ -1,0 +1,54 @@
+//! The cable is pulled out and put in again; and a cable of which one direction is broken.
+
+use super::Field;
+use rohrpost::Fault;
+use rohrpost::interfaces::LinkState;
+
+#[test]
+fn a_link_that_is_cut_is_told_at_both_ends_and_once_mended_carries_as_before() {
+    let Some(field) = Field::launched() else { return };
+    for round in 1..=2 {
+        field.lab.cut("arm").unwrap();
+        for (node, peer, module) in [("base", "arm", "probe.1"), ("arm", "base", "probe.0")] {
+            field.wait_for_state(node, peer, LinkState::Silent);
+            assert_eq!(field.fault(node, module), Fault::NodeSilent { node: peer.into() });
+        }
+        field.wait_told("router.0", &["node arm", "is silent"], round);
+        field.lab.mend("arm").unwrap();
+        field.wait_counted("base", "probe.1", round as u32);
+        field.wait_counted("arm", "probe.0", round as u32);
+        // Else what is known of the next cut would be that of this one.
+        field.wait_for_state("base", "arm", LinkState::Alive);
+        field.wait_for_state("arm", "base", LinkState::Alive);
+        field.wait_told("router.0", &["node arm", "is heard"], round + 1);
+    }
+    for (node, peer) in [("base", "arm"), ("arm", "base")] {
+        assert_eq!(field.peer(node, peer).restarts, 0, "the same routers as before");
+    }
+    for module in ["probe.0", "probe.1"] {
+        assert!(!field.counted(module).contains(&super::NEVER), "{module}: what was answered with a fault was run");
+    }
+    field.stop();
+}
+
+#[test]
+fn of_a_link_with_one_direction_each_end_says_what_it_knows() {
+    let Some(mut field) = Field::new(2, "") else { return };
+    let config = field.config.clone();
+    field.launch_from(&config, &["base"], &[]);
+    // All that arm sends is lost; what base sends comes.
+    field.launch_from(&config, &["arm"], &[("ROHRPOST_IMPAIR", "loss=100%,seed=7")]);
+    field.wait_for_state("base", "arm", LinkState::Silent);
+    field.wait_for_state("arm", "base", LinkState::Unheard);
+    assert_eq!(field.fault("base", "probe.1"), Fault::NodeSilent { node: "arm".into() });
+    let deaf = field.fault("arm", "probe.0");
+    assert_eq!(deaf, Fault::NodeDeaf { node: "base".into() });
+    assert!(deaf.to_string().contains("node base is heard, but does not hear"), "{deaf}");
+    assert_eq!(field.place.counted().len(), 0, "nothing was run");
+
+    field.halt_node("arm");
+    field.launch(&["arm"], &[]);
+    field.wait_counted("base", "probe.1", 1);
+    field.wait_counted("arm", "probe.0", 2);
+    field.stop();
+}

@@ -1,0 +1,246 @@
+//! A network that fails in every way: real routers and modules in network namespaces, and what is told, lost, counted and run.
+//!
+//! Each file is a fault. The nodes are `base` (probe.0 and the collector of lines), `arm` (probe.1) and, where three are needed, `desk`
+//! (probe.2); the test takes part on each as a tool. One lab at a time: each has its own processes, and the computer may be busy.
+
+mod accounts;
+mod buffer;
+mod calls;
+mod flow;
+mod frozen;
+mod killed;
+mod link;
+mod master;
+mod strangers;
+mod twice;
+
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, skipped, wait};
+use crate::process::Running;
+use rohrpost::common::GET_DATA;
+use rohrpost::config::Installation;
+use rohrpost::interface::DataPort;
+use rohrpost::interfaces::{LinkState, Links, PeerLink, RouterInterface};
+use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::value::Data;
+use rohrpost::{CallError, Fault, Name};
+use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Nodes, their addresses, and the instances of their tools.
+const NODES: [(&str, &str, &str); 3] =
+    [("base", "10.78.0.1", "[0, 15]"), ("arm", "10.78.0.2", "[16, 31]"), ("desk", "10.78.0.3", "[32, 47]")];
+const MTU: u16 = 1500;
+/// Packages older than this are not run any more; seed 002 has it in "at most once".
+const TRANSIT_MAX: Duration = Duration::from_secs(2);
+/// "At once", on a busy computer; a call that is not answered takes [`PATIENCE`].
+const AT_ONCE: Duration = Duration::from_secs(5);
+/// The collector's file.
+const LOG: &str = "[output]\nfile = \"robot.log\"\n";
+
+static TURN: Mutex<()> = Mutex::new(());
+
+/// Nodes of a system, each in its namespace.
+struct Field {
+    // Dropped in this order: processes, what they left, their network, the turn.
+    nodes: Vec<(&'static str, Running, Robot)>,
+    place: Place,
+    lab: Lab,
+    config: PathBuf,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Field {
+    /// So many nodes, none of them launched, with further keys of `[network]`. None, and said so, where namespaces are not permitted.
+    fn new(nodes: usize, network: &str) -> Option<Self> {
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let spec = |(name, address, _): &(&str, &str, &str)| NodeSpec {
+            name: (*name).into(),
+            address: address.parse().unwrap(),
+        };
+        let specs: Vec<NodeSpec> = NODES[..nodes].iter().map(spec).collect();
+        let lab = match Lab::new(&specs, MTU) {
+            Ok(lab) => lab,
+            Err(LabError::NotAllowed(error)) => {
+                skipped(&format!("faults of networks (network namespaces: {error})"));
+                return None;
+            }
+            Err(error) => panic!("{error}"),
+        };
+        let place = Place::new();
+        let config = configure(&place, "test", nodes, network, &[&format!("{OUTPUT}node = \"base\"\n"), LOG]);
+        Some(Self { nodes: Vec::new(), place, lab, config, _turn: turn })
+    }
+
+    /// `base` and `arm`, at work.
+    fn launched() -> Option<Self> {
+        let mut field = Self::new(2, "")?;
+        field.launch(&["base", "arm"], &[]);
+        Some(field)
+    }
+
+    /// Launches nodes, all at once, with this in their environment, and waits until all modules are on and the routers hear each other.
+    fn launch(&mut self, nodes: &[&'static str], environment: &[(&str, &str)]) {
+        let config = self.config.clone();
+        self.launch_from(&config, nodes, environment);
+        for node in nodes {
+            for peer in self.nodes.iter().map(|(name, ..)| *name).filter(|name| name != node) {
+                self.wait_for_state(node, peer, LinkState::Alive);
+            }
+        }
+    }
+
+    /// The same of another configuration; nobody need be heard.
+    fn launch_from(&mut self, config: &Path, nodes: &[&'static str], environment: &[(&str, &str)]) {
+        let begin = |node: &&'static str| {
+            let mut command = self.place.command(&["launch", config.to_str().unwrap(), "--node", node]);
+            command.envs(environment.iter().copied());
+            let _inside = self.lab.enter(node).unwrap();
+            (*node, Running::start(command))
+        };
+        let begun: Vec<_> = nodes.iter().map(begin).collect();
+        for (node, mut launch) in begun {
+            let robot = self.place.robot(config, node, &mut launch);
+            robot.wait_on(&mut launch);
+            self.nodes.push((node, launch, robot));
+        }
+    }
+
+    /// Ends a node in order.
+    fn halt_node(&mut self, node: &str) {
+        let at = self.nodes.iter().position(|(name, ..)| *name == node).unwrap();
+        let (_, mut launch, robot) = self.nodes.remove(at);
+        drop(robot);
+        launch.stop();
+    }
+
+    /// Ends all; nothing is left.
+    fn stop(mut self) {
+        while let Some((_, mut launch, robot)) = self.nodes.pop() {
+            drop(robot);
+            launch.stop();
+        }
+        self.place.assert_empty();
+    }
+
+    fn robot(&self, node: &str) -> &Robot {
+        &self.nodes.iter().find(|(name, ..)| *name == node).unwrap().2
+    }
+
+    fn launcher(&self, node: &str) -> &Running {
+        &self.nodes.iter().find(|(name, ..)| *name == node).unwrap().1
+    }
+
+    /// A router's process.
+    fn router(&self, node: &str) -> u32 {
+        self.robot(node).pid(&router_of(node))
+    }
+
+    /// Digest of the configuration that the nodes share.
+    fn digest(&self) -> u64 {
+        Installation::load(&self.config).unwrap().digest().lan()
+    }
+
+    /// What a router says of itself, at most half a second old.
+    fn said<T: Data>(&self, node: &str, port: DataPort<T>) -> T {
+        let robot = self.robot(node);
+        let router = robot.name(&router_of(node));
+        wait(format!("{} of {node}", port.name), || {
+            let mut tool = robot.tool(Duration::from_secs(2));
+            let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
+            let said = tool.call::<(u64, T)>(router, GET_DATA, (port.hash)(), ask, |bytes| from_bytes(bytes));
+            tool.close();
+            // Of a router that was just started there is nothing yet.
+            said.ok().map(|(_, said)| said)
+        })
+    }
+
+    fn links(&self, node: &str) -> Links {
+        self.said(node, RouterInterface::LINKS)
+    }
+
+    /// A node, as another one's router sees it.
+    fn peer(&self, node: &str, peer: &str) -> PeerLink {
+        self.links(node).peers.into_iter().find(|link| link.node == peer).unwrap()
+    }
+
+    fn wait_for_state(&self, node: &str, peer: &str, state: LinkState) {
+        wait(format!("{peer} is {state:?} to {node}"), || (self.peer(node, peer).state == state).then_some(()));
+    }
+
+    /// Lines of a module with all these words, in the collector's file.
+    fn lines(&self, module: &str, words: &[&str]) -> Vec<String> {
+        lines(&self.place.path("robot.log"), module, words)
+    }
+
+    /// Waits until a module has said so, for this many times in all.
+    fn wait_told(&self, module: &str, words: &[&str], times: usize) {
+        wait(format!("{module} says {words:?}"), || (self.lines(module, words).len() >= times).then_some(()));
+    }
+
+    /// What counting on another node brings, if the answer comes within the timeout.
+    fn count(&self, node: &str, module: &str, number: u32, timeout: Duration) -> Result<u64, CallError> {
+        let mut calls = calls::Calls::new(self, node, module, timeout);
+        calls.begin(number);
+        calls.settle();
+        calls.close().remove(0).1
+    }
+
+    /// Counts with ever new tries until one comes through.
+    fn wait_counted(&self, node: &str, module: &str, number: u32) {
+        wait(format!("{module} counts for {node}"), || self.count(node, module, number, Duration::from_secs(2)).ok());
+    }
+
+    /// The fault with which a call is answered at once, although it would wait for long.
+    fn fault(&self, node: &str, module: &str) -> Fault {
+        let begun = Instant::now();
+        let answer = self.count(node, module, NEVER, PATIENCE);
+        assert!(begun.elapsed() < AT_ONCE, "answered after {:?}: {answer:?}", begun.elapsed());
+        match answer {
+            Err(CallError::Fault(_, fault)) => fault,
+            other => panic!("no fault: {other:?}"),
+        }
+    }
+
+    /// Numbers that a module has counted, in order.
+    fn counted(&self, module: &str) -> Vec<u32> {
+        let line = format!("{module} count ");
+        self.place.record().iter().filter_map(|said| said.strip_prefix(&line)?.parse().ok()).collect()
+    }
+}
+
+/// The number of calls that must not be run.
+const NEVER: u32 = u32::MAX;
+
+/// Writes a configuration of the first nodes, a probe on each.
+fn configure(place: &Place, name: &str, nodes: usize, network: &str, further: &[&str]) -> PathBuf {
+    let node = |(name, address, tools): &(&str, &str, &str)| {
+        format!("[nodes.{name}]\naddress = \"{address}\"\ntools = {tools}\n")
+    };
+    let all: String = NODES[..nodes].iter().map(node).collect();
+    let sections =
+        format!("{all}[network]\nsecurity = \"none\"\n{network}\n[time]\nsource = \"master\"\ninterval = \"500 ms\"\n");
+    let on = |(index, (node, ..)): (usize, &(&str, &str, &str))| {
+        probe(&format!("probe.{index}"), "rate-hz = 50.0", &format!("node = \"{node}\""))
+    };
+    let probes: String = NODES[..nodes].iter().enumerate().map(on).collect();
+    place.config_of(name, &sections, &[&[probes.as_str()], further].concat())
+}
+
+fn router_of(node: &str) -> String {
+    let index = NODES.iter().position(|(name, ..)| *name == node).unwrap();
+    format!("router.{index}")
+}
+
+fn lines(log: &Path, module: &str, words: &[&str]) -> Vec<String> {
+    let text = std::fs::read_to_string(log).unwrap_or_default();
+    let has = |line: &&str| line.contains(module) && words.iter().all(|word| line.contains(word));
+    text.lines().filter(has).map(str::to_owned).collect()
+}
+
+/// A mailbox of the test's own on a node: one of the last tools there, so that real ones find room.
+fn mailbox_on(node: &str) -> Name {
+    let index = NODES.iter().position(|(name, ..)| *name == node).unwrap() as u8;
+    Name::new(1, 16, 16 * index + 14, rohrpost::mailbox::local::DATA)
+}
