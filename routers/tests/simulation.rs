@@ -9,6 +9,7 @@ use rohrpost_routers::sim::plan::Plan;
 use rohrpost_routers::sim::run::{Mistake, run, run_broken};
 use rohrpost_routers::time;
 use std::collections::BTreeMap;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -99,7 +100,7 @@ fn for_all<R: Send>(seeds: u64, run: impl Fn(u64) -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+        threads.into_iter().flat_map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
     })
 }
 
