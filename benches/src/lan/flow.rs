@@ -1,8 +1,8 @@
 //! Messages in one direction as fast as they go, where some may be lost: what comes is counted, and what does not.
 
 use crate::Failure;
-use crate::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
 use crate::floors::ring::Bell;
+use crate::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
 use rohrpost_mailbox::{monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -273,7 +273,8 @@ mod tests {
 
     /// How many came of these, when 10 were sent.
     fn received(messages: impl IntoIterator<Item = Vec<u8>>) -> Result<u64, Failure> {
-        let flow = Flow { bytes: 32, messages: 10, window: None, sender: End::Ping, sender_fifo: 50, cap: Duration::ZERO };
+        let flow =
+            Flow { bytes: 32, messages: 10, window: None, sender: End::Ping, sender_fifo: 50, cap: Duration::ZERO };
         let turn = Shared::<Turn>::new()?;
         turn.sent.store(10, Ordering::Release);
         receive_all(&mut Canned(messages.into_iter().collect()), &flow, &turn)?;

@@ -64,10 +64,17 @@ impl Case for Rate {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
-        let mtu = if self.packs { WHOLE } else { one };
+        let mtu = if self.packs { WHOLE } else { u16::try_from(one).unwrap_or(WHOLE) };
         let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" });
         let losses = Losses::default();
-        let raw = Flow { bytes: self.bytes, messages: messages(settings), window: None, sender: End::Ping, sender_fifo: 50, cap: TURN };
+        let raw = Flow {
+            bytes: self.bytes,
+            messages: messages(settings),
+            window: None,
+            sender: End::Ping,
+            sender_fifo: 50,
+            cap: TURN,
+        };
         let beside = Flow { window: Some(WINDOW), ..raw };
         let apart = Flow { sender: End::Pong, sender_fifo: SENDER_FIFO, ..beside };
         let ours = |ours: &Flow| {
