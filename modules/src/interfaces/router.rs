@@ -62,6 +62,8 @@ pub struct PeerLink {
     pub damaged: u64,
     /// Datagrams from it that came after later ones.
     pub overtaken: u64,
+    /// Datagrams with its address that were not taken: of another version or configuration, or of another life of its router.
+    pub refused: u64,
     /// Times that its router was started anew.
     pub restarts: u64,
 }

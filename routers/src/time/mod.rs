@@ -43,10 +43,12 @@ mod line;
 pub mod message;
 #[cfg(test)]
 mod tests;
+mod types;
 
 #[cfg(any(test, feature = "broken-variants"))]
 pub use broken::Broken;
-pub use clock::{Clock, Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
+pub use clock::Clock;
+pub use types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
 
 /// The bound of a node that does not know the time.
 pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;
@@ -94,7 +96,7 @@ impl Term {
 
     /// Round 1 is the first; rank 0 stands first among the masters, and before the others of its round.
     pub fn new(round: u64, rank: u8) -> Self {
-        Self(round << 8 | u64::from(u8::MAX - rank))
+        Self(round.min(u64::MAX >> 8) << 8 | u64::from(u8::MAX - rank))
     }
 
     /// Raised by each master that takes over.

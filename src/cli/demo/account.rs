@@ -162,6 +162,7 @@ mod tests {
             copies: 0,
             damaged: 0,
             overtaken: 0,
+            refused: 0,
             restarts: 0,
         };
         Links {

@@ -71,6 +71,7 @@ fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
         copies: received.copies.get(),
         damaged: received.damaged.get(),
         overtaken: received.overtaken.get(),
+        refused: received.refused.get() + received.old.get(),
         restarts: received.restarts.get(),
     }
 }

@@ -44,5 +44,6 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
     // Each has three tries: of a tenth that is lost on the way there or back, hardly any is lost three times.
     assert!(calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);
     assert_once(&field, "probe.1", &calls.close());
+    drop((source, sink));
     field.stop();
 }

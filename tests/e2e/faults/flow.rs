@@ -78,7 +78,7 @@ fn read(package: &rohrpost::mailbox::Package<'_>) -> (u8, u64) {
 
 /// What a router did with a class.
 pub(super) fn carried(links: &Links, class: Class) -> ClassCarried {
-    let none = ClassCarried { class: class.0, taken: 0, sent: 0, came: 0, delivered: 0, lost: Vec::new() };
+    let none = ClassCarried { class: class.0, taken: 0, sent: 0, came: 0, delivered: 0, lost: Vec::new(), age: None };
     links.classes.iter().find(|carried| carried.class == class.0).cloned().unwrap_or(none)
 }
 
@@ -108,7 +108,7 @@ pub(super) struct Accounts {
 }
 
 /// Waits until nothing of a class is under way, and has every package accounted for: what was sent is what came, and what each on the
-/// way counts as lost. `delayed` are further classes whose packages have datagrams of their own.
+/// way counts as lost.
 pub(super) fn balance(field: &Field, source: &Source, sink: &mut Sink, class: Class) -> Accounts {
     let (base, arm) = (field.robot("base"), field.robot("arm"));
     let transit = base.name(&router_of("base")).with_local(local::TRANSIT);

@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 const ANSWERED_WITHIN: Duration = Duration::from_secs(15);
 /// A call is repeated after a third of this: so what is answered within [`ANSWERED_WITHIN`] was sent once.
 const ONE_TRY: Duration = Duration::from_secs(60);
+/// As many as a tool may have under way.
+const WAITING: usize = 8;
 /// These are repeated several times meanwhile.
 const MANY_TRIES: Duration = Duration::from_millis(900);
 
@@ -38,10 +40,15 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
         signal(pid, Signal::SIGKILL);
         let killed = Instant::now();
         wait(format!("{pid} is gone"), || (!runs(pid)).then_some(()));
-        numbers.by_ref().take(12).for_each(|number| waiting.begin(number));
+        numbers.by_ref().take(WAITING).for_each(|number| waiting.begin(number));
         waiting.settle();
         assert!(killed.elapsed() < ANSWERED_WITHIN, "after {:?}", killed.elapsed());
-        assert_eq!(waiting.answered().len(), 12, "what waited was carried by the next router: {:?}", waiting.answers);
+        assert_eq!(
+            waiting.answered().len(),
+            WAITING,
+            "what waited was carried by the next router: {:?}",
+            waiting.answers
+        );
         under_way.settle();
         answers[probe].extend(waiting.close());
         answers[probe].extend(under_way.close());

@@ -10,6 +10,7 @@ mod flow;
 mod frozen;
 mod killed;
 mod link;
+mod master;
 mod strangers;
 mod twice;
 
@@ -17,8 +18,10 @@ use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, skipped, wait};
 use crate::process::Running;
 use rohrpost::common::GET_DATA;
 use rohrpost::config::Installation;
+use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{LinkState, Links, PeerLink, RouterInterface};
 use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::value::Data;
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use std::path::{Path, PathBuf};
@@ -140,17 +143,21 @@ impl Field {
     }
 
     /// What a router says of itself, at most half a second old.
-    fn links(&self, node: &str) -> Links {
+    fn said<T: Data>(&self, node: &str, port: DataPort<T>) -> T {
         let robot = self.robot(node);
-        let (router, port) = (robot.name(&router_of(node)), RouterInterface::LINKS);
-        wait(format!("links of {node}"), || {
+        let router = robot.name(&router_of(node));
+        wait(format!("{} of {node}", port.name), || {
             let mut tool = robot.tool(Duration::from_secs(2));
             let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
-            let links = tool.call::<(u64, Links)>(router, GET_DATA, (port.hash)(), ask, |bytes| from_bytes(bytes));
+            let said = tool.call::<(u64, T)>(router, GET_DATA, (port.hash)(), ask, |bytes| from_bytes(bytes));
             tool.close();
             // Of a router that was just started there is nothing yet.
-            links.ok().map(|(_, links)| links)
+            said.ok().map(|(_, said)| said)
         })
+    }
+
+    fn links(&self, node: &str) -> Links {
+        self.said(node, RouterInterface::LINKS)
     }
 
     /// A node, as another one's router sees it.
@@ -212,7 +219,8 @@ fn configure(place: &Place, name: &str, nodes: usize, network: &str, further: &[
         format!("[nodes.{name}]\naddress = \"{address}\"\ntools = {tools}\n")
     };
     let all: String = NODES[..nodes].iter().map(node).collect();
-    let sections = format!("{all}[network]\nsecurity = \"none\"\n{network}\n[time]\nsource = \"master\"\n");
+    let sections =
+        format!("{all}[network]\nsecurity = \"none\"\n{network}\n[time]\nsource = \"master\"\ninterval = \"500 ms\"\n");
     let on = |(index, (node, ..)): (usize, &(&str, &str, &str))| {
         probe(&format!("probe.{index}"), "rate-hz = 50.0", &format!("node = \"{node}\""))
     };

@@ -58,6 +58,7 @@ fn nodes_with_different_configurations_refuse_each_other_and_both_say_why() {
     assert_eq!((refused.taken, refused.sent, refused.lost[0].cause.as_str()), (20, 0, "refused"));
     assert!(sink.came.is_empty() && field.place.counted().is_empty(), "{:?}", sink.came);
 
+    drop((source, sink));
     field.halt_node("arm");
     field.launch(&["arm"], &[]);
     field.wait_counted("base", "probe.1", 1);

@@ -1,14 +1,17 @@
 //! Two routers claim to be one node.
 
-use super::flow::{ALONE_BYTES, PLAIN, Sink, Source, URGENT};
+use super::flow::{ALONE_BYTES, PLAIN, Sink, Source};
 use super::{Field, mailbox_on};
-use crate::harness::{PATIENCE, wait};
+use crate::harness::wait;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost::mailbox::{Head, Type};
 use rohrpost_routers::frame::{FrameHead, Kind};
 use std::net::UdpSocket;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+/// Where the numbers of the second begin.
+const SECOND: u64 = 1 << 32;
 
 /// A second router of the arm, at the same address: its datagrams are those of a router with the right configuration.
 struct Second {
@@ -26,15 +29,15 @@ impl Second {
         Self { socket, head }
     }
 
-    /// A package for the sink at the base, with the number of the datagram.
+    /// A package for the sink at the base, as the first one's, with the datagram's number above [`SECOND`].
     fn send(&mut self) {
-        let body = [&self.head.sequence.to_le_bytes()[..], &[0; ALONE_BYTES - 8]].concat();
+        let body = [&(SECOND + self.head.sequence).to_le_bytes()[..], &[0; ALONE_BYTES - 8]].concat();
         let package = Head {
             to: mailbox_on("base"),
             from: mailbox_on("arm"),
             len: body.len() as u16,
             kind: Type::data(1),
-            priority: URGENT.priority(),
+            priority: PLAIN.priority(),
             ..Head::default()
         };
         let rest = [&package.to_bytes()[..], &body].concat();
@@ -52,19 +55,27 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
     let mut first = Source::new(field.robot("arm"), "arm", "base", PLAIN);
     let mut second = Second::new(&field);
     let words = ["two routers send as node arm", "address is used twice"];
-    let begun = Instant::now();
-    while field.lines("router.0", &words).is_empty() {
-        assert!(begun.elapsed() < PATIENCE, "nobody says {words:?}");
+    wait("base tells of two", || {
         first.send();
         second.send();
-        sink.take(Duration::from_millis(20));
-    }
+        sink.take(Duration::from_millis(1));
+        (!field.lines("router.0", &words).is_empty()).then_some(())
+    });
     field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
     // What is delivered: of the first until the second is heard, from there on of the second alone.
-    let turn = sink.came.iter().position(|(class, _)| *class == URGENT.0).unwrap();
-    assert!(sink.came[turn..].iter().all(|(class, _)| *class == URGENT.0), "{:?}", sink.came);
-    assert_eq!(sink.numbers(URGENT), (0..second.head.sequence).collect::<Vec<_>>(), "all of the second");
-    assert!(sink.numbers(PLAIN).len() <= 2, "of the first, what came before: {:?}", sink.numbers(PLAIN));
+    wait("all of the second came", || {
+        sink.take(Duration::from_millis(1));
+        (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
+    });
+    let numbers = sink.numbers(PLAIN);
+    let turn = numbers.iter().position(|number| *number == SECOND).unwrap();
+    assert!(turn <= 2, "{turn} of the first came before");
+    assert!(
+        (SECOND..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
+        "all of the second, and nothing else"
+    );
+    let not_taken = field.peer("base", "arm").refused;
+    assert!(not_taken >= first.sent - turn as u64, "{not_taken} of {}", first.sent);
     // The first notices that its peer hears another.
     wait("arm is not heard", || {
         second.send();
@@ -73,18 +84,20 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
     assert_eq!(field.fault("arm", "probe.0"), Fault::NodeDeaf { node: "base".into() });
 
     // The second ends: after a second of its silence the first is heard again.
-    sink.take(Duration::from_millis(20));
-    let before = sink.numbers(PLAIN).len();
+    sink.came.clear();
     wait("the first is heard again", || {
         first.send();
-        sink.take(Duration::from_millis(20));
-        (sink.numbers(PLAIN).len() > before + 10).then_some(())
+        sink.take(Duration::from_millis(1));
+        (sink.numbers(PLAIN).iter().filter(|number| **number < SECOND).count() > 10).then_some(())
     });
+    let numbers = sink.numbers(PLAIN);
+    let first_again = numbers.iter().position(|number| *number < SECOND).unwrap();
+    assert!(numbers[first_again..].is_sorted_by(|one, next| one < next), "in order, none twice, none of the second");
     field.wait_counted("base", "probe.1", 2);
     field.wait_counted("arm", "probe.0", 3);
     let peer = field.peer("base", "arm");
     assert_eq!(peer.restarts, 2, "to the second, and back");
-    assert!(sink.numbers(PLAIN).is_sorted_by(|one, next| one < next), "in order, none twice");
     assert_eq!(field.lines("router.0", &words).len(), 1, "told once");
+    drop((first, sink));
     field.stop();
 }
