@@ -24,6 +24,9 @@ use std::time::{Duration, Instant};
 
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
 const BURST: usize = 64;
+/// While some wait already, only so many between two datagrams: a flood must not be taken in faster than anything gets out. What
+/// is left in the mailbox is the least important.
+const FEW: usize = 8;
 /// To wait for less than this, it sleeps with a timeout, which is exact but costs a timer of the kernel; for longer waits the thread
 /// that receives rings, within its own patience.
 const EXACT: Duration = Duration::from_millis(10);
@@ -50,11 +53,12 @@ impl Departures {
     pub(super) fn run(mut self) {
         let mut awake = Awake::default();
         while !self.shared.ends() {
-            let taken = self.take();
+            let most = if self.outbound.is_empty() { BURST } else { FEW };
+            let taken = self.take(most);
             let now_ns = monotonic_ns();
             match self.outbound.poll(now_ns, &mut self.datagram, &mut self.answers) {
                 Output::Send { to, bytes } => self.send(to, bytes),
-                Output::Wait { .. } if taken == BURST => {}
+                Output::Wait { .. } if taken == most => {}
                 Output::Wait { until_ns } => {
                     let until_ns = until_ns.min(self.wire.deliver(now_ns));
                     self.sleep(now_ns, until_ns);
@@ -64,10 +68,10 @@ impl Departures {
         }
     }
 
-    /// Takes what waits in the mailbox, most important first; how many.
-    fn take(&mut self) -> usize {
+    /// Takes what waits in the mailbox, most important first, at most so many; how many.
+    fn take(&mut self, most: usize) -> usize {
         let Self { transit, outbound, answers, wire, .. } = self;
-        for taken in 0..BURST {
+        for taken in 0..most {
             let Some(waiting) = transit.try_receive() else { return taken };
             let (now_ns, body) = (monotonic_ns(), waiting.body());
             let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body };
@@ -79,7 +83,7 @@ impl Departures {
                 outbound.unsent(&head, body, answers);
             }
         }
-        BURST
+        most
     }
 
     fn send(&mut self, to: NodeIndex, bytes: usize) {
