@@ -160,6 +160,11 @@ impl Outbound {
         if taken { Accepted::Waits } else { Accepted::Lost }
     }
 
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.queue.is_empty()
+    }
+
     /// What leaves next, or when to ask again. `datagram` has room for the largest.
     ///
     /// # Panics

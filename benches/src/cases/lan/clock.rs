@@ -29,6 +29,7 @@ const INTERVAL: Duration = Duration::from_millis(100);
 const SETTLED: u64 = 50;
 const PATIENCE: Duration = Duration::from_secs(60);
 const PORT: u16 = 20_140;
+const MTU: u16 = 1_500;
 const SKEW: Skew = Skew { offset_ns: 1_234_000_000, rate_ppb: 30_000, wander_ppb: 500.0, begin_ns: 0 };
 /// The load: datagrams of an ordinary network, about 40 000 a second.
 const LOAD_BYTES: usize = 1_400;
@@ -53,7 +54,7 @@ impl Case for Clock {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let wire = Wire::new();
+        let wire = Wire::new(MTU);
         let wire = || wire.as_ref().map_err(Clone::clone);
         let fixed = |(name, bounds)| Contender { name, turn: Box::new(move || Ok(bounds)) };
         let contenders = [

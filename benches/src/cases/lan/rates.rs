@@ -64,7 +64,7 @@ impl Case for Rate {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
-        let mtu = if self.packs { WHOLE } else { one };
+        let mtu = if self.packs { WHOLE } else { u16::try_from(one).unwrap_or(WHOLE) };
         let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" });
         let losses = Losses::default();
         let raw = Flow {
