@@ -268,6 +268,7 @@ mod tests {
             waiting_bytes: 0,
             classes: Vec::new(),
             foreign: 0,
+            failures: Vec::new(),
         }
     }
 
