@@ -10,6 +10,8 @@ use std::time::Duration;
 /// Classes that only flows have, so that their accounts are theirs alone.
 pub(super) const PLAIN: Class = Class(100);
 pub(super) const URGENT: Class = Class(200);
+/// Less important than the calls of tools, and not real time.
+pub(super) const BULK: Class = Class(8);
 /// More than half of a datagram, and less than one: each datagram carries one package.
 pub(super) const ALONE_BYTES: usize = 1000;
 
