@@ -318,7 +318,9 @@ mod tests {
             let waiting = scope.spawn(|| window.await_room(7, &turn.credit));
             (4..=5).for_each(|next| turn.credit.arrived(next));
             waiting.join().unwrap();
-            assert_eq!(window.lost_before, 0);
+        });
+        assert_eq!(window.lost_before, 0);
+        std::thread::scope(|scope| {
             let waiting = scope.spawn(|| window.await_room(9, &turn.credit));
             while !waiting.is_finished() {
                 turn.credit.silent();
