@@ -30,7 +30,7 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
     let mut calls = Calls::new(&field, "base", "probe.1", CALL);
     let mut last = 0;
     while source.sent < PACKAGES {
-        if source.send() && source.sent % CALL_EVERY == 0 {
+        if source.send() && source.sent.is_multiple_of(CALL_EVERY) {
             last += 1;
             calls.begin(last);
         }
