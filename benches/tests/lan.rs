@@ -51,6 +51,8 @@ fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
             assert_eq!(rows.iter().filter(|row| row["vs"] == *other).count(), 1, "{case} {bytes} beside {other}");
         }
     }
+    let clock: Vec<&Map<String, Value>> = rows.iter().filter(|row| row["case"] == "clock").collect();
+    assert_eq!(clock.iter().filter(|row| row["who"] == "rohrpost" && row["vs"].is_string()).count(), 3, "{clock:?}");
     // A network between two nodes of one computer that are not busy loses nothing.
     for row in rows.iter().filter(|row| row["unit"] == "%") {
         assert_eq!(row["p50"], 0.0, "{row:?}");

@@ -4,6 +4,7 @@
 //!   network/graph            nodes on a circle; on each link, in each direction, how it is: state, packages a second, lost
 //!   network/packages/A → B   packages a second        network/lost/A → B    packages lost on the wire so far
 //!   network/clock/NODE       error bound, µs          network/offset/NODE   offset at the last exchange, µs
+//!   network/latency/…        by class and hop, µs: until the router has it, until it is delivered, until it is taken
 //! ```
 
 use crate::blueprint::Tab;
@@ -13,16 +14,21 @@ use crate::view::{Datum, View};
 use crate::views::is;
 use rerun::blueprint::{ContainerLike, GraphView, Horizontal, TimeSeriesView, Vertical};
 use rerun::{AsComponents, GraphEdges, GraphNodes, Scalars, SerializedComponentBatch};
+use rohrpost::Class;
 use rohrpost::config::Installation;
 use rohrpost::description::{DataItem, Description};
 use rohrpost::interfaces::{ClockState, LinkState, Links, PeerLink};
 use std::collections::{BTreeMap, HashMap};
 use std::f32::consts::TAU;
+use std::time::{Duration, Instant};
 
 /// Of the circle on which nodes stand, and how far a link's words are from the straight way, points of the view.
 const RADIUS: f32 = 260.0;
 const ASIDE: f32 = 34.0;
 const NODE: palette::Rgb = [86, 180, 233];
+
+/// A router tells how it is twice a second; what it told so long ago is no news.
+const OLD: Duration = Duration::from_secs(3);
 
 /// The tab of both views.
 fn tab() -> Tab {
@@ -44,8 +50,8 @@ fn tab() -> Tab {
 /// Links, as all routers see theirs.
 #[derive(Default)]
 pub(crate) struct Network {
-    /// By the node that tells.
-    last: BTreeMap<String, Links>,
+    /// By the node that tells, and when it did.
+    last: BTreeMap<String, (Links, Instant)>,
     /// Packages a second, by the node that sends and the one that receives.
     rates: HashMap<(String, String), f64>,
 }
@@ -57,7 +63,7 @@ impl View for Network {
 
     fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
         let links: Links = datum.read()?;
-        let before = self.last.get(&links.node);
+        let before = self.last.get(&links.node).map(|(before, _)| before);
         for peer in &links.peers {
             let from_to = (links.node.clone(), peer.node.clone());
             if let Some(per_s) = before.and_then(|before| sent_per_s(before, &links, peer)) {
@@ -69,7 +75,13 @@ impl View for Network {
             // Who receives knows what is missing; it is drawn as the loss of the way to it.
             scene.curve(&["network", "lost", &format!("{} → {}", peer.node, links.node)], peer.lost as f64);
         }
-        self.last.insert(links.node.clone(), links);
+        for class in &links.classes {
+            let Some(age) = class.age else { continue };
+            let name = datum.installation.classes.name(Class(class.class)).unwrap_or("others");
+            let name = format!("{name} delivered to {}", links.node);
+            scene.curve(&["network", "latency", &name], age.p99_ns as f64 / 1e3);
+        }
+        self.last.insert(links.node.clone(), (links, Instant::now()));
         scene.log(entity(&["network", "graph"]), &self.graph(datum.installation));
         Ok(())
     }
@@ -121,19 +133,18 @@ impl Network {
         };
         let mut points: Vec<Point> = names.iter().map(node).collect();
         let mut edges: Vec<(String, String)> = Vec::new();
-        for links in self.last.values() {
+        for (links, told) in self.last.values() {
+            let is_old = told.elapsed() > OLD;
             for peer in &links.peers {
                 let (Some(from), Some(to)) = (place(&links.node), place(&peer.node)) else { continue };
                 let per_s = self.rates.get(&(links.node.clone(), peer.node.clone())).copied().unwrap_or(0.0);
                 let id = format!("{} → {}", links.node, peer.node);
                 edges.extend([(links.node.clone(), id.clone()), (id.clone(), peer.node.clone())]);
-                points.push(Point {
-                    id,
-                    at: beside(from, to),
-                    label: words(peer, per_s),
-                    colour: colour(peer.state),
-                    radius: 4.0,
-                });
+                let (label, colour) = match is_old {
+                    true => (format!("{} tells no more", links.node), colour(LinkState::Unknown)),
+                    false => (words(peer, per_s), colour(peer.state)),
+                };
+                points.push(Point { id, at: beside(from, to), label, colour, radius: 4.0 });
             }
         }
         let nodes = GraphNodes::new(points.iter().map(|point| point.id.as_str()))
@@ -257,6 +268,7 @@ mod tests {
             waiting_bytes: 0,
             classes: Vec::new(),
             foreign: 0,
+            failures: Vec::new(),
         }
     }
 

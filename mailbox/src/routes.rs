@@ -64,6 +64,20 @@ impl Node {
         Ok(())
     }
 
+    /// Nothing goes to other nodes any more, until that is said anew.
+    ///
+    /// # Errors
+    /// When the file cannot be removed.
+    pub fn forget_routes(&self) -> Result<(), NodeError> {
+        let path = self.path().join(FILE);
+        match fs::remove_file(&path) {
+            Ok(()) => self.raise_registry_epoch(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(NodeError::of(&path, error)),
+        }
+        Ok(())
+    }
+
     /// The mailbox of the router that takes packages for this name to another node; none if it has no route. A name with a
     /// mailbox on this node may have one too: nobody follows it.
     pub fn route(&self, name: Name) -> Option<Name> {
@@ -139,6 +153,10 @@ mod tests {
         assert!(node.route(name).is_none() && node.registry_epoch() != epoch);
         let files: Vec<_> = fs::read_dir(folder.path().join("node")).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!(files.len(), 2, "`node`, `routes`, and nothing unfinished: {files:?}");
+        node.set_routes(VIA, &[(name, name)]).unwrap();
+        node.forget_routes().unwrap();
+        node.forget_routes().unwrap();
+        assert!(node.route(name).is_none() && !node.path().join(FILE).exists());
     }
 
     #[test]

@@ -6,12 +6,12 @@ use crate::latest::Posts;
 use crate::name::{Name, Priority};
 use crate::package::{Head, Options, Type};
 use crate::participant::Participant;
+use crate::place::Place;
 use crate::routes;
 use crate::segment::{BadSegment, Segment};
 use crate::slots::{Claim, NoSlot, Published};
 use crate::step::step;
 use crate::traffic::{Key, Writer};
-use crate::word::Claimant;
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.
@@ -76,54 +76,6 @@ impl Label {
     fn head(&self, to: Name, len: usize) -> Head {
         let Self { from, kind, id, priority, options } = *self;
         Head { to, from, len: len as u16, kind, id, priority, options }
-    }
-}
-
-/// Where a sender looks for a free slot first.
-///
-/// As long as the receiver keeps up, in few slots by turns: their lines are still in the caches of both, and the next can be
-/// fetched while the receiver reads the last. When these are in use, onwards through all, so that a long queue is not searched
-/// for each package anew.
-struct Place {
-    /// The slot that the next search begins with, if it is not for the home.
-    cursor: usize,
-    /// First of the few. Senders have different ones, so that they meet less.
-    home: usize,
-    /// Which of the few is next.
-    turn: usize,
-    /// Searches until the home is tried again.
-    away: u32,
-}
-
-impl Place {
-    /// So many slots make a home.
-    const HOME: usize = 4;
-    /// So many searches the home is left alone when its next slot was in use.
-    const AWAY: u32 = 32;
-
-    fn of(me: Claimant) -> Self {
-        let home = usize::from(me.participant) * 7;
-        Self { cursor: home, home, turn: 0, away: 0 }
-    }
-
-    /// The slot that will be looked at first.
-    fn next(&self) -> usize {
-        if self.away == 0 { self.home + self.turn } else { self.cursor }
-    }
-
-    fn first(&mut self) -> &mut usize {
-        self.cursor = self.next();
-        &mut self.cursor
-    }
-
-    fn found(&mut self, slot: usize, count: usize) {
-        if self.away > 0 {
-            self.away -= 1;
-        } else if slot == (self.home + self.turn) % count {
-            self.turn = (self.turn + 1) % Self::HOME;
-        } else {
-            self.away = Self::AWAY;
-        }
     }
 }
 

@@ -141,7 +141,8 @@ fn late_answers_and_those_to_forgotten_calls_are_dropped() {
 #[test]
 fn faults_come_as_faults() {
     let mut ground = ground();
-    for fault in [Fault::ModuleOff, Fault::Interrupted, Fault::Busy, Fault::Arguments("no".into())] {
+    let silent = Fault::NodeSilent { node: "arm".into() };
+    for fault in [Fault::ModuleOff, Fault::Interrupted, Fault::Busy, Fault::Arguments("no".into()), silent] {
         let call = ground.begin(SERVER, 1, LONG).unwrap();
         let CallEnvelope { incarnation, sequence, .. } = take(&mut ground.server).envelope;
         ground.answer_as(SERVER, incarnation, sequence, Options::ERROR, &postcard::to_stdvec(&fault).unwrap());
@@ -159,8 +160,13 @@ fn a_refused_try_says_nothing_of_its_repeats() {
     while ground.server.try_receive().is_none() {
         assert!(ground.link.poll(call).is_none());
     }
-    let busy = postcard::to_stdvec(&Fault::Busy).unwrap();
-    ground.answer_as(SERVER, first.incarnation, first.sequence, Options::ERROR, &busy);
+    for refusal in [Fault::Busy, Fault::NoMailbox, Fault::NodeSilent { node: "arm".into() }] {
+        let mut body = Vec::new();
+        assert!(refusal.answer(&first.to_bytes(), &mut body), "as a router answers");
+        let (_, fault) = ReplyEnvelope::split(&body).unwrap();
+        ground.answer_as(SERVER, first.incarnation, first.sequence, Options::ERROR, fault);
+        assert!(ground.link.poll(call).is_none(), "{refusal}");
+    }
     ground.answer_as(SERVER, first.incarnation, first.sequence, Options::default(), &[8]);
     assert_eq!(ground.wait(call).unwrap(), 8);
 }

@@ -273,7 +273,8 @@ fn one_that_is_stopped_before_its_turn_does_not_keep_the_start() {
         };
         let mut tool = ToolLink::join(&installation, &node, "main", PATIENCE).unwrap();
         // The last: nothing comes after it that would wake launch. Launch has its node before it has its mailbox.
-        while let Err(error) = tool.stop("third.0") {
+        let launcher = tool.launcher();
+        while let Err(error) = tool.stop(launcher, "third.0") {
             assert!(began.elapsed() < PATIENCE, "{error}");
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -319,7 +320,7 @@ fn what_is_off_comes_back_off_however_it_ended() {
         kill(before);
         if asked {
             // Launch finds this as soon as it has seen the end; what was printed last is still waited for then.
-            person.begin_restart("first.0").unwrap();
+            person.begin_restart(person.launcher(), "first.0").unwrap();
         }
         watch_until(&mut launch, |launch| {
             launch.phase(name) == Some(Phase::Running) && pid(launch, 0).is_some_and(|pid| pid != before)

@@ -185,7 +185,7 @@ impl End {
     pub(crate) fn hears(&self, peer: NodeIndex, now_ns: u64) {
         let link = &self.stats.peer(peer).link;
         link.heard_ns.set(now_ns);
-        link.hears_us_ns.set(now_ns);
+        link.hears_us(now_ns, true);
     }
 
     fn alive(&mut self, now_ns: u64) -> Vec<(NodeIndex, Vec<u8>)> {

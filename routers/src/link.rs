@@ -8,11 +8,13 @@ use crate::stats::Count;
 /// A peer to which nothing else goes is told "still there" this often.
 pub const ALIVE_EVERY_NS: u64 = 200_000_000;
 /// A busy peer is told what was heard of it this often.
-pub const TELL_EVERY_NS: u64 = 1_000_000_000;
+pub const TELL_EVERY_NS: u64 = 500_000_000;
 /// A peer of which nothing came for so long is silent.
 pub const SILENT_AFTER_NS: u64 = 1_000_000_000;
-/// A peer that is heard, but for so long has not said that it hears us, does not.
-pub const UNHEARD_AFTER_NS: u64 = 2 * TELL_EVERY_NS + ALIVE_EVERY_NS;
+/// A peer that says for so long that it does not hear us, does not: who has just begun is not heard at once.
+pub const DENIED_FOR_NS: u64 = 1_000_000_000;
+/// So long after a peer has heard us last it is unheard at the latest, if none of what it says is lost.
+pub const UNHEARD_AFTER_NS: u64 = SILENT_AFTER_NS + TELL_EVERY_NS + DENIED_FOR_NS;
 /// A refusal holds for so long; whoever goes on refusing says so every second.
 pub const REFUSED_FOR_NS: u64 = 3_000_000_000;
 
@@ -42,13 +44,15 @@ pub struct Link {
     pub next: Count,
     /// When it said last that it hears us, ns; 0: never.
     pub hears_us_ns: Count,
+    /// When it began to say that it does not, ns; 0: it does not say so.
+    pub denied_ns: Count,
     /// When it was first heard after it was not, ns.
     pub since_ns: Count,
     /// Datagrams of ours that it misses, as it says.
     pub missed_by_it: Count,
     /// When one of us refused the other last, ns; 0: never.
     refused_ns: Count,
-    /// What differs, as eight and eight bytes: see [`pack`].
+    /// What differs: version, reason, whether a digest is known; and that.
     refused_why: Count,
     refused_digest: Count,
 }
@@ -66,13 +70,33 @@ impl Link {
         if heard_ns == 0 {
             return State::Unknown;
         }
-        let doubt_ns = self.hears_us_ns.get().max(self.since_ns.get()).saturating_add(UNHEARD_AFTER_NS);
-        if doubt_ns <= now_ns && !broken!(NeverUnheard) { State::Unheard } else { State::Alive }
+        let denied_ns = self.denied_ns.get();
+        let is_unheard = denied_ns != 0 && denied_ns.saturating_add(DENIED_FOR_NS) <= now_ns;
+        if is_unheard && !broken!(NeverUnheard) { State::Unheard } else { State::Alive }
     }
 
     /// What to tell it of itself. `missing`: datagrams of its that never came.
-    pub(crate) fn told(&self, missing: u64) -> Alive {
+    pub(crate) fn told(&self, now_ns: u64, missing: u64) -> Alive {
+        if self.heard_ns.get().saturating_add(SILENT_AFTER_NS) <= now_ns {
+            return Alive::default();
+        }
         Alive { heard_incarnation: self.incarnation.get(), heard_next: self.next.get(), heard_lost: missing }
+    }
+
+    /// It says whether it hears us.
+    pub(crate) fn hears_us(&self, now_ns: u64, hears: bool) {
+        if hears {
+            self.hears_us_ns.set(now_ns);
+            self.denied_ns.set(0);
+        } else if self.denied_ns.get() == 0 {
+            self.denied_ns.set(now_ns);
+        }
+    }
+
+    /// What it said of us is of another time: it is heard anew, or could not be heard.
+    pub(crate) fn begin(&self, now_ns: u64) {
+        self.since_ns.set(now_ns);
+        self.denied_ns.set(0);
     }
 
     pub(crate) fn refuse(&self, now_ns: u64, mismatch: Mismatch) {

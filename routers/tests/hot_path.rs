@@ -5,12 +5,13 @@
 
 use rohrpost_config::{Network, Route};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::{Datagram, Inbound};
 use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
 use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::stats::{Cause, Stats};
+use rohrpost_routers::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::net::{IpAddr, Ipv4Addr};
@@ -222,4 +223,68 @@ fn no_package_touches_the_heap() {
         assert!(happened(cause) > 10, "{cause:?}: {} times", happened(cause));
     }
     assert!(pair.counts.delivered > 10_000 && pair.datagrams > 10_000);
+}
+
+/// Two clocks without a network: what one sends the other has at once.
+struct Clocks {
+    clocks: [Clock; 2],
+    now_ns: u64,
+    frames: u64,
+}
+
+impl Clocks {
+    fn new() -> Self {
+        let clock = |own| {
+            let interval = std::time::Duration::from_millis(100);
+            let settings =
+                TimeSettings { system: 1, own, nodes: 2, masters: vec![0], interval, digest: 7, incarnation: 9 };
+            Clock::new(settings, 0, 1_790_000_000 * 1000 * MS, None)
+        };
+        Self { clocks: [clock(0), clock(1)], now_ns: 0, frames: 0 }
+    }
+
+    /// Until nothing is due; then until the next is.
+    fn step(&mut self) {
+        let mut until = u64::MAX;
+        for own in [0, 1] {
+            let mut datagram = [0; TIME_BYTES];
+            loop {
+                match self.clocks[own].poll(self.now_ns, &mut datagram) {
+                    Step::Wait { until_ns } => break until = until.min(until_ns),
+                    Step::Send { stamp, .. } => {
+                        let stamped = |ns| Stamp { ns, doubt_ns: 50, by_kernel: true };
+                        if let Some(id) = stamp {
+                            self.clocks[own].sent(id, stamped(self.now_ns + 1_000));
+                        }
+                        self.now_ns += 10_000;
+                        let (head, rest) = FrameHead::parse(&datagram).unwrap();
+                        let _ = self.clocks[1 - own].handle(self.now_ns, stamped(self.now_ns), &head, rest);
+                        self.frames += 1;
+                    }
+                }
+            }
+        }
+        self.now_ns = self.now_ns.max(until);
+    }
+}
+
+#[test]
+fn a_clock_takes_nothing_from_the_heap() {
+    let mut clocks = Clocks::new();
+    while clocks.clocks[1].role() != Role::Slave || !clocks.clocks[1].reading(clocks.now_ns).synchronised {
+        assert!(clocks.now_ns < 10_000 * MS, "{:?}", clocks.clocks[1].reading(clocks.now_ns));
+        clocks.step();
+    }
+    let before = USES.get();
+    clocks.frames = 0;
+    while clocks.frames < 10_000 {
+        clocks.step();
+    }
+    assert_eq!(USES.get() - before, 0);
+    // Without a master, too.
+    for _ in 0..1_000 {
+        clocks.now_ns += 10 * MS;
+        let _ = clocks.clocks[1].poll(clocks.now_ns, &mut [0; TIME_BYTES]);
+    }
+    assert_eq!(USES.get() - before, 0);
 }

@@ -122,7 +122,7 @@ impl Nodes {
                 us(clock.offset_ns as f64),
                 format!("{:.3} ppm", clock.rate_ppb as f64 / 1000.0),
                 clock.round_trip_ns.map_or_else(|| "-".into(), |ns| us(ns as f64)),
-                if clock.by_kernel { "kernel" } else { "own" }.into(),
+                stamps(clock).into(),
                 told.ago_ns.map_or_else(String::new, |ns| time(Duration::from_nanos(ns.max(0).unsigned_abs()))),
             ]
         });
@@ -133,6 +133,15 @@ impl Nodes {
             }
         }
         text
+    }
+}
+
+/// Who stamps the frames that it measures by.
+fn stamps(clock: &ClockState) -> &'static str {
+    match (clock.role, clock.exchanges) {
+        (ClockRole::Master, _) | (_, 0) => "-",
+        _ if clock.by_kernel => "kernel",
+        _ => "own",
     }
 }
 

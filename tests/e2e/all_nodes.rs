@@ -5,8 +5,10 @@ use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
 use std::collections::BTreeSet;
 use std::fmt::Write;
+use std::os::unix::fs::chown;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 const NODES: &str =
     "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\ntools = [16, 31]\n";
@@ -183,6 +185,37 @@ fn what_cannot_be_launched_is_told_with_its_remedy() {
     place.assert_empty();
 }
 
+/// Of tests that run as root: a user who is not launches all nodes, too, if users may make namespaces.
+#[test]
+fn a_user_without_rights_launches_all_nodes() {
+    const NOBODY: u32 = 65_534;
+    if !nix::unistd::geteuid().is_root() {
+        return skipped("root alone can be somebody else; the other tests ran without its rights");
+    }
+    let place = Place::new();
+    // No program of the tests' own: nobody may be allowed to read the folder that it is in.
+    let config = place.config_of("test", &format!("{NODES}{NETWORK}"), &[&format!("{OUTPUT}node = \"arm\"\n")]);
+    let launch = place.command(&["launch", config.to_str().unwrap(), "--all"]);
+    let program = place.path("rohrpost");
+    std::fs::copy(launch.get_program(), &program).unwrap();
+    for path in [place.memory(), config.parent().unwrap()] {
+        chown(path, Some(NOBODY), Some(NOBODY)).unwrap();
+    }
+    let mut command = Command::new(&program);
+    command.args(launch.get_args()).env("ROHRPOST_DIR", place.memory()).current_dir(config.parent().unwrap());
+    command.uid(NOBODY).gid(NOBODY).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut launch = Running::start(command);
+    wait("it runs, or may not", || {
+        let runs = ["base of test runs: 1 module", "arm of test runs: 2 modules"];
+        (launch.ended().is_some() || runs.iter().all(|runs| launch.out().contains(runs))).then_some(())
+    });
+    if launch.err().contains("network namespaces cannot be made here") {
+        return skipped(&launch.err());
+    }
+    launch.stop();
+    place.assert_empty();
+}
+
 /// As on a computer that lets nobody make them: a user namespace with a limit of none.
 #[test]
 fn without_the_right_to_namespaces_it_says_what_gives_it() {
@@ -197,10 +230,7 @@ fn without_the_right_to_namespaces_it_says_what_gives_it() {
         .args(["--user", "--map-root-user", "sh", "-c", &script, "sh"])
         .arg(launch.get_program())
         .args(launch.get_args());
-    limited
-        .env("ROHRPOST_DIR", place.memory())
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped());
+    limited.env("ROHRPOST_DIR", place.memory()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let Ok(child) = limited.spawn() else { return skipped("there is no `unshare`") };
     let output = child.wait_with_output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);

@@ -102,7 +102,15 @@ fn what_a_file_means_can_be_read_by_programs() {
     assert_eq!((&json["right"], &json["installation"]["name"]), (&true.into(), &"two-computers".into()));
     let base = &json["installation"]["nodes"][0];
     assert_eq!((&base["name"], &base["mode"]), (&"base".into(), &"0770".into()));
-    let motor = &base["modules"][0];
+    let router = &base["modules"][0];
+    assert_eq!((&router["name"], &router["restart"]["policy"]), (&"router.0".into(), &"always".into()), "by itself");
+    let installation = &json["installation"];
+    assert_eq!(
+        (&installation["network"]["port"], &installation["network"]["security"]),
+        (&4000.into(), &"none".into())
+    );
+    assert_eq!(installation["time"]["masters"], serde_json::json!(["desk", "base"]));
+    let motor = &base["modules"][1];
     assert_eq!((&motor["name"], &motor["scheduling"]["fifo"]), (&"motor.0".into(), &25.into()));
     assert_eq!(motor["mailboxes"]["commands"]["max_age_ms"], 300.0);
     assert_eq!(json["missing_programs"][0]["module"], "motor.0");

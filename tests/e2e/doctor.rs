@@ -1,6 +1,6 @@
 //! `rohrpost doctor` on the computer that the tests run on. What it says of others is tested beside its code.
 
-use crate::harness::{OUTPUT, Place, probe, wait};
+use crate::harness::{NETWORK, OUTPUT, Place, probe, wait};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
@@ -35,6 +35,37 @@ fn this_computer_is_examined() {
     // For people, with the same words.
     let page = place.say(&["doctor"]).out;
     assert!(page.contains(" warnings, ") && page.contains("ok    kernel"), "{page}");
+    place.assert_empty();
+}
+
+/// Both nodes are this computer, at addresses of the loopback, on which nobody else's router is.
+#[test]
+fn the_network_of_a_configuration_is_examined() {
+    let place = Place::new();
+    let node =
+        |name: &str, address: &str, tools: &str| format!("[nodes.{name}]\naddress = \"{address}\"\ntools = {tools}\n");
+    let nodes = |base: &str| node("base", base, "[0, 3]") + &node("arm", "127.251.7.2", "[4, 7]") + NETWORK;
+    let module = probe("probe.0", "", "node = \"arm\"");
+    let config = place.config_of("test", &nodes("127.251.7.1"), &[&module]);
+    let findings = examine(&place, &["--config", config.to_str().unwrap(), "--node", "base"]);
+    let is = |what: &str| find(&findings, what)["is"].as_str().unwrap();
+    assert!(is("node address").starts_with("127.251.7.1"), "{}", is("node address"));
+    assert_eq!((is("port of packages"), is("port of time")), ("UDP 21117, free", "UDP 21118, free"));
+    assert_eq!(is("time stamps"), "sending and receiving");
+    assert_eq!(is("peer"), "arm at 127.251.7.2: is there; no router runs on it yet");
+    assert!(is("packet size").starts_with("1500 B of the 65"), "{}", is("packet size"));
+    // A port that somebody has, and an address that nobody has (RFC 5737).
+    let taken = std::net::UdpSocket::bind("127.251.7.1:21118").unwrap();
+    let findings = examine(&place, &["--config", config.to_str().unwrap(), "--node", "base"]);
+    assert_eq!(find(&findings, "port of time")["is"], "UDP 21118, another program has it");
+    assert_eq!(find(&findings, "port of time")["state"], "bad");
+    drop(taken);
+    let config = place.config_of("elsewhere", &nodes("192.0.2.1"), &[&module]);
+    let findings = examine(&place, &["--config", config.to_str().unwrap(), "--node", "base"]);
+    assert_eq!(find(&findings, "node address")["state"], "bad");
+    let mend = find(&findings, "node address")["mend"].as_str().unwrap();
+    assert!(mend.contains("base") && mend.contains("elsewhere.toml"), "{mend}");
+    assert_eq!(find(&findings, "port of time")["is"], "UDP 21118, not tried");
     place.assert_empty();
 }
 

@@ -248,3 +248,47 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
     });
     lan.stop();
 }
+
+#[test]
+fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
+    let mut lan = Lan::launched();
+    let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
+    let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
+    assert_eq!(told.as_array().unwrap().len(), 1, "of the node that was asked for");
+    let config = lan.config.to_str().unwrap().to_owned();
+    let all = |lan: &Lan, more: &[&str]| lan.place.say(&[&["net", "--config", &config], more].concat());
+    let told = wait("all hear each other, and have one time", || {
+        let told: serde_json::Value = serde_json::from_str(&all(&lan, &["--json"]).out).unwrap();
+        let alive = (0..2).all(|node| state(&told, node) == "alive");
+        let slave = (0..2).any(|node| told[node]["clock"]["role"] == "slave");
+        (alive && slave).then_some(told)
+    });
+    assert_eq!((&told[0]["node"], &told[1]["links"]["peers"][0]["node"]), (&"base".into(), &"base".into()));
+    assert!(told[0]["rates"][0]["sent_bytes_s"].as_f64().unwrap() > 0.0, "they say that they are there: {told}");
+    let text = all(&lan, &[]).ok();
+    for words in ["base", "arm", "alive", "slave of", "there and back"] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+    // A command to a mailbox that nobody has is lost at its node, and that is told.
+    assert_eq!(lan.say(&["stop", "probe.1"]).code, Some(0));
+    assert_eq!(lan.fault(), Some(Fault::NoMailbox));
+    wait("the loss is told", || all(&lan, &[]).out.contains("no-mailbox").then_some(()));
+    let (mut launch, robot) = lan.nodes.pop().unwrap();
+    drop(robot);
+    launch.stop();
+    let silent = wait("arm is silent", || Some(all(&lan, &[])).filter(|said| said.out.contains("silent")));
+    assert_eq!(silent.code, Some(1), "{silent:?}");
+    assert!(silent.out.contains("node arm: "), "{silent:?}");
+    lan.stop();
+}
+
+#[test]
+fn a_node_alone_has_no_net() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let told = place.say(&["net"]).fails();
+    assert!(told.contains("has one node, and so no routers"), "{told}");
+    drop(robot);
+    launch.stop();
+    place.assert_empty();
+}

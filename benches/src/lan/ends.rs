@@ -78,13 +78,24 @@ impl Source {
     }
 }
 
-impl Inlet for Source {
-    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+impl Source {
+    /// Sends; false when the router's mailbox has no room.
+    ///
+    /// # Errors
+    /// When it cannot be sent for another reason.
+    pub fn offer(&mut self, message: &[u8]) -> Result<bool, Failure> {
         match self.sender.send(&self.label, &[message]) {
-            // The receiver counts what is missing.
-            Ok(()) | Err(SendError::Full(_)) => Ok(()),
+            Ok(()) => Ok(true),
+            Err(SendError::Full(_)) => Ok(false),
             Err(error) => Err(Failure::of("send", error)),
         }
+    }
+}
+
+impl Inlet for Source {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        // The receiver counts what is missing.
+        self.offer(message).map(drop)
     }
 }
 

@@ -1,9 +1,9 @@
 //! Messages in one direction as fast as they go, where some may be lost: what comes is counted, and what does not.
 
 use crate::Failure;
+use crate::floors::ring::Bell;
 use crate::harness::{Child, End, Gate, Placement, Scheduling, Shared, Zeroable, settle};
-use nix::sched::sched_yield;
-use rohrpost_mailbox::monotonic_ns;
+use rohrpost_mailbox::{monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -34,8 +34,6 @@ const LOOK_EVERY: u64 = 61;
 const CLOCK_EVERY: u64 = 16;
 /// After this silence nothing more is on its way.
 pub const SILENCE: Duration = Duration::from_millis(60);
-/// What is on its way for so long is held for lost, and its room in the window is given again.
-const LOST_AFTER: Duration = Duration::from_millis(20);
 /// A turn that takes so much longer than its cap hangs, and is killed.
 const GRACE: Duration = Duration::from_secs(30);
 
@@ -48,6 +46,10 @@ pub struct Flow {
     pub messages: u64,
     /// How many may be on their way; none: any number, as long as the contender takes them.
     pub window: Option<u64>,
+    /// Where the sender runs.
+    pub sender: End,
+    /// Its SCHED_FIFO priority.
+    pub sender_fifo: u8,
     /// Ends the sending.
     pub cap: Duration,
 }
@@ -81,9 +83,8 @@ struct Turn {
     /// Not 0: this many were sent, and no more will be.
     sent: AtomicU64,
     received: AtomicU64,
-    /// One more than the number of the newest that came.
-    next: AtomicU64,
     took_ns: AtomicU64,
+    credit: Credit,
 }
 
 // SAFETY: atomics only.
@@ -109,7 +110,9 @@ pub fn flow<I: Inlet, O: Outlet>(
     let sender = Child::start(|| {
         turn.gate.meet(2)?;
         let mut inlet = inlet()?;
-        settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
+        settle(flow.sender, Placement::TwoCores, Scheduling::Fifo)?;
+        // Refused, the environment says so.
+        let _ = sys::schedule(sys::Scheduling::Fifo(flow.sender_fifo));
         send_all(&mut inlet, flow, &turn)
     })?;
     let deadline = Instant::now() + flow.cap + GRACE;
@@ -129,10 +132,10 @@ pub fn flow<I: Inlet, O: Outlet>(
 fn send_all(inlet: &mut impl Inlet, flow: &Flow, turn: &Turn) -> Result<(), Failure> {
     let mut message = vec![FILLER; flow.bytes];
     let over = Instant::now() + flow.cap;
-    let mut window = Window { size: flow.window.unwrap_or(u64::MAX), given_up: 0 };
+    let mut window = Window { size: flow.window.unwrap_or(u64::MAX), lost_before: 0 };
     let mut sent = 0;
     while sent < flow.messages && (sent % CLOCK_EVERY != 0 || Instant::now() < over) {
-        window.await_room(sent, &turn.next)?;
+        window.await_room(sent, &turn.credit);
         put_number(&mut message, sent);
         inlet.send(&message)?;
         sent += 1;
@@ -141,29 +144,57 @@ fn send_all(inlet: &mut impl Inlet, flow: &Flow, turn: &Turn) -> Result<(), Fail
     Ok(())
 }
 
+/// What the receiver tells a sender that keeps to a window.
+#[repr(C)]
+struct Credit {
+    /// One more than the number of the newest message that came.
+    next: AtomicU64,
+    /// What that must be for the sender to be woken.
+    wanted: AtomicU64,
+    /// How often nothing came for long.
+    silences: AtomicU64,
+    bell: Bell,
+}
+
+impl Credit {
+    fn arrived(&self, next: u64) {
+        // ORDERING: SeqCst, as the bell wants it of what its sleeper looks for.
+        self.next.store(next, Ordering::SeqCst);
+        if next >= self.wanted.load(Ordering::SeqCst) {
+            self.bell.ring();
+        }
+    }
+
+    fn silent(&self) {
+        self.silences.fetch_add(1, Ordering::SeqCst);
+        self.bell.ring();
+    }
+}
+
 /// What may be on its way.
 struct Window {
     size: u64,
-    /// Messages before this one are held for lost, if they did not come.
-    given_up: u64,
+    /// Messages before this one are lost, if they did not come.
+    lost_before: u64,
 }
 
 impl Window {
-    /// Lets others have the processor until there is room.
-    fn await_room(&mut self, sent: u64, next: &AtomicU64) -> Result<(), Failure> {
-        let mut since: Option<(u64, Instant)> = None;
-        loop {
-            let arrived = next.load(Ordering::Acquire).max(self.given_up);
-            if sent - arrived < self.size {
-                return Ok(());
-            }
-            let (seen, began) = *since.get_or_insert_with(|| (arrived, Instant::now()));
-            if seen != arrived {
-                since = None;
-            } else if began.elapsed() > LOST_AFTER {
-                self.given_up = sent;
-            }
-            sched_yield().map_err(|error| Failure::of("sched_yield", error))?;
+    /// Sleeps, if the window is full, until half of it is free, or nothing comes any more.
+    fn await_room(&mut self, sent: u64, credit: &Credit) {
+        let arrived = || credit.next.load(Ordering::SeqCst);
+        let silences = credit.silences.load(Ordering::SeqCst);
+        if sent - arrived().max(self.lost_before) < self.size {
+            return;
+        }
+        let wanted = sent - self.size / 2;
+        credit.wanted.store(wanted, Ordering::SeqCst);
+        let is_silent = || credit.silences.load(Ordering::SeqCst) != silences;
+        while arrived() < wanted && !is_silent() {
+            credit.bell.sleep_unless(|| arrived() >= wanted || is_silent());
+        }
+        credit.wanted.store(u64::MAX, Ordering::SeqCst);
+        if arrived() < wanted {
+            self.lost_before = sent;
         }
     }
 }
@@ -186,6 +217,7 @@ fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &Turn) -> Result<(),
             if is_over {
                 break;
             }
+            turn.credit.silent();
             continue;
         }
         last_ns = monotonic_ns();
@@ -198,7 +230,7 @@ fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &Turn) -> Result<(),
         }
         next = number + 1;
         received += 1;
-        turn.next.store(next, Ordering::Release);
+        turn.credit.arrived(next);
     }
     turn.took_ns.store(last_ns - first_ns, Ordering::Release);
     turn.received.store(received, Ordering::Release);
@@ -241,7 +273,8 @@ mod tests {
 
     /// How many came of these, when 10 were sent.
     fn received(messages: impl IntoIterator<Item = Vec<u8>>) -> Result<u64, Failure> {
-        let flow = Flow { bytes: 32, messages: 10, window: None, cap: Duration::ZERO };
+        let flow =
+            Flow { bytes: 32, messages: 10, window: None, sender: End::Ping, sender_fifo: 50, cap: Duration::ZERO };
         let turn = Shared::<Turn>::new()?;
         turn.sent.store(10, Ordering::Release);
         receive_all(&mut Canned(messages.into_iter().collect()), &flow, &turn)?;
@@ -276,12 +309,24 @@ mod tests {
     }
 
     #[test]
-    fn a_window_opens_when_messages_come_and_when_they_are_lost() {
-        let next = AtomicU64::new(3);
-        let mut window = Window { size: 4, given_up: 0 };
-        window.await_room(6, &next).unwrap();
-        assert_eq!(window.given_up, 0);
-        window.await_room(7, &next).unwrap();
-        assert_eq!(window.given_up, 7, "none of those on their way ever came");
+    fn a_window_opens_when_half_of_it_came_and_when_nothing_comes() {
+        let turn = Shared::<Turn>::new().unwrap();
+        turn.credit.arrived(3);
+        let mut window = Window { size: 4, lost_before: 0 };
+        window.await_room(6, &turn.credit);
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| window.await_room(7, &turn.credit));
+            (4..=5).for_each(|next| turn.credit.arrived(next));
+            waiting.join().unwrap();
+        });
+        assert_eq!(window.lost_before, 0);
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| window.await_room(9, &turn.credit));
+            while !waiting.is_finished() {
+                turn.credit.silent();
+                std::thread::yield_now();
+            }
+        });
+        assert_eq!(window.lost_before, 9, "none of those on their way will come");
     }
 }

@@ -27,7 +27,7 @@ const LOOK_EACH: Duration = Duration::from_millis(5);
 #[derive(Clone, Copy, Debug)]
 pub struct Network {
     /// Largest IP packet, bytes.
-    pub mtu: usize,
+    pub mtu: u16,
     /// Most that a router sends, bytes a second.
     pub rate: &'static str,
     /// How much one sender may have waiting in its node's router.

@@ -4,22 +4,19 @@ use crate::harness::{End, Failure};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec, become_able};
 use std::net::{IpAddr, Ipv4Addr};
 
-/// Largest packet of its links: a datagram as large as any goes in one.
-const MTU: u16 = u16::MAX;
-
 /// Where each end has its address. Gone with the last process that has it.
 pub struct Wire {
     lab: Lab,
 }
 
 impl Wire {
-    /// Makes it.
+    /// Makes it; `mtu` is the largest packet of its links, bytes.
     ///
     /// # Errors
     /// [`Failure::Skipped`] when the system lets nobody make namespaces.
-    pub fn new() -> Result<Self, Failure> {
+    pub fn new(mtu: u16) -> Result<Self, Failure> {
         let node = |end| NodeSpec { name: name_of(end).into(), address: address(end) };
-        Lab::new(&[node(End::Ping), node(End::Pong)], MTU).map(|lab| Self { lab }).map_err(failure)
+        Lab::new(&[node(End::Ping), node(End::Pong)], mtu).map(|lab| Self { lab }).map_err(failure)
     }
 
     /// The calling process goes to this end, and stays: what it opens and starts from now on is there.

@@ -49,6 +49,8 @@ pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str
     for name in node.mailboxes()? {
         node.remove_orphan(name)?;
     }
+    // What was on other nodes then need not be now; the router says so anew.
+    node.forget_routes()?;
     Ok(notes)
 }
 

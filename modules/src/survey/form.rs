@@ -4,6 +4,8 @@
 //! process: whatever the bytes are, reading them gives a look or an error.
 
 mod detail;
+#[cfg(test)]
+mod tests;
 
 use super::{MailboxLook, ModuleSurvey, Survey, Usage};
 use detail::{DetailForm, detail, detail_form};

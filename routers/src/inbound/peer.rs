@@ -76,7 +76,7 @@ impl Peer {
         };
         (self.incarnation, self.began_ns) = (head.incarnation, now_ns);
         way.peer.link.incarnation.set(head.incarnation);
-        way.peer.link.since_ns.set(now_ns);
+        way.peer.link.begin(now_ns);
         way.peer.link.accept();
         true
     }
@@ -93,7 +93,7 @@ impl Peer {
         let link = &way.peer.link;
         if !self.told.heard {
             self.told = Told { heard: true, silent: false, ..self.told };
-            link.since_ns.set(now_ns);
+            link.begin(now_ns);
             deliver.event(Event::Heard { peer: way.from });
         }
         link.heard_ns.set(now_ns);
@@ -138,7 +138,7 @@ impl Peer {
     pub(super) fn excuse(&self, now_ns: u64, way: &Way<'_>) {
         if self.told.heard {
             way.peer.link.heard_ns.set(now_ns);
-            way.peer.link.since_ns.set(now_ns);
+            way.peer.link.denied_ns.set(0);
         }
     }
 
@@ -202,8 +202,9 @@ impl Way<'_> {
 
     /// Hears what the peer says of us.
     pub(super) fn hears_of_us(&self, now_ns: u64, own: u64, alive: &Alive) {
-        if alive.heard_incarnation == own {
-            self.peer.link.hears_us_ns.set(now_ns);
+        let hears = alive.heard_incarnation == own;
+        self.peer.link.hears_us(now_ns, hears);
+        if hears {
             self.peer.link.missed_by_it.set(alive.heard_lost);
         }
     }

@@ -82,7 +82,7 @@ impl Outbound {
 
     pub(super) fn alive(&mut self, now_ns: u64, peer: NodeIndex, datagram: &mut [u8]) -> Output {
         let stats = self.stats.peer(peer);
-        let told = stats.link.told(stats.received.missing()).to_bytes();
+        let told = stats.link.told(now_ns, stats.received.missing()).to_bytes();
         let end = frame::HEAD_BYTES + told.len();
         datagram[frame::HEAD_BYTES..end].copy_from_slice(&told);
         self.peers[usize::from(peer)].tell_ns = now_ns + TELL_EVERY_NS;

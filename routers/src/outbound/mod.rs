@@ -123,7 +123,8 @@ impl Outbound {
         }
     }
 
-    /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram.
+    /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram; nor need one
+    /// so large that no second of its size would fit.
     pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
         let mut head = package.head;
         if matches!(head.kind.kind(), rohrpost_mailbox::Kind::Command(_)) {
@@ -139,7 +140,8 @@ impl Outbound {
                 return Accepted::Lost;
             }
         };
-        if alone && self.may_leave_at_once(now_ns, package.body.len()) {
+        let needs_no_company = alone || self.fills_a_datagram(package.body.len());
+        if needs_no_company && self.may_leave_at_once(now_ns, package.body.len()) {
             return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package.body) };
         }
         let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
@@ -156,6 +158,11 @@ impl Outbound {
         }
         self.stats.waiting_bytes.set(self.queue.used_bytes());
         if taken { Accepted::Waits } else { Accepted::Lost }
+    }
+
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.queue.is_empty()
     }
 
     /// What leaves next, or when to ask again. `datagram` has room for the largest.
@@ -260,6 +267,11 @@ impl Outbound {
         self.queue.is_empty()
             && bytes <= self.settings.network.datagram_bytes_max
             && self.pace.may_leave(now_ns).is_ok()
+    }
+
+    /// Two of this size are more than a datagram holds. Copied into the queue and out of it, it would leave no sooner.
+    fn fills_a_datagram(&self, body_bytes: usize) -> bool {
+        frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.settings.network.datagram_bytes_max
     }
 
     fn is_large(&self, waiting: &Waiting) -> bool {

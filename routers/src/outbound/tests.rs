@@ -52,6 +52,18 @@ fn an_idle_network_takes_a_package_from_where_it_lies() {
     assert_eq!((end.stats.waiting_in_all(), end.stats.waiting_bytes.get()), (0, 0));
 }
 
+#[test]
+fn a_package_that_no_second_could_join_waits_for_no_company() {
+    let mut end = End::new(0, |_| {});
+    // Of datagrams of 1472 B.
+    let half = (1472 - frame::HEAD_BYTES) / 2 - PACKAGE_HEAD_BYTES;
+    assert!(end.send(START, to(1, 90), &vec![0; half + 1], false).is_some());
+    assert_eq!(end.send(START, to(1, 90), &vec![0; half], false), None, "two of these fit");
+    assert_eq!(end.send(START, to(1, 90), &vec![0; half + 1], false), None, "not before the other");
+    assert_eq!(sent(&mut end, START), [(1, vec![1]), (1, vec![2])]);
+    end.assert_balanced();
+}
+
 fn check_order_on_the_wire() {
     let mut end = End::new(0, |_| {});
     for (peer, priority, len) in
@@ -112,20 +124,14 @@ fn the_largest_package_goes_in_the_smallest_datagrams() {
 
 fn check_what_does_not_go() {
     let mismatch = Mismatch { reason: crate::frame::Reason::Digest, version: 1, digest: Some(1) };
-    let (silent, unheard, refused): (fn(&End), fn(&End), _) = (
-        |_| {},
-        |end| {
-            let link = &end.stats.peer(1).link;
-            link.heard_ns.set(START + 3 * S);
-            link.since_ns.set(START);
-        },
-        |end: &End| end.stats.peer(1).link.refuse(START + 3 * S, mismatch),
-    );
-    for (set, cause) in [(silent, Cause::Silent), (unheard, Cause::Unheard)] {
-        check_cause(set, cause);
-    }
-    check_cause(refused, Cause::Refused);
-    check_cause(|end| end.stats.peer(1).link.heard_ns.set(START + 3 * S - 1), Cause::Unheard);
+    check_cause(|_| {}, Cause::Silent);
+    let unheard = |end: &End| {
+        let link = &end.stats.peer(1).link;
+        link.heard_ns.set(START + 3 * S);
+        link.denied_ns.set(START);
+    };
+    check_cause(unheard, Cause::Unheard);
+    check_cause(|end| end.stats.peer(1).link.refuse(START + 3 * S, mismatch), Cause::Refused);
 }
 
 /// What goes to a peer that is not there is lost with a cause: new or waiting, and of whatever kind.
@@ -135,7 +141,6 @@ fn check_cause(set: impl Fn(&End), cause: Cause) {
     end.hears(1, START + 3 * S);
     end.queue(START + 3 * S, to(1, 90), &ENVELOPE);
     end.stats.peer(1).link.heard_ns.set(START);
-    end.stats.peer(1).link.hears_us_ns.set(0);
     set(&end);
     let now_ns = START + 3 * S + MS;
     assert_eq!(sent(&mut end, now_ns), []);
@@ -239,8 +244,9 @@ fn the_rate_is_kept() {
 }
 
 #[test]
-fn an_idle_peer_hears_every_200_ms_and_a_busy_one_every_second_what_we_heard() {
+fn an_idle_peer_hears_every_200_ms_and_a_busy_one_every_500_ms_what_we_heard() {
     let mut end = End::new(0, |_| {});
+    end.hears(1, START);
     end.stats.peer(1).link.incarnation.set(77);
     end.stats.peer(1).link.next.set(5);
     end.stats.peer(1).received.lost.add(3);
@@ -254,16 +260,18 @@ fn an_idle_peer_hears_every_200_ms_and_a_busy_one_every_second_what_we_heard() {
         for (to, datagram) in end.leave(now_ns) {
             let Frame::Alive(alive) = Frame::parse(&datagram).unwrap().1 else { panic!() };
             told.push((to, now_ns - START));
+            // Node 1 is silent for the second before it is busy.
+            let is_heard = to == 1 && !(START + S..START + 2 * S).contains(&now_ns);
             let heard =
-                if to == 1 { Alive { heard_incarnation: 77, heard_next: 5, heard_lost: 3 } } else { Alive::default() };
+                if is_heard { Alive { heard_incarnation: 77, heard_next: 5, heard_lost: 3 } } else { Alive::default() };
             assert_eq!(alive, heard);
         }
         now_ns += 10 * MS;
     }
     let of = |node, begin, end| told.iter().filter(|(to, at)| *to == node && (begin..end).contains(at)).count();
     assert_eq!((of(1, 0, 2 * S), of(2, 0, 2 * S), of(2, 2 * S, 4 * S)), (9, 9, 10));
-    assert_eq!(of(1, 2 * S, 4 * S), 2, "a busy one");
-    assert_eq!((ALIVE_EVERY_NS, TELL_EVERY_NS), (200 * MS, S));
+    assert_eq!(of(1, 2 * S, 4 * S), 4, "a busy one");
+    assert_eq!((ALIVE_EVERY_NS, TELL_EVERY_NS), (200 * MS, S / 2));
 }
 
 #[test]

@@ -27,7 +27,10 @@ pub struct Undelivered<'a> {
 
 /// Writes the bodies of such answers: what a fault looks like is not the routers' business.
 pub trait Faults: Send + Sync {
-    /// Appends the answer to a command whose body begins with these bytes ([`BEGINNING_BYTES`](crate::report::BEGINNING_BYTES) of it at least); false when it is not one that can be answered.
+    /// Appends the answer to a command whose body begins with these bytes, [`BEGINNING_BYTES`] of it at least; false when it is not
+    /// one that can be answered.
+    ///
+    /// [`BEGINNING_BYTES`]: crate::report::BEGINNING_BYTES
     fn write(&self, call: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool;
 }
 

@@ -15,7 +15,7 @@ use crate::impair::{self, Impairment};
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
 use crate::report::Report;
 use crate::settings::Settings;
-use crate::stats::Cause;
+use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{Head, Receiver, monotonic_ns, wait_any};
 use std::io::IoSlice;
 use std::sync::Arc;
@@ -24,15 +24,19 @@ use std::time::{Duration, Instant};
 
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
 const BURST: usize = 64;
-/// To wait for less than this, it sleeps with a timeout, which is exact but costs a timer of the kernel; for longer waits the thread
-/// that receives rings, within its own patience.
-const EXACT: Duration = Duration::from_millis(10);
+/// While some wait already, only so many between two datagrams: a flood must not be taken in faster than anything gets out. What
+/// is left in the mailbox is the least important.
+const FEW: usize = 8;
+/// While more waits in the mailbox than may leave, it rests for at most so long: whoever shares its processor goes on, and what is
+/// more important than all that waits is taken soon.
+const REST: Duration = Duration::from_micros(200);
 
 /// What the sending thread has.
 pub(super) struct Departures {
     pub(super) shared: Arc<Shared>,
     pub(super) transit: Receiver,
     pub(super) outbound: Outbound,
+    pub(super) stats: Arc<Stats>,
     pub(super) answers: Answers,
     pub(super) wire: Wire,
     /// Room for the largest datagram.
@@ -50,24 +54,26 @@ impl Departures {
     pub(super) fn run(mut self) {
         let mut awake = Awake::default();
         while !self.shared.ends() {
-            let taken = self.take();
+            let most = if self.outbound.is_empty() { BURST } else { FEW };
+            let taken = self.take(most);
             let now_ns = monotonic_ns();
             match self.outbound.poll(now_ns, &mut self.datagram, &mut self.answers) {
                 Output::Send { to, bytes } => self.send(to, bytes),
-                Output::Wait { .. } if taken == BURST => {}
+                Output::Wait { until_ns } if taken == most => self.rest(now_ns, until_ns),
                 Output::Wait { until_ns } => {
-                    let until_ns = until_ns.min(self.wire.deliver(now_ns));
-                    self.sleep(now_ns, until_ns);
+                    let delivery_ns = self.wire.deliver(now_ns);
+                    let waits = self.stats.waiting_bytes.get() > 0 || delivery_ns < u64::MAX;
+                    self.sleep(now_ns, until_ns.min(delivery_ns), waits);
                 }
             }
             awake.pause_if_long(now_ns);
         }
     }
 
-    /// Takes what waits in the mailbox, most important first; how many.
-    fn take(&mut self) -> usize {
+    /// Takes what waits in the mailbox, most important first, at most so many; how many.
+    fn take(&mut self, most: usize) -> usize {
         let Self { transit, outbound, answers, wire, .. } = self;
-        for taken in 0..BURST {
+        for taken in 0..most {
             let Some(waiting) = transit.try_receive() else { return taken };
             let (now_ns, body) = (monotonic_ns(), waiting.body());
             let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body };
@@ -79,7 +85,7 @@ impl Departures {
                 outbound.unsent(&head, body, answers);
             }
         }
-        BURST
+        most
     }
 
     fn send(&mut self, to: NodeIndex, bytes: usize) {
@@ -90,10 +96,16 @@ impl Departures {
         }
     }
 
-    /// Sleeps until a package comes, or until then.
-    fn sleep(&mut self, now_ns: u64, until_ns: u64) {
-        let wait = Duration::from_nanos(until_ns.saturating_sub(now_ns));
-        let deadline = if wait < EXACT { Some(Instant::now() + wait) } else { None };
+    /// The pace holds the wire, and the mailbox holds more: to sleep on its bell would not be to sleep.
+    fn rest(&mut self, now_ns: u64, until_ns: u64) {
+        let until_ns = until_ns.min(self.wire.deliver(now_ns));
+        std::thread::sleep(Duration::from_nanos(until_ns.saturating_sub(now_ns)).min(REST));
+    }
+
+    /// Sleeps until a package comes, or until then. If something `waits` to leave, that is exact, and costs a timer of the kernel; else
+    /// the thread that receives rings, within its own patience.
+    fn sleep(&mut self, now_ns: u64, until_ns: u64, waits: bool) {
+        let deadline = waits.then(|| Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns)));
         // Before the look at the mailbox: who rings because of this time changes the bell that is slept on.
         self.shared.departures_due_ns.store(until_ns, Ordering::Release);
         wait_any(&mut [&mut self.transit], deadline, || self.shared.ends());

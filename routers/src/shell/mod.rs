@@ -120,6 +120,7 @@ impl Shell {
             shared: shared.clone(),
             transit: mailbox,
             outbound: Outbound::new(&settings, stats.clone()),
+            stats: stats.clone(),
             answers: answers(&sender),
             wire: Wire::new(&settings, impair, &failures),
             datagram: vec![0; settings.network.datagram_bytes_max].into(),
@@ -139,18 +140,18 @@ impl Shell {
         // From here on, whatever fails ends what has begun.
         let mut shell = Self { settings, stats, failures, ages, shared, socket, threads: Vec::new() };
         shell.begin("departures", move || {
-            if let Err(error) = threads::schedule() {
+            if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                 tracing::warn!(
                     "the router's threads run as modules do, and not before them: {error}; allow it with a limit `rtprio` of {} \
                      for this user (limits.conf) or CAP_SYS_NICE",
-                    threads::FIFO
+                    threads::ARRIVALS_FIFO
                 );
             }
             departures.run();
         })?;
         shell.begin("arrivals", move || {
             // A refusal was told by the other.
-            let _ = threads::schedule();
+            let _ = threads::schedule(threads::ARRIVALS_FIFO);
             arrivals.run();
         })?;
         Ok(shell)

@@ -6,8 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Above every module: a router that waits for a module's work keeps others' packages waiting.
-pub(super) const FIFO: u8 = FIFO_MAX + 10;
+/// Above every module: a router that waits for a module's work keeps others' packages waiting. This is the thread that sends.
+pub(super) const DEPARTURES_FIFO: u8 = FIFO_MAX + 9;
+/// Of the thread that receives: a flood of what leaves must not keep answers from coming in; it sleeps whenever the socket is empty.
+pub(super) const ARRIVALS_FIFO: u8 = DEPARTURES_FIFO + 1;
 /// A thread that has not slept for so long is made to, for this short time: the kernel ends a real-time process that works without
 /// pause (RLIMIT_RTTIME), and a flood is no reason to be ended.
 const AWAKE_MAX_NS: u64 = 250_000_000;
@@ -75,6 +77,6 @@ impl Awake {
 ///
 /// # Errors
 /// What the system said.
-pub(super) fn schedule() -> std::io::Result<()> {
-    sys::schedule(sys::Scheduling::Fifo(FIFO))
+pub(super) fn schedule(fifo: u8) -> std::io::Result<()> {
+    sys::schedule(sys::Scheduling::Fifo(fifo))
 }

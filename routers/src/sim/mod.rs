@@ -19,6 +19,7 @@ mod modules;
 pub mod packages;
 pub mod plan;
 pub mod receiving;
+mod rough;
 pub mod run;
 pub mod sending;
 pub mod station;

@@ -1,6 +1,7 @@
 //! The layer that carries packages: `Outbound` and `Inbound`, called as the threads of the shell call them, and watched.
 
 use super::book::{Promise, Role};
+use super::clock::Now;
 use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
 use super::plan::{Plan, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
@@ -23,7 +24,9 @@ pub const PORT: Port = 0;
 /// Of the configuration.
 pub(super) const DIGEST: u64 = 0x1234_5678;
 /// A router that did nothing for so long stood still: threads do not wake that late.
-const STILL_NS: u64 = 500_000_000;
+const STILL_NS: u64 = 400_000_000;
+/// After so long the wire holds nothing any more of what a router's last life took.
+const YOUNG_NS: u64 = 500_000_000;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
@@ -104,6 +107,10 @@ impl Packages {
         }
     }
 
+    fn is_young(&self, now: Now) -> bool {
+        now.monotonic_ns < self.stats.started_ns + YOUNG_NS
+    }
+
     /// Takes all that waits in the transit mailbox.
     fn take_in(&mut self, io: &mut Io<'_>) {
         while let Some(parcel) = io.host.transit.take() {
@@ -122,7 +129,8 @@ impl Packages {
 
     fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) {
         let package = Package { head, published_ns, body };
-        let mut watch = Watch { io, arrived_ns: None, is_out: true, undelivered: &mut self.undelivered };
+        let mut watch =
+            Watch { io, arrived_ns: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
         if let Accepted::Send { to, head } =
             self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch)
         {
@@ -133,7 +141,8 @@ impl Packages {
 
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
         if io.host.unsendable > 0 && io.chance.percent(50) {
-            let mut watch = Watch { io, arrived_ns: None, is_out: true, undelivered: &mut self.undelivered };
+            let mut watch =
+                Watch { io, arrived_ns: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             return self.outbound.unsent(&bytes, &[], &mut watch);
         }
         io.book.leaves(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
@@ -220,7 +229,7 @@ impl Packages {
             }
             let (heard_ns, life, own_life) = io.book.heard.get(&(peer, io.node)).copied().unwrap_or_default();
             let goes_on = life == io.lives[peer] && own_life == io.life;
-            let doubt_ns = io.now.true_ns - heard_ns.min(io.now.true_ns);
+            let doubt_ns = (io.now.true_ns - heard_ns.min(io.now.true_ns)).min(now_ns - self.steady_since_ns);
             if is_there && goes_on && doubt_ns > UNHEARD_AFTER_NS + TELL_EVERY_NS + 2 * STILL_NS {
                 let text = format!("node {peer} is {state:?} for node {}, which it does not hear", io.node);
                 io.book.broken(io.now, Promise::Links, text);
@@ -265,8 +274,8 @@ impl Layer for Packages {
             arrived_ns: arrived.stamp.monotonic_ns,
             bytes: &arrived.bytes,
         };
-        let arrived_ns = Some(datagram.arrived_ns);
-        let mut watch = Watch { io, arrived_ns, is_out: false, undelivered: &mut self.undelivered };
+        let (arrived_ns, is_young) = (Some(datagram.arrived_ns), self.is_young(io.now));
+        let mut watch = Watch { io, arrived_ns, is_out: false, is_young, undelivered: &mut self.undelivered };
         self.inbound.handle(watch.io.now.monotonic_ns, &datagram, &mut watch);
         let after = self.counted(source);
         let (taken, copies, dropped) = (after.0 - before.0, after.1 - before.1, after.2 - before.2);
@@ -288,7 +297,7 @@ impl Layer for Packages {
         self.answer(io);
     }
 
-    fn left(&mut self, _: &mut Io<'_>, _: u64, _: super::clock::Now) {}
+    fn left(&mut self, _: &mut Io<'_>, _: u64, _: Now) {}
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
         if io.now.monotonic_ns > self.polled_ns + STILL_NS {
@@ -297,8 +306,9 @@ impl Layer for Packages {
         self.polled_ns = io.now.monotonic_ns;
         self.take_in(io);
         let mut until_ns = u64::MAX;
+        let is_young = self.is_young(io.now);
         loop {
-            let mut watch = Watch { io, arrived_ns: None, is_out: false, undelivered: &mut self.undelivered };
+            let mut watch = Watch { io, arrived_ns: None, is_out: false, is_young, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 inbound::Output::Refuse { to, bytes } => {
                     let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
@@ -315,7 +325,8 @@ impl Layer for Packages {
         }
         self.answer(io);
         loop {
-            let mut watch = Watch { io, arrived_ns: None, is_out: true, undelivered: &mut self.undelivered };
+            let mut watch =
+                Watch { io, arrived_ns: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             match self.outbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 Output::Send { to, bytes } => {
                     let bytes = Rc::from(&self.buffer[..bytes]);
@@ -375,6 +386,8 @@ struct Watch<'a, 'b> {
     /// When the datagram came that is being looked at.
     arrived_ns: Option<u64>,
     is_out: bool,
+    /// The router began so short a time ago that the wire may hold copies of what its last life took.
+    is_young: bool,
     undelivered: &'a mut Vec<Head>,
 }
 
@@ -388,8 +401,11 @@ impl Report for Watch<'_, '_> {
         } else {
             io.book.lost_behind(io.now, io.life, head)
         };
-        // One that was handed out before may have been delivered then: nobody knows.
-        let is_known = matches!(head.kind.kind(), Kind::Command(_)) && !head.options.has(Options::REDELIVERED);
+        // One that was handed out before may have been delivered then; so may the copy that a router finds on the wire when it begins.
+        let is_first = !head.options.has(Options::REDELIVERED) && (self.is_out || !self.is_young);
+        // Of these the caller's next try comes through, or brings another answer.
+        let is_final = !matches!(cause, Cause::Socket | Cause::Late | Cause::Incomplete);
+        let is_known = matches!(head.kind.kind(), Kind::Command(_)) && is_first && is_final;
         match number {
             Some(number) if self.is_out && is_known => io.host.returned.push(number),
             Some(_) if is_known => self.undelivered.push(*head),

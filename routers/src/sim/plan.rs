@@ -7,6 +7,8 @@
 use super::chance::Chance;
 use super::link::Quality;
 use crate::frame::NodeIndex;
+use crate::inbound::REFUSE_EVERY_NS;
+use crate::link::REFUSED_FOR_NS;
 use rohrpost_mailbox::Name;
 
 /// Microseconds, milliseconds and seconds in ns.
@@ -20,8 +22,9 @@ pub const S: u64 = 1_000_000_000;
 pub const NODES_MAX: usize = 64;
 /// System of all nodes.
 pub const SYSTEM: u8 = 1;
-/// So long after the last fault everything must be as if there had been none: every call answered, nothing lost.
-pub const RECOVERY_NS: u64 = 3 * S;
+/// So long after the last fault everything must be as if there had been none: every call answered, nothing lost. A datagram that went
+/// astray is refused up to a second later, and a refusal holds for three.
+pub const RECOVERY_NS: u64 = REFUSE_EVERY_NS + REFUSED_FOR_NS + S / 4;
 /// So long all must be well.
 pub const WELL_NS: u64 = 3 * S / 2;
 /// After the last package all has been delivered or counted within this time: what may wait, waits 2 s at most.
@@ -331,7 +334,9 @@ impl Plan {
             let (node, from, to) = self.pair(chance);
             let period_ns = chance.scale(20 * MS, 300 * MS);
             let valid_for_ns = chance.between(30, 2500) * MS;
-            let priority = if chance.percent(20) { u8::MAX } else { from.class().0 };
+            // All commands of a module, so that they overtake each other nowhere.
+            let hurries = (from.raw() ^ self.seed as u32).is_multiple_of(5);
+            let priority = if hurries { u8::MAX } else { from.class().0 };
             self.calls.push(Calls { node, from, to, period_ns, valid_for_ns, priority });
         }
     }
@@ -340,9 +345,7 @@ impl Plan {
         let count = if chance.percent(10) { 0 } else { chance.below(6 + 2 * self.nodes.len() as u64) };
         for _ in 0..count {
             let fault = self.fault(chance);
-            // A refusal is said up to a second later, and holds for three.
-            let is_strange = matches!(fault, Fault::Foreign { .. } | Fault::Replay { .. });
-            let from_ns = chance.below(self.mended_ns - if is_strange { 3 * S / 2 } else { S / 2 });
+            let from_ns = chance.below(self.mended_ns - S / 2);
             let longest_ns = self.mended_ns - from_ns;
             let long_ns = chance.scale(5 * MS, 4 * S).min(longest_ns);
             self.faults.push(Planned { from_ns, until_ns: from_ns + long_ns, fault });
@@ -392,7 +395,7 @@ fn shape(chance: &mut Chance) -> Shape {
     }
 }
 
-fn node(index: usize, chance: &mut Chance) -> NodePlan {
+pub(super) fn node(index: usize, chance: &mut Chance) -> NodePlan {
     let mut classes = CLASSES.to_vec();
     let kept = 1 + chance.below(4) as usize;
     while classes.len() > kept {

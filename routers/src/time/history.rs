@@ -27,11 +27,11 @@ pub(super) struct Sample {
 
 impl Sample {
     pub(super) fn width_ns(&self) -> i64 {
-        self.high_ns - self.low_ns
+        self.high_ns.saturating_sub(self.low_ns)
     }
 
     fn middle_ns(&self) -> i64 {
-        self.low_ns + self.width_ns() / 2
+        self.low_ns.saturating_add(self.width_ns() / 2)
     }
 }
 
@@ -111,10 +111,10 @@ impl History {
         let mut guesses = [0.0; GUESS_BUCKETS];
         for (guess, sample) in guesses.iter_mut().zip(recent) {
             // Relative to the newest: as whole numbers these are larger than a double counts.
-            let middle = (sample.middle_ns() - newest.low_ns) as f64;
+            let middle = sample.middle_ns().saturating_sub(newest.low_ns) as f64;
             *guess = middle + rate * span_ns(sample.local_ns, local_ns);
         }
-        let guess_ns = newest.low_ns + median(&mut guesses[..recent.len()]).round() as i64;
+        let guess_ns = newest.low_ns.saturating_add(median(&mut guesses[..recent.len()]).round() as i64);
         Some(Estimate { offset_ns: guess_ns.clamp(low_ns, high_ns), low_ns, high_ns, rate, rate_low, rate_high })
     }
 
@@ -122,7 +122,8 @@ impl History {
     fn recent<'a>(&self, room: &'a mut [Sample; GUESS_BUCKETS]) -> &'a [Sample] {
         let newest = &self.buckets[self.buckets.len().saturating_sub(GUESS_BUCKETS)..];
         let narrowest_ns = newest.iter().map(Sample::width_ns).min().unwrap_or(0);
-        let waited = |sample: &&Sample| sample.width_ns() > WAITED_TIMES * narrowest_ns + WAITED_NS;
+        let waited =
+            |sample: &&Sample| sample.width_ns() > narrowest_ns.saturating_mul(WAITED_TIMES).saturating_add(WAITED_NS);
         let mut count = 0;
         for (place, sample) in room.iter_mut().zip(newest.iter().filter(|sample| !waited(sample))) {
             *place = *sample;
@@ -139,7 +140,7 @@ impl History {
                 let span = span_ns(earlier.local_ns, later.local_ns);
                 // Two that lie at an edge between buckets say nothing of the rate.
                 if span >= self.bucket_ns as f64 / 2.0 {
-                    slopes[count] = (later.middle_ns() - earlier.middle_ns()) as f64 / span;
+                    slopes[count] = later.middle_ns().saturating_sub(earlier.middle_ns()) as f64 / span;
                     count += 1;
                 }
             }
@@ -155,8 +156,8 @@ impl History {
                 let span = span_ns(earlier.local_ns, later.local_ns);
                 if span >= 1.0 {
                     let change = WANDER * (span / 2.0 + span_ns(later.local_ns, local_ns));
-                    rate_low = rate_low.max((later.low_ns - earlier.high_ns) as f64 / span - change);
-                    rate_high = rate_high.min((later.high_ns - earlier.low_ns) as f64 / span + change);
+                    rate_low = rate_low.max(later.low_ns.saturating_sub(earlier.high_ns) as f64 / span - change);
+                    rate_high = rate_high.min(later.high_ns.saturating_sub(earlier.low_ns) as f64 / span + change);
                 }
             }
         }
@@ -169,8 +170,10 @@ impl History {
         for sample in &self.buckets {
             let age = span_ns(sample.local_ns, local_ns);
             let change = WANDER * age / 2.0;
-            low_ns = low_ns.max(sample.low_ns + ((rate_low - change).max(-RATE_MAX) * age).floor() as i64);
-            high_ns = high_ns.min(sample.high_ns + ((rate_high + change).min(RATE_MAX) * age).ceil() as i64);
+            low_ns =
+                low_ns.max(sample.low_ns.saturating_add(((rate_low - change).max(-RATE_MAX) * age).floor() as i64));
+            high_ns =
+                high_ns.min(sample.high_ns.saturating_add(((rate_high + change).min(RATE_MAX) * age).ceil() as i64));
         }
         (low_ns <= high_ns).then_some((low_ns, high_ns))
     }

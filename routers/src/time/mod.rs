@@ -12,7 +12,7 @@
 //! *The time of a term* is what its master's page shows; when a master takes over, the time of the new term is the new master's,
 //! less what it was off just then, which its own bound states and all its followers add. So within an epoch the time of a term goes on
 //! from the one before. A reading's bound contains its distance from the time of the term that the node follows
-//! ([`Clock::term`]), provided that clocks keep what [`RATE_MAX_PPB`] and [`WANDER_PPB_S`] say of them, and that
+//! ([`Reading::term`]), provided that clocks keep what [`RATE_MAX_PPB`] and [`WANDER_PPB_S`] say of them, and that
 //! a frame never arrives before it leaves. Nothing is assumed of how long a way takes, nor that both ways take equally long.
 //! While a network is split, each part may have a master, and so two terms are two times.
 //!
@@ -26,7 +26,7 @@
 //!
 //! Of two masters that hear each other, the one that nobody follows yields; if both or neither are followed, that of the lower term.
 //! Terms are never shared, since a term has its master's rank in it. Who yields is a slave with the next [`Sync`](message::Sync), so
-//! after a split is mended there is one master after at most two intervals. The nodes of the other part slew if they are off by
+//! after a split is mended there is one master after at most two intervals, as long as some of its datagrams arrive. The nodes of the other part slew if they are off by
 //! at most [`STEP_MIN_NS`]; else they say so, and the master begins a new epoch, in which they step.
 //!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
@@ -43,10 +43,12 @@ mod line;
 pub mod message;
 #[cfg(test)]
 mod tests;
+mod types;
 
 #[cfg(any(test, feature = "broken-variants"))]
 pub use broken::Broken;
-pub use clock::{Clock, Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
+pub use clock::Clock;
+pub use types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
 
 /// The bound of a node that does not know the time.
 pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;
@@ -94,7 +96,7 @@ impl Term {
 
     /// Round 1 is the first; rank 0 stands first among the masters, and before the others of its round.
     pub fn new(round: u64, rank: u8) -> Self {
-        Self(round << 8 | u64::from(u8::MAX - rank))
+        Self(round.min(u64::MAX >> 8) << 8 | u64::from(u8::MAX - rank))
     }
 
     /// Raised by each master that takes over.

@@ -3,7 +3,7 @@
 use super::Told;
 use crate::cli::table::{table, time};
 use crate::cli::target::Running;
-use crate::cli::units::bytes;
+use crate::cli::units::{bytes, fine};
 use rohrpost::Class;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, PeerLink};
 use std::time::Duration;
@@ -120,7 +120,7 @@ fn clocks(all: &[Told]) -> String {
     if clocks.is_empty() {
         return String::new();
     }
-    let ns = |ns: u64| time(Duration::from_nanos(ns));
+    let ns = |ns: u64| fine(ns as f64 * 1e-9);
     let rows = clocks.into_iter().map(|clock| {
         [
             clock.node.clone(),

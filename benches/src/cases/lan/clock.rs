@@ -1,32 +1,36 @@
-//! How far a slave's system time is off the master's, while both computers work and the network is full.
+//! How far a slave's system time is off the master's, while both processors work and the network is full.
 //!
-//! The far node follows the near one, by real routers. Both computers of this network have one clock, so both pages can be read for
-//! the same moment, and what they differ by is the slave's error. Its own bound must contain it.
+//! The clock services are those of routers. The clocks that they read are this computer's, the slave's made wrong by a known offset,
+//! 30 ppm, and half a ppm that comes and goes; so the true error of each reading is known, and its own bound must contain it.
 
-use super::Ground;
 use crate::cases::Case;
-use crate::harness::{Child, End, Failure, Link, Placement, Scheduling, interrupted, sample_in_child, settle};
+use crate::harness::{Child, End, Failure, Link, Placement, Scheduling, sample_in_child, settle};
 use crate::lan::Wire;
-use crate::lan::nodes::{Network, Nodes};
 use crate::lan::rtnet;
 use crate::lan::udp::Datagrams;
+use crate::lan::wire::address;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
-use rohrpost_mailbox::{Node, NodeError, SystemClock, TimeSource, monotonic_ns};
+use rohrpost_mailbox::monotonic_ns;
+use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::shell::clock::{ClockParts, ClockService, Skew};
+use rohrpost_routers::time::{Role, TimeSettings};
 use std::time::{Duration, Instant};
 
-/// How often the pages are read, and how many times in a turn.
+/// How often the clocks are read, and how many times in a turn.
 const EACH: Duration = Duration::from_millis(1);
 const SAMPLES: usize = 2_000;
 /// RTnet's have 5 ms each.
 const SYNCHRONISATIONS: usize = 400;
-const PATIENCE: Duration = Duration::from_secs(20);
-/// A slave that has the time within this, which is where it no longer steps, may take that long to have it exactly.
-const SETTLED: Duration = Duration::from_micros(200);
-const SETTLES_WITHIN: Duration = Duration::from_secs(60);
-/// After that the filter is full.
-const SETTLING: Duration = Duration::from_secs(10);
+/// Of ours.
+const INTERVAL: Duration = Duration::from_millis(100);
+/// Exchanges until the slave's filter has what it needs.
+const SETTLED: u64 = 50;
+const PATIENCE: Duration = Duration::from_secs(60);
+const PORT: u16 = 20_140;
+const MTU: u16 = 1_500;
+const SKEW: Skew = Skew { offset_ns: 1_234_000_000, rate_ppb: 30_000, wander_ppb: 500.0, begin_ns: 0 };
 /// The load: datagrams of an ordinary network, about 40 000 a second.
 const LOAD_BYTES: usize = 1_400;
 const LOAD_BURST: usize = 40;
@@ -50,27 +54,14 @@ impl Case for Clock {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = Ground::new(settings, &Network { mtu: 1_500, rate: "100 MiB", quota: "256 KiB" });
-        let settled = ground.turn().and_then(|(nodes, _)| await_time(nodes, settings));
+        let wire = Wire::new(MTU);
+        let wire = || wire.as_ref().map_err(Clone::clone);
         let fixed = |(name, bounds)| Contender { name, turn: Box::new(move || Ok(bounds)) };
         let contenders = [
-            Contender::sampled("rohrpost", || {
-                settled.clone()?;
-                let (nodes, _) = ground.turn()?;
-                let _load = Load::start(ground.wire()?)?;
-                sample_in_child(PATIENCE, |samples| {
-                    let clocks = Clocks::open(nodes)?;
-                    for _ in 0..settings.count(SAMPLES) {
-                        std::thread::sleep(EACH);
-                        samples.push(clocks.error_us()?);
-                    }
-                    Ok(())
-                })
-            }),
+            Contender::sampled("rohrpost", || errors_us(wire()?, settings)),
             Contender::sampled(RTNET, || {
-                let wire = ground.wire()?;
-                let _load = Load::start(wire)?;
-                rtnet::errors_us(wire, settings.count(SYNCHRONISATIONS))
+                let _load = Load::start(wire()?)?;
+                rtnet::errors_us(wire()?, settings.count(SYNCHRONISATIONS))
             }),
             fixed(MUST),
             fixed(HOPED),
@@ -86,60 +77,74 @@ impl Case for Clock {
     }
 }
 
-/// Both nodes' pages.
-struct Clocks {
-    near: SystemClock,
-    far: SystemClock,
+/// How far off the slave was at any moment, µs.
+fn errors_us(wire: &Wire, settings: &Settings) -> Result<Vec<f64>, Failure> {
+    let _load = Load::start(wire)?;
+    sample_in_child(PATIENCE, |samples| {
+        let master = Timed::start(wire, End::Ping)?;
+        let slave = Timed::start(wire, End::Pong)?;
+        let give_up = Instant::now() + PATIENCE;
+        while !slave.is_settled() {
+            if Instant::now() > give_up {
+                return Err(Failure::Failed(format!("the slave has no time: {:?}", slave.service.state().snapshot())));
+            }
+            std::thread::sleep(EACH);
+        }
+        for _ in 0..settings.count(SAMPLES) {
+            std::thread::sleep(EACH);
+            samples.push(error_us(&master, &slave)?);
+        }
+        Ok(())
+    })
 }
 
-impl Clocks {
-    fn open(nodes: &Nodes) -> Result<Self, Failure> {
-        let clock = |end| Ok(SystemClock::open(&*Node::open(&nodes.directory(end))?));
-        let both = || Ok::<_, NodeError>(Self { near: clock(End::Ping)?, far: clock(End::Pong)? });
-        both().map_err(|error| Failure::of("time page", error))
+/// How far the slave is off the master at this moment. It must know.
+fn error_us(master: &Timed, slave: &Timed) -> Result<f64, Failure> {
+    let records = [master, slave].map(|timed| timed.service.state().snapshot().record);
+    let now_ns = monotonic_ns();
+    let [master, slave] = [records[0].at(master.skew.local_ns(now_ns)), records[1].at(slave.skew.local_ns(now_ns))];
+    if master.epoch != slave.epoch {
+        return Err(Failure::Failed(format!("epoch {} at the master, {} at the slave", master.epoch, slave.epoch)));
     }
-
-    /// Whether both have the time, and the slave knows it well.
-    fn are_settled(&self) -> bool {
-        let follows = |clock: &SystemClock| clock.record().is_some_and(|record| record.source == TimeSource::Master);
-        follows(&self.near) && follows(&self.far) && self.far.now().error < SETTLED && self.near.now().error < SETTLED
+    let (error, bound) = (Duration::from_nanos(master.ns.abs_diff(slave.ns)), slave.error);
+    if error > bound {
+        return Err(Failure::Failed(format!("off by {error:?}, where at most {bound:?} was promised")));
     }
-
-    /// How far the slave is off the master at this moment. It must know.
-    fn error_us(&self) -> Result<f64, Failure> {
-        let now_ns = monotonic_ns();
-        let (near, far) = (self.near.at(now_ns), self.far.at(now_ns));
-        if near.epoch != far.epoch {
-            return Err(Failure::Failed(format!("epoch {} at the master, {} at the slave", near.epoch, far.epoch)));
-        }
-        let error = Duration::from_nanos(near.ns.abs_diff(far.ns));
-        let bound = near.error + far.error;
-        if error > bound {
-            return Err(Failure::Failed(format!("off by {error:?}, where at most {bound:?} was promised")));
-        }
-        Ok(error.as_nanos() as f64 / 1000.0)
-    }
+    Ok(error.as_nanos() as f64 / 1000.0)
 }
 
-/// Until the slave has the master's time.
-fn await_time(nodes: &Nodes, settings: &Settings) -> Result<(), Failure> {
-    let clocks = Clocks::open(nodes)?;
-    let give_up = Instant::now() + SETTLES_WITHIN;
-    while !clocks.are_settled() {
-        if interrupted() || Instant::now() > give_up {
-            let [near, far] = [&clocks.near, &clocks.far].map(|clock| clock.record().map(|record| record.source));
-            let error = clocks.far.now().error;
-            return Err(Failure::Failed(format!(
-                "after {SETTLES_WITHIN:?} the slave knows the time within {error:?}; sources: {near:?}, {far:?}"
-            )));
-        }
-        std::thread::sleep(EACH);
+/// A node that keeps time, by a clock of its own.
+struct Timed {
+    service: ClockService,
+    skew: Skew,
+}
+
+impl Timed {
+    /// The near one is the master.
+    fn start(wire: &Wire, end: End) -> Result<Self, Failure> {
+        wire.enter(end)?;
+        let own = NodeIndex::from(end == End::Pong);
+        let skew = if end == End::Ping { Skew { offset_ns: 0, rate_ppb: 0, wander_ppb: 0.0, ..SKEW } } else { SKEW };
+        let skew = Skew { begin_ns: monotonic_ns(), ..skew };
+        let settings = TimeSettings {
+            system: 1,
+            own,
+            nodes: 2,
+            masters: vec![0],
+            interval: INTERVAL,
+            digest: 1,
+            incarnation: monotonic_ns(),
+        };
+        let nodes = [End::Ping, End::Pong].map(|end| (address(end), PORT).into()).into();
+        let parts = ClockParts { settings, nodes, node: None, impair: None, skew: Some(skew), observer: None };
+        let service = ClockService::start(parts).map_err(|error| Failure::of("clock service", error))?;
+        Ok(Self { service, skew })
     }
-    let settled = Instant::now() + SETTLING;
-    while !settings.quick && !interrupted() && Instant::now() < settled {
-        std::thread::sleep(EACH);
+
+    fn is_settled(&self) -> bool {
+        let seen = self.service.state().snapshot();
+        seen.synchronised && seen.role == Role::Slave && seen.exchanges >= SETTLED
     }
-    Ok(())
 }
 
 /// Work on both processors, and datagrams from node to node, until it is dropped.

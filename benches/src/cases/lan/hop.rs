@@ -20,7 +20,7 @@ const CAP: Duration = Duration::from_secs(2);
 /// A package each so often, as robots send.
 const PACE: Duration = Duration::from_micros(500);
 /// What a network of today has.
-const ETHERNET: usize = 1_500;
+const ETHERNET: u16 = 1_500;
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
@@ -35,7 +35,7 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
 struct Hop {
     name: &'static str,
     bytes: usize,
-    mtu: usize,
+    mtu: u16,
     pace: Option<Duration>,
     /// Whether the targets hold.
     judged: bool,

@@ -18,7 +18,7 @@ pub fn all() -> Vec<Box<dyn Case>> {
 }
 
 /// As large as a datagram can be, so that none is parted.
-const WHOLE: usize = 65_535;
+const WHOLE: u16 = u16::MAX;
 
 /// What all turns of a case happen on.
 struct Ground {
@@ -32,7 +32,7 @@ struct Ground {
 impl Ground {
     /// Makes the network and starts the routers.
     fn new(settings: &Settings, network: &Network) -> Self {
-        let wire = Wire::new();
+        let wire = Wire::new(network.mtu);
         let nodes =
             wire.as_ref().map_err(Clone::clone).and_then(|wire| Nodes::start(wire, network, settings.command()));
         Self { wire, nodes, turns: Counter::new(0) }

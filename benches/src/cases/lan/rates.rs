@@ -1,7 +1,15 @@
 //! How many packages go from node to node in a second, beside raw datagrams, and what is lost of them.
 //!
-//! `rate`: the largest datagram is chosen so that one package fits and no second one. `packing`: as many as fit. Ours has
-//! a window of packages on their way, as senders that want an answer have one: more would only be lost in its own node's router.
+//! `rate`: the largest datagram is chosen so that one package fits and no second one. `packing`: as many as fit. Ours has a window of
+//! packages on their way, as senders that want an answer have one: more would only be lost in its own node's router.
+//!
+//! ```text
+//!  processor 0                  processor 1
+//!  raw sender ═══════════════▶ raw receiver
+//!  sending router ═══════════▶ receiving router ─▶ receiving module;  sending module, which hands over a window at a time
+//! ```
+//! Two nodes share two processors here, so the sending router has one for itself, as the raw sender has. With the sending module on
+//! that one, too, and below its router as launch schedules it, each package costs two changes of process: that is told beside.
 
 use super::{Ground, WHOLE};
 use crate::cases::Case;
@@ -21,7 +29,10 @@ use std::time::Duration;
 /// Long enough for some ten thousand packages, short enough that the kernel's fair server stays out.
 const TURN: Duration = Duration::from_millis(500);
 /// Below the slots of a router's mailbox.
-const WINDOW: u64 = 48;
+const WINDOW: u64 = 60;
+/// Above the routers' threads: a sender on the other processor hands over what it has before they go on.
+const SENDER_FIFO: u8 = 80;
+const BESIDE_ROUTER: &str = "beside its router";
 /// IPv4 and UDP, and the head of a router's frame, before the packages.
 const BEFORE_PACKAGES: usize = 28 + frame::HEAD_BYTES;
 /// Least that a network's largest packet may be.
@@ -53,17 +64,27 @@ impl Case for Rate {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
-        let mtu = if self.packs { WHOLE } else { one };
+        let mtu = if self.packs { WHOLE } else { u16::try_from(one).unwrap_or(WHOLE) };
         let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" });
         let losses = Losses::default();
-        let raw = Flow { bytes: self.bytes, messages: messages(settings), window: None, cap: TURN };
-        let ours = Flow { window: Some(WINDOW), ..raw };
+        let raw = Flow {
+            bytes: self.bytes,
+            messages: messages(settings),
+            window: None,
+            sender: End::Ping,
+            sender_fifo: 50,
+            cap: TURN,
+        };
+        let beside = Flow { window: Some(WINDOW), ..raw };
+        let apart = Flow { sender: End::Pong, sender_fifo: SENDER_FIFO, ..beside };
+        let ours = |ours: &Flow| {
+            let (nodes, turn) = ground.turn()?;
+            let [from, to] = [End::Ping, End::Pong].map(|end| nodes::bench(end, turn));
+            flow(ours, || Source::open(nodes, from, to), || Sink::open(nodes, to, self.bytes))
+        };
         let mut contenders = vec![
-            losses.rated("rohrpost", || {
-                let (nodes, turn) = ground.turn()?;
-                let [from, to] = [End::Ping, End::Pong].map(|end| nodes::bench(end, turn));
-                flow(&ours, || Source::open(nodes, from, to), || Sink::open(nodes, to, self.bytes))
-            }),
+            losses.rated("rohrpost", || ours(&apart)),
+            losses.rated(BESIDE_ROUTER, || ours(&beside)),
             losses.rated("udp", || {
                 let open = |end| Datagrams::open(ground.wire()?, end);
                 flow(&raw, || open(End::Ping), || open(End::Pong)?.with_patience(SILENCE))
@@ -72,7 +93,7 @@ impl Case for Rate {
         if let Some((_, rate)) = CBWARE.into_iter().find(|(bytes, _)| *bytes == self.bytes) {
             contenders.push(Contender { name: CBWARE_NAME, turn: Box::new(move || Ok(Summary::single(rate))) });
         }
-        let versus: Vec<Versus> = contenders[1..]
+        let versus: Vec<Versus> = contenders[2..]
             .iter()
             .map(|other| Versus {
                 name: other.name,
@@ -124,6 +145,6 @@ impl Losses {
                 ratio_p99: None,
             })
         };
-        ["rohrpost", "udp"].into_iter().filter_map(row).collect()
+        ["rohrpost", BESIDE_ROUTER, "udp"].into_iter().filter_map(row).collect()
     }
 }

@@ -1,14 +1,15 @@
 //! Something urgent each millisecond, there and back over two routers, while a lower class sends as much as it can.
 //!
 //! ```text
-//!  processor 0                                            processor 1
-//!  flooder, FIFO 10: 18 ms of 20 ─┐                       ┌─▶ swamp, FIFO 10: takes what comes
-//!                                 ├▶ router ════▶ router ─┤
-//!  urgent, FIFO 50: each ms ──────┘      ◀═══════         └─▶ echo, FIFO 50
+//!  processor 0                                      processor 1
+//!  urgent, FIFO 50: each ms ─┐                  ┌─▶ echo, FIFO 50
+//!                            ├▶ router ═▶ router┤
+//!  flooder (processor 1) ────┘      ◀═          └─▶ swamp (processor 0): takes what comes of the flood
 //! ```
-//! The routers send as fast as they do by default, which is less than the flooder gives: its packages wait in the queue, and what
-//! is too much for the quota is lost there. Of the urgent ones none may be. The flooder pauses for 2 ms in 20, so that the kernel's
-//! fair server stays out; what waits in the queue lasts longer.
+//! The routers send as fast as they do by default. The flooder gives more: the router's mailbox is full of its packages, and so is
+//! its quota of the queue; what is too much is refused, or lost there. Of the urgent ones none may be. Flooder and swamp have
+//! FIFO 10, before other programs and after all that is timed, and each is where the router of its node is not. The flooder pauses
+//! for 2 ms in 20, so that the kernel's fair server stays out; what waits in the queue lasts longer.
 
 use super::Ground;
 use crate::cases::Case;
@@ -16,7 +17,7 @@ use crate::harness::{
     Cell, Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
 };
 use crate::lan::ends::{Module, Sink, Source};
-use crate::lan::flow::{Inlet, Outlet};
+use crate::lan::flow::Outlet;
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
@@ -132,7 +133,7 @@ impl Flood {
         let [from, to] = [End::Ping, End::Pong].map(|end| nodes::flood(end, turn));
         let swamp = Child::start(|| {
             let mut sink = Sink::open(nodes, to, FLOOD_BYTES)?;
-            settle_low(End::Pong)?;
+            settle_low(End::Ping)?;
             counts.swamp.meet(2)?;
             let mut message = vec![0; FLOOD_BYTES];
             while counts.over.load(Ordering::Acquire) == 0 {
@@ -145,15 +146,16 @@ impl Flood {
         let flooder = Child::start(|| {
             counts.swamp.meet(2)?;
             let mut source = Source::open(nodes, from, to)?;
-            settle_low(End::Ping)?;
+            settle_low(End::Pong)?;
             counts.flooding.meet(2)?;
             let message = vec![7; FLOOD_BYTES];
             let is_over = || counts.over.load(Ordering::Acquire) != 0;
             while !is_over() {
                 let ends = Instant::now() + FLOOD;
                 while Instant::now() < ends && !is_over() {
-                    source.send(&message)?;
-                    counts.sent.fetch_add(1, Ordering::AcqRel);
+                    if source.offer(&message)? {
+                        counts.sent.fetch_add(1, Ordering::AcqRel);
+                    }
                 }
                 std::thread::sleep(LULL);
             }
@@ -187,6 +189,7 @@ fn settle_low(end: End) -> Result<(), Failure> {
 }
 
 fn flood_rows(case: &str, floods: &[Flooded]) -> Vec<Row> {
+    // What the router's mailbox took, and what arrived.
     let row = |who, rate: fn(&Flooded) -> f64| {
         let median = crate::statistics::median(floods.iter().map(rate))?;
         Some(Row {
@@ -200,7 +203,7 @@ fn flood_rows(case: &str, floods: &[Flooded]) -> Vec<Row> {
             ratio_p99: None,
         })
     };
-    [row("flood, sent", |flood| flood.sent), row("flood, arrived", |flood| flood.received)]
+    [row("flood, taken", |flood| flood.sent), row("flood, arrived", |flood| flood.received)]
         .into_iter()
         .flatten()
         .collect()

@@ -107,23 +107,23 @@ fn a_life_that_was_taken_for_over_comes_back() {
 pub(super) fn check_one_way() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
-    let mut unheard_ns = None;
-    for step in 0..40 {
-        let now_ns = START + step * 100 * MS;
-        // Nothing of ours arrives any more: what it hears is another router of ours, long gone.
-        arm.stats.peer(0).link.incarnation.set(99);
-        arm.outbound.tell_all(now_ns);
+    let (mut unheard_ns, mut alive) = (None, Vec::new());
+    for step in 0..400 {
+        // Nothing of ours arrives any more.
+        let now_ns = START + step * 10 * MS;
         for (_, datagram) in arm.leave(now_ns).into_iter().filter(|(to, _)| *to == 0) {
             base.take(now_ns, 1, &datagram);
+            alive.push(now_ns);
         }
         base.refusals(now_ns);
         if base.stats.state(1, now_ns) == State::Unheard {
             unheard_ns.get_or_insert(now_ns - START);
         }
     }
-    assert_eq!(unheard_ns, Some(2200 * MS));
+    let told_ns = alive.iter().find(|at| **at >= START + S).unwrap() - START;
+    assert!((S..S + 200 * MS).contains(&told_ns));
+    assert_eq!(unheard_ns, Some(told_ns + S), "a second after the first denial");
     assert_eq!(base.log.events.iter().filter(|event| **event == Event::Unheard { peer: 1 }).count(), 1);
-    arm.stats.peer(0).link.incarnation.set(100);
     base.meet(START + 4 * S, &mut arm);
     assert_eq!(base.stats.state(1, START + 4 * S), State::Alive);
 }

@@ -1,6 +1,7 @@
 //! Clocks against a world that knows the true time: each promise of the module's page, with many seeds.
 
 mod scenes;
+mod strangers;
 mod world;
 
 use super::Broken;

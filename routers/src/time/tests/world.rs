@@ -133,7 +133,7 @@ impl World {
                 rate_ppb: random.random_range(-100_000..=100_000),
                 wander_ppb: random.random_range(0.0..500.0),
                 period_ns: random.random_range(20.0..60.0) * 1e9,
-                phase: random.random_range(0.0..6.28),
+                phase: random.random_range(0.0..std::f64::consts::TAU),
             },
             page: None,
             page_term: Term::NONE,

@@ -1,0 +1,51 @@
+//! Where a sender looks for a free slot first.
+
+use crate::word::Claimant;
+
+/// Where a sender looks for a free slot first.
+///
+/// As long as the receiver keeps up, in few slots by turns: their lines are still in the caches of both, and the next can be
+/// fetched while the receiver reads the last. When these are in use, onwards through all, so that a long queue is not searched
+/// for each package anew.
+pub(crate) struct Place {
+    /// The slot that the next search begins with, if it is not for the home.
+    cursor: usize,
+    /// First of the few. Senders have different ones, so that they meet less.
+    home: usize,
+    /// Which of the few is next.
+    turn: usize,
+    /// Searches until the home is tried again.
+    away: u32,
+}
+
+impl Place {
+    /// So many slots make a home.
+    const HOME: usize = 4;
+    /// So many searches the home is left alone when its next slot was in use.
+    const AWAY: u32 = 32;
+
+    pub(crate) fn of(me: Claimant) -> Self {
+        let home = usize::from(me.participant) * 7;
+        Self { cursor: home, home, turn: 0, away: 0 }
+    }
+
+    /// The slot that will be looked at first.
+    pub(crate) fn next(&self) -> usize {
+        if self.away == 0 { self.home + self.turn } else { self.cursor }
+    }
+
+    pub(crate) fn first(&mut self) -> &mut usize {
+        self.cursor = self.next();
+        &mut self.cursor
+    }
+
+    pub(crate) fn found(&mut self, slot: usize, count: usize) {
+        if self.away > 0 {
+            self.away -= 1;
+        } else if slot == (self.home + self.turn) % count {
+            self.turn = (self.turn + 1) % Self::HOME;
+        } else {
+            self.away = Self::AWAY;
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Looks survive their way, and bytes that are none are refused.
+
+use super::*;
+use proptest::prelude::*;
+
+/// A look with something in each of its parts.
+fn seen() -> Seen {
+    let waited = Latency { max: Duration::from_micros(3), ..Latency::default() };
+    let class = ClassTraffic {
+        class: Some(Class(140)),
+        received: 7,
+        body_bytes: 70,
+        losses: [1; Loss::ALL.len()],
+        latency: waited.clone(),
+    };
+    let name = Name::new(1, 140, 0, 0);
+    let process = ParticipantInfo {
+        module: name,
+        pid: 4711,
+        incarnation: 9,
+        state: Some(ModuleState::Error),
+        restarts: 2,
+        joined_ns: 5,
+    };
+    let module = ModuleSurvey {
+        node: "base".into(),
+        at_ns: Some(9),
+        name,
+        faces: vec![Name::new(1, 141, 0, 0)],
+        process: Some(process),
+        usage: Some(Usage { cpu: Duration::from_millis(30), memory_bytes: 1 << 20 }),
+        scheduling: Some(Scheduling::Normal(-3)),
+        received: 7,
+        bytes_in: 70,
+        lost: 1,
+        losses: [1; Loss::ALL.len()],
+        waited,
+        sent: 3,
+        bytes_out: 30,
+        depth: 1,
+    };
+    let second = FlowSecond { second: 8, interval_ns: Some((1, 2)), bytes: (3, 4) };
+    let flow = FlowInfo {
+        pid: 4711,
+        module: name,
+        incarnation: 9,
+        from: name,
+        to: Name::new(1, 200, 0, 0),
+        kind: Type::command(16),
+        packages: 3,
+        bytes: 30,
+        refused: 0,
+        first_ns: 1,
+        last_ns: 2,
+        interval_squares_ns2: u128::MAX,
+        age_sum_ns: 0,
+        seconds: vec![second],
+    };
+    let mailbox = MailboxInfo {
+        name,
+        shape: Shape { max_age: Some(Duration::from_secs(2)), full: Full::Latest, ..Shape::default() },
+        owner: Some(4711),
+        adoptions: 1,
+        depth: 1,
+        depth_max: 2,
+        sent: 8,
+        classes: vec![class.clone()],
+    };
+    Seen::Survey(Box::new(Survey {
+        node: "base".into(),
+        at_ns: 9,
+        modules: vec![module],
+        mailboxes: vec![mailbox],
+        classes: vec![class],
+        flows: vec![flow],
+    }))
+}
+
+#[test]
+fn what_travels_arrives_field_by_field() {
+    let there = seen();
+    let here = Seen::from_bytes(&there.to_bytes()).unwrap();
+    assert_eq!(format!("{there:?}"), format!("{here:?}"));
+}
+
+proptest! {
+    #[test]
+    fn whatever_the_bytes_are_they_are_a_look_or_an_error(
+        bytes in prop::collection::vec(any::<u8>(), 0..400), at in any::<prop::sample::Index>(), with in any::<u8>(),
+    ) {
+        let mut changed = seen().to_bytes();
+        let at = at.index(changed.len());
+        changed[at] = with;
+        for bytes in [bytes, changed] {
+            if let Ok(seen) = Seen::from_bytes(&bytes) {
+                // What was read is written as it is read: a second way through changes nothing.
+                let again = Seen::from_bytes(&seen.to_bytes()).unwrap();
+                prop_assert_eq!(format!("{seen:?}"), format!("{again:?}"));
+            }
+        }
+    }
+}

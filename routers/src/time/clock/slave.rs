@@ -1,0 +1,198 @@
+//! A clock as a slave: it asks the master after each of its Syncs, and bends its page's line to what comes of it.
+
+use super::{Asked, Clock, Draft, EXCHANGE_NS_MIN, rate_of};
+use crate::frame::FrameHead;
+use crate::time::broken::Broken;
+use crate::time::election::{Followed, Heard, State};
+use crate::time::history::{Estimate, Sample};
+use crate::time::line::{EVEN_PPB, wander_ns_s};
+use crate::time::message::{Reply, Request, Sync};
+use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
+
+/// So many samples a slave has before it believes them, and before it is content.
+const SAMPLES_MIN: u32 = 4;
+const SAMPLES_EAGER: u32 = 8;
+/// A slave answers a Sync at most so late: meanwhile its clock drifts from the master's.
+const ANSWER_NS_MAX: u64 = 50_000_000;
+/// A slave is mended within so long, or four exchanges.
+const SERVO_NS_MIN: u64 = 250_000_000;
+/// For so long the stated growth of the bound holds, and at least for four intervals; then a greater one is stated.
+const HORIZON_NS_MIN: u64 = 2_000_000_000;
+
+impl Clock {
+    pub(super) fn sync(&mut self, now_ns: u64, received: Stamp, head: &FrameHead, sync: &Sync) -> Result<(), Ignored> {
+        let was_master = matches!(self.election.state(), State::Master(_));
+        let followed = self.is_followed(now_ns);
+        if was_master && self.is(Broken::Stubborn) {
+            return Err(Ignored::Late);
+        }
+        match self.election.sync(head.from, head.incarnation, sync, received.ns, followed) {
+            Heard::Ignored => {
+                self.keep_term();
+                self.answer_master(now_ns, head.from);
+                return Err(Ignored::Late);
+            }
+            Heard::Turned => {
+                self.line.stop_slew(now_ns);
+                self.forget();
+                if was_master {
+                    self.drafts.clear();
+                }
+            }
+            Heard::Followed if self.term.rank() == sync.term.rank() && !self.history.is_new() => self.term = sync.term,
+            Heard::Followed => {}
+        }
+        let pause_ns = self.exchange_ns.min(EXCHANGE_NS_MIN) / 2;
+        let pauses = received.ns.saturating_sub(self.asked_ns) < pause_ns;
+        if pauses || now_ns.saturating_sub(received.ns) > ANSWER_NS_MAX {
+            return Ok(());
+        }
+        self.asked_ns = received.ns;
+        let exchange = Exchange { id: sync.id, sync_sent_ns: sync.sent_ns, sync_came: received, ..Exchange::default() };
+        self.asked.rotate_right(1);
+        self.asked[0] = Asked { exchange, ..Asked::default() };
+        // The newest question is enough, when several Syncs came at once.
+        self.drafts.clear();
+        self.drafts.push_back((head.from, Draft::WarmUp));
+        self.drafts.push_back((head.from, Draft::Request { id: sync.id }));
+        Ok(())
+    }
+
+    pub(super) fn reply(
+        &mut self,
+        now_ns: u64,
+        received: Stamp,
+        head: &FrameHead,
+        reply: &Reply,
+    ) -> Result<(), Ignored> {
+        let State::Slave(master) = self.election.state() else { return Err(Ignored::Unasked) };
+        if (head.from, head.incarnation, reply.began) != (master.node, master.incarnation, master.began) {
+            return Err(Ignored::Unasked);
+        }
+        let any = self.is(Broken::AnyReply);
+        let mut asked = self.asked.iter_mut();
+        let asked = asked.find(|asked| (asked.exchange.id == reply.id || any) && asked.exchange.request_sent_ns != 0);
+        let mut exchange = asked.map(std::mem::take).ok_or(Ignored::Unasked)?.exchange;
+        exchange.sync_left_ns = reply.sync_ns;
+        exchange.request_came_ns = reply.request_ns;
+        (exchange.reply_sent_ns, exchange.reply_came) = (reply.sent_ns, received);
+        let master_by_kernel = reply.sync_by_kernel && reply.request_by_kernel;
+        exchange.by_kernel = master_by_kernel && exchange.sync_came.by_kernel && exchange.request_left.by_kernel;
+        self.election.reply(reply.epoch, reply.error_ns, received.ns);
+        let doubt_ns = exchange.sync_came.doubt_ns.max(exchange.request_left.doubt_ns);
+        let sample =
+            sample(&exchange, u64::from(doubt_ns) + u64::from(reply.doubt_ns)).ok_or(Ignored::NegativeDelay)?;
+        self.last = Some(exchange);
+        self.history.add(sample);
+        if self.history.samples() >= SAMPLES_MIN {
+            self.discipline(now_ns, sample);
+        }
+        Ok(())
+    }
+
+    /// The servo: from what was measured, where the line is to go.
+    pub(super) fn discipline(&mut self, now_ns: u64, newest: Sample) {
+        let State::Slave(master) = self.election.state() else { return };
+        let Some(estimate) = self.history.estimate(now_ns, self.usual_rate) else {
+            self.contradictions += 1;
+            self.forget();
+            self.history.add(newest);
+            return;
+        };
+        self.usual_rate = estimate.rate;
+        let pace_ppb = EVEN_PPB.saturating_add_signed((estimate.rate * 1e9).round() as i64);
+        let drift_ns_s = self.drift_ns_s(&estimate, pace_ppb);
+        let target_ns = now_ns.saturating_add_signed(estimate.offset_ns);
+        let epoch = self.line.record().epoch;
+        let by_ns = target_ns.wrapping_sub(self.line.at(now_ns).ns).cast_signed();
+        if master.epoch > epoch || self.is(Broken::Steps) {
+            let error_ns = self.bound_ns(&estimate, estimate.offset_ns, &master);
+            self.line.step(now_ns, master.epoch, target_ns, pace_ppb, error_ns, drift_ns_s);
+        } else if master.epoch < epoch || !self.line.is_synchronised() || by_ns.unsigned_abs() > STEP_MIN_NS {
+            self.far = true;
+            return;
+        } else {
+            let page_ns = self.line.at(now_ns).ns.wrapping_sub(now_ns).cast_signed();
+            let target_error_ns = self.bound_ns(&estimate, estimate.offset_ns, &master);
+            let error_ns = self.bound_ns(&estimate, page_ns, &master).max(target_error_ns);
+            let within_ns = self.exchange_ns.saturating_mul(4).max(SERVO_NS_MIN);
+            self.line.bend(now_ns, by_ns, within_ns, pace_ppb, error_ns, drift_ns_s);
+        }
+        (self.term, self.far, self.offset_ns) = (master.term, false, by_ns);
+        self.stated = (now_ns.saturating_add(self.horizon_ns()), self.horizon_ns());
+    }
+
+    /// How far a line may be off that is `offset_ns` from the local clock now.
+    pub(super) fn bound_ns(&self, estimate: &Estimate, offset_ns: i64, master: &Followed) -> u64 {
+        let (above, below) = (estimate.high_ns.saturating_sub(offset_ns), offset_ns.saturating_sub(estimate.low_ns));
+        let off_ns = above.max(below).unsigned_abs();
+        let off_ns = if self.is(Broken::HalfBound) { off_ns / 2 } else { off_ns };
+        off_ns.saturating_add(if self.is(Broken::NoMasterError) { 0 } else { master.error_ns })
+    }
+
+    /// How fast a bound may grow until the horizon, ns a second.
+    pub(super) fn drift_ns_s(&self, estimate: &Estimate, pace_ppb: u64) -> u64 {
+        let pace = rate_of(pace_ppb);
+        let off = (pace - estimate.rate_low).max(estimate.rate_high - pace).max(0.0);
+        (off * 1e9).ceil() as u64 + wander_ns_s(self.horizon_ns()) + 1
+    }
+
+    pub(super) fn horizon_ns(&self) -> u64 {
+        self.interval_ns.saturating_mul(4).max(HORIZON_NS_MIN)
+    }
+
+    /// Without a master for longer than was thought of, the rate may have changed more: the bound grows faster.
+    pub(super) fn keep_bound(&mut self, now_ns: u64) {
+        let (until_ns, span_ns) = self.stated;
+        if self.is(Broken::NoDrift) {
+            self.line.restate(self.line.record().error_ns, 0);
+        } else if until_ns <= now_ns && self.is_held_over() {
+            let record = self.line.record();
+            let drift_ns_s = record.drift_ns_s.saturating_add(wander_ns_s(span_ns));
+            self.line.restate(record.error_ns, drift_ns_s.min(2 * RATE_MAX_PPB.unsigned_abs()));
+            self.stated = (now_ns.saturating_add(span_ns), span_ns.saturating_mul(2));
+        }
+    }
+
+    pub(super) fn is_held_over(&self) -> bool {
+        let is_master = matches!(self.election.state(), State::Master(_));
+        let at_most = self.line.record().drift_ns_s >= 2 * RATE_MAX_PPB.unsigned_abs();
+        self.line.is_synchronised() && !is_master && !at_most
+    }
+
+    pub(super) fn write_request(&mut self, now_ns: u64, id: u64, sequence: u64) -> Option<Request> {
+        if id != 0 {
+            let asked = self.asked.iter_mut().find(|asked| asked.exchange.id == id)?;
+            asked.sequence = sequence;
+            (asked.exchange.request_sent_ns, asked.exchange.request_left) = (now_ns, Stamp::by_us(now_ns));
+        }
+        Some(Request {
+            id,
+            error_ns: self.line.error_ns(now_ns),
+            epoch: self.line.record().epoch,
+            term: self.term,
+            eager: self.history.samples() < SAMPLES_EAGER,
+            far: self.far,
+            timed: self.line.is_synchronised(),
+        })
+    }
+}
+
+/// The interval that an exchange leaves for `system − local` when the Request left. None when the frames took less than no time.
+fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<Sample> {
+    let (came_ns, left_ns) = (exchange.sync_came.ns, exchange.request_left.ns);
+    let waited_ns = left_ns.checked_sub(came_ns)?;
+    let low_ns = exchange.sync_left_ns.wrapping_sub(came_ns).cast_signed();
+    let high_ns = exchange.request_came_ns.wrapping_sub(left_ns).cast_signed();
+    if high_ns <= low_ns {
+        return None;
+    }
+    // Between both of our stamps our clock drifted; the master's are whole numbers.
+    let drifted_ns = u128::from(waited_ns) * RATE_MAX_PPB as u128 / 1_000_000_000;
+    let doubt_ns = doubt_ns.saturating_add(drifted_ns as u64).saturating_add(2).cast_signed();
+    Some(Sample {
+        local_ns: left_ns,
+        low_ns: low_ns.saturating_sub(doubt_ns),
+        high_ns: high_ns.saturating_add(doubt_ns),
+    })
+}

@@ -1,0 +1,135 @@
+//! Datagrams that nobody sends who means well: they are refused, or change nothing that a module could notice.
+
+use crate::frame::{FrameHead, Kind};
+use crate::time::message::{MESSAGE_BYTES, Message, Reply, Request, Sync};
+use crate::time::{Clock, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
+use proptest::prelude::*;
+use std::time::Duration;
+
+const KINDS: [Kind; 4] = [Kind::Sync, Kind::WarmUp, Kind::Request, Kind::Reply];
+
+fn settings() -> TimeSettings {
+    TimeSettings {
+        system: 1,
+        own: 1,
+        nodes: 3,
+        masters: vec![0, 1],
+        interval: Duration::from_millis(100),
+        digest: 7,
+        incarnation: 9,
+    }
+}
+
+fn head(kind: Kind, from: u8) -> FrameHead {
+    FrameHead { kind, system: 1, from, to: 1, digest: 7, incarnation: 5, sequence: 0 }
+}
+
+/// Numbers at the edges, and near each other: so that they go together now and then.
+fn number() -> impl Strategy<Value = u64> {
+    prop_oneof![0..4_u64, 250..260_u64, 500..520_u64, Just(u64::MAX), Just(i64::MAX as u64), any::<u64>()]
+}
+
+fn message() -> impl Strategy<Value = Message> {
+    let numbers = (number(), number(), number(), number(), number(), number(), number(), number());
+    let flags = (any::<bool>(), any::<bool>(), any::<bool>(), any::<u32>(), 0..4_usize);
+    (numbers, flags).prop_map(|((id, a, b, c, error_ns, epoch, term, began), (x, y, z, doubt_ns, kind))| {
+        let (term, began) = (Term(term), Term(began));
+        match kind {
+            0 => {
+                let (cycle, nominal_ns, sent_ns, followed) = (a, b, c, x);
+                Message::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed })
+            }
+            1 => Message::WarmUp,
+            2 => Message::Request(Request { id, error_ns, epoch, term, eager: x, far: y, timed: z }),
+            _ => Message::Reply(Reply {
+                id,
+                sync_ns: a,
+                request_ns: b,
+                sent_ns: c,
+                error_ns,
+                epoch,
+                term,
+                began,
+                doubt_ns,
+                sync_by_kernel: x,
+                request_by_kernel: y,
+            }),
+        }
+    })
+}
+
+proptest! {
+    #[test]
+    fn a_message_that_is_taken_has_these_bytes_and_no_others(message in message()) {
+        let bytes = message.to_bytes();
+        if let Ok(parsed) = Message::parse(message.kind(), &bytes) {
+            prop_assert_eq!(parsed, message);
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_a_message_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..100), kind in 0..4_usize) {
+        if let Ok(message) = Message::parse(KINDS[kind], &bytes) {
+            prop_assert_eq!(message.to_bytes().to_vec(), bytes);
+        }
+    }
+
+    #[test]
+    fn a_clock_survives_whatever_it_is_told_and_never_goes_back(
+        told in prop::collection::vec((message(), prop_oneof![Just(0_u8), Just(2)], 0..200_000_000_u64, 0..300_000_000_u64), 1..60)
+    ) {
+        let mut now_ns = 1_000_000_000;
+        let mut clock = Clock::new(settings(), now_ns, 1_790_000_000_000_000_000, None);
+        let mut last = clock.reading(now_ns).time;
+        for (message, from, waits_ns, came_before_ns) in told {
+            now_ns += waits_ns;
+            let came = Stamp { ns: now_ns - came_before_ns.min(now_ns), doubt_ns: 50, by_kernel: true };
+            let _ = clock.handle(now_ns, came, &head(message.kind(), from), &message.to_bytes());
+            let mut datagram = [0; TIME_BYTES];
+            for sent in 0.. {
+                prop_assert!(sent < 100, "it sends without end");
+                match clock.poll(now_ns, &mut datagram) {
+                    Step::Send { stamp: Some(SentId { to, sequence }), .. } => {
+                        clock.sent(SentId { to, sequence }, Stamp { ns: now_ns + 10, doubt_ns: 50, by_kernel: true });
+                    }
+                    Step::Send { .. } => {}
+                    Step::Wait { until_ns } => {
+                        prop_assert!(until_ns >= now_ns);
+                        break;
+                    }
+                }
+            }
+            let time = clock.reading(now_ns).time;
+            prop_assert!(time.epoch > last.epoch || (time.epoch == last.epoch && time.ns >= last.ns), "{:?} {:?}", last, time);
+            last = time;
+        }
+    }
+}
+
+#[test]
+fn a_reply_to_another_question_changes_nothing() {
+    let mut clock = Clock::new(settings(), 0, 0, None);
+    let sync = |id, ns| {
+        let (cycle, nominal_ns, sent_ns) = (0, ns, ns);
+        let (error_ns, epoch, term, began) = (0, 1, Term::new(1, 0), Term::new(1, 0));
+        Message::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed: true })
+    };
+    let reply = |id| {
+        let (sync_ns, request_ns, sent_ns) = (5_000_000, 5_200_000, 5_300_000);
+        let reply = Reply { id, sync_ns, request_ns, sent_ns, epoch: 1, ..Reply::default() };
+        Message::Reply(Reply { term: Term::new(1, 0), began: Term::new(1, 0), ..reply })
+    };
+    let mut tell = |now_ns: u64, message: Message| {
+        let taken = clock.handle(now_ns, Stamp::by_us(now_ns), &head(message.kind(), 0), &message.to_bytes());
+        let mut datagram = [0; TIME_BYTES];
+        while let Step::Send { .. } = clock.poll(now_ns, &mut datagram) {}
+        taken.is_ok()
+    };
+    assert!(tell(10_000_000, sync(1, 5_000_000)));
+    assert!(!tell(10_400_000, reply(2)), "nobody asked");
+    assert!(tell(10_400_000, reply(1)));
+    assert!(!tell(10_400_000, reply(1)), "answered already");
+    assert!(!tell(10_500_000, sync(1, 5_000_000)), "twice");
+    assert!(!tell(10_500_000, Message::Request(Request { id: 3, ..Request::default() })), "it is no master");
+    assert_eq!(MESSAGE_BYTES, 72);
+}

@@ -1,0 +1,120 @@
+//! What goes into a clock and comes out of it.
+
+use super::{Stamp, Term};
+use crate::frame::{BadFrame, NodeIndex};
+use rohrpost_mailbox::SystemTime;
+use std::time::Duration;
+
+/// What a clock knows before the first datagram.
+#[derive(Clone, Debug)]
+pub struct TimeSettings {
+    /// First byte of the names of this system.
+    pub system: u8,
+    /// Which node it runs on.
+    pub own: NodeIndex,
+    /// Nodes of the system.
+    pub nodes: u8,
+    /// Which of them may be master, in order.
+    pub masters: Vec<NodeIndex>,
+    /// Of synchronisation, 1 ms to 10 s; the same on all nodes.
+    pub interval: Duration,
+    /// What must be equal on both ends of a wire.
+    pub digest: u64,
+    /// Tells this life of the router from its others; not 0.
+    pub incarnation: u64,
+}
+
+/// What a node is for the others.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Role {
+    /// Hears no master; if it has time, it goes on by its own clock.
+    Listening,
+    /// Follows a master.
+    Slave,
+    /// Is followed.
+    Master,
+}
+
+/// What to do next.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Step {
+    /// The buffer has a datagram for this node. If it is to be stamped, its id comes back with [`Clock::sent`].
+    Send {
+        /// To whom.
+        to: NodeIndex,
+        /// Which it is, if its stamp matters.
+        stamp: Option<SentId>,
+    },
+    /// Nothing before this moment, local monotonic ns, unless a datagram comes.
+    Wait {
+        /// Until then.
+        until_ns: u64,
+    },
+}
+
+/// Which datagram left.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SentId {
+    /// To whom.
+    pub to: NodeIndex,
+    /// The sequence in its head.
+    pub sequence: u64,
+}
+
+/// Why a datagram was not taken. Counted; none of these is an error of this node.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum Ignored {
+    /// Not of this system, for another node, or of another configuration.
+    #[error("from or for somebody else")]
+    Stranger,
+    /// Wrong in itself.
+    #[error(transparent)]
+    Bad(#[from] BadFrame),
+    /// Of a master that must yield, late, or twice.
+    #[error("late, twice, or of a master that must yield")]
+    Late,
+    /// A reply to a question that nobody asked, or that was answered.
+    #[error("no such question")]
+    Unasked,
+    /// The frames arrived before they left: a wrong stamp.
+    #[error("frames that arrived before they left")]
+    NegativeDelay,
+}
+
+/// What [`Clock::reading`] says.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reading {
+    /// System time, its epoch and its bound, by the node's page.
+    pub time: SystemTime,
+    /// The term that this time follows; its bound is about the time of this term.
+    pub term: Term,
+    /// System nanoseconds in a billion local ones.
+    pub pace_ppb: u64,
+    /// Whether the bound says anything at all.
+    pub synchronised: bool,
+}
+
+/// One exchange, for who wants to look at it: stamps of both ends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Exchange {
+    /// Of Sync, Request and Reply.
+    pub id: u64,
+    /// Sync left: system ns, just before it was handed to the kernel.
+    pub sync_sent_ns: u64,
+    /// Sync left: system ns, as the master knows it.
+    pub sync_left_ns: u64,
+    /// Sync came: local.
+    pub sync_came: Stamp,
+    /// Request left: local, just before it was handed to the kernel.
+    pub request_sent_ns: u64,
+    /// Request left: local.
+    pub request_left: Stamp,
+    /// Request came: system ns.
+    pub request_came_ns: u64,
+    /// Reply left: system ns, just before it was handed to the kernel.
+    pub reply_sent_ns: u64,
+    /// Reply came: local.
+    pub reply_came: Stamp,
+    /// All four stamps that count are the kernel's.
+    pub by_kernel: bool,
+}
