@@ -10,6 +10,8 @@ const IMPAIR: &str = "loss=5%,delay=2ms,reorder=5%,duplicate=1%,seed=7";
 const PACKAGES: u64 = 3000;
 /// One call after so many packages.
 const CALL_EVERY: u64 = 30;
+/// As many as a tool may have under way.
+const CALLS: usize = rohrpost_modules::call::REPLIES_KEPT;
 /// Repeated after a third of it.
 const CALL: Duration = Duration::from_millis(900);
 
@@ -30,11 +32,11 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
     let mut calls = Calls::new(&field, "base", "probe.1", CALL);
     let mut last = 0;
     while source.sent < PACKAGES {
-        if source.send() && source.sent.is_multiple_of(CALL_EVERY) {
+        let is_room = calls.look() < CALLS;
+        if source.send() && source.sent.is_multiple_of(CALL_EVERY) && is_room {
             last += 1;
             calls.begin(last);
         }
-        calls.look();
         sink.take(Duration::from_micros(500));
     }
     calls.settle();
@@ -45,13 +47,13 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
     // Of a twentieth that the network lost, every one is known; and what else is missing there never carried a package.
     assert!((PACKAGES / 40..PACKAGES / 10).contains(&accounts.wire), "{accounts:?}");
     let peer = field.peer("arm", "base");
-    assert!(accounts.datagrams_lost - accounts.wire <= accounts.datagrams_alive + u64::from(last), "{accounts:?}");
+    assert!(accounts.datagrams_lost - accounts.wire <= accounts.datagrams_other, "{accounts:?}");
     assert!(peer.copies > 0 && peer.overtaken > 0, "{peer:?}");
     let late = accounts.arm.lost.iter().find(|loss| loss.cause == "late").map_or(0, |loss| loss.packages);
     assert!(late > 0, "what was overtaken is not delivered: {accounts:?}");
 
     // Each has three tries: of a tenth that is lost on the way there or back, hardly any is lost three times.
-    assert!(calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);
+    assert!(last >= 20 && calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);
     assert_once(&field, "probe.1", &calls.close());
     drop((source, sink));
     field.stop();

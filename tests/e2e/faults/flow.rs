@@ -101,10 +101,10 @@ fn lost_in_mailbox(robot: &Robot, name: rohrpost::Name, class: Class) -> u64 {
 pub(super) struct Accounts {
     /// Packages lost on the wire, since the one router sent them and the other never saw them.
     pub(super) wire: u64,
-    /// Datagrams that the receiving router counts as lost: those, and some that said "still there".
+    /// Datagrams that the receiving router counts as lost: those, and others.
     pub(super) datagrams_lost: u64,
-    /// Datagrams that carried no package.
-    pub(super) datagrams_alive: u64,
+    /// Datagrams that carried no package of the flow.
+    pub(super) datagrams_other: u64,
     /// What the receiving router did.
     pub(super) arm: ClassCarried,
 }
@@ -122,7 +122,7 @@ pub(super) fn balance(field: &Field, source: &Source, sink: &mut Sink, class: Cl
         let accounts = Accounts {
             wire: of_base.sent.checked_sub(of_arm.came)?,
             datagrams_lost: inn.peers[0].lost,
-            datagrams_alive: out.peers[0].sent.datagrams.checked_sub(out.peers[0].sent.packages)?,
+            datagrams_other: out.peers[0].sent.datagrams.saturating_sub(of_base.sent),
             arm: of_arm,
         };
         let sums = [

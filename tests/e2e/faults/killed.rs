@@ -21,7 +21,7 @@ const ONE_TRY: Duration = Duration::from_secs(10);
 /// What has waited longer is not sent any more.
 const TOO_LATE: Duration = Duration::from_nanos(WAIT_MAX_NS);
 /// As many as a tool may have under way.
-const WAITING: usize = 8;
+const WAITING: usize = rohrpost_modules::call::REPLIES_KEPT;
 /// These are repeated several times meanwhile.
 const MANY_TRIES: Duration = Duration::from_millis(900);
 
