@@ -128,13 +128,20 @@ installation = "said"
 name = "robot"
 id = 1
 [classes]
+router = { id = 250 }
 motor = { id = 200 }
 laser = { id = 150 }
 output = { id = 32 }
 tool = { id = 16 }
+[network]
+security = "none"
+[time]
+source = "master"
 [nodes.base]
+address = "10.77.0.1"
 tools = [0, 3]
 [nodes.desk]
+address = "10.77.0.2"
 tools = [4, 7]
 [[module]]
 name = "motor.0"
@@ -195,7 +202,9 @@ optional = true
 
     #[test]
     fn json_has_all_there_is() {
-        let text = CONFIG.replace("[nodes.base]", "[time]\nsource = \"log\"\n[nodes.base]");
+        let (head, module) = CONFIG.split_once("[network]").unwrap();
+        let (_, module) = module.split_once("[[module]]").unwrap();
+        let text = format!("{head}[time]\nsource = \"log\"\n[nodes.base]\n[[module]]{module}");
         let installation = Installation::parse(&text, Path::new("said.toml")).unwrap();
         let format = Format::new(&installation);
         let told = OutputLine { lost: 3, suppressed: 12, ..line(Name::new(1, 200, 0, 0), "… \"x\"") };
