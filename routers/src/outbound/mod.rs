@@ -160,9 +160,9 @@ impl Outbound {
         if taken { Accepted::Waits } else { Accepted::Lost }
     }
 
-    /// Whether nothing waits.
-    pub fn is_empty(&self) -> bool {
-        self.queue.is_empty()
+    /// Whether what waits fills a datagram and the next: then more is of use only if it is more important.
+    pub fn has_plenty(&self) -> bool {
+        self.queue.used_bytes() >= 2 * self.settings.network.datagram_bytes_max as u64
     }
 
     /// What leaves next, or when to ask again. `datagram` has room for the largest.

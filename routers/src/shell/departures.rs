@@ -24,9 +24,6 @@ use std::time::{Duration, Instant};
 
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
 const BURST: usize = 64;
-/// While some wait already, only so many between two datagrams: a flood must not be taken in faster than anything gets out. What
-/// is left in the mailbox is the least important.
-const FEW: usize = 8;
 /// While more waits in the mailbox than may leave, it rests for at most so long: whoever shares its processor goes on, and what is
 /// more important than all that waits is taken soon.
 const REST: Duration = Duration::from_micros(200);
@@ -54,12 +51,11 @@ impl Departures {
     pub(super) fn run(mut self) {
         let mut awake = Awake::default();
         while !self.shared.ends() {
-            let most = if self.outbound.is_empty() { BURST } else { FEW };
-            let taken = self.take(most);
+            let more = self.take();
             let now_ns = monotonic_ns();
             match self.outbound.poll(now_ns, &mut self.datagram, &mut self.answers) {
                 Output::Send { to, bytes } => self.send(to, bytes),
-                Output::Wait { until_ns } if taken == most => self.rest(now_ns, until_ns),
+                Output::Wait { until_ns } if more => self.rest(now_ns, until_ns),
                 Output::Wait { until_ns } => {
                     let delivery_ns = self.wire.deliver(now_ns);
                     let waits = self.stats.waiting_bytes.get() > 0 || delivery_ns < u64::MAX;
@@ -70,11 +66,13 @@ impl Departures {
         }
     }
 
-    /// Takes what waits in the mailbox, most important first, at most so many; how many.
-    fn take(&mut self, most: usize) -> usize {
+    /// Takes what waits in the mailbox, most important first; whether there may be more. With plenty in the queue it takes one: the
+    /// most important of all that came since. A flood that is taken in faster than it leaves would only be lost to its quota there, and
+    /// cost the processor that modules need; in the mailbox its least important gives way by itself.
+    fn take(&mut self) -> bool {
         let Self { transit, outbound, answers, wire, .. } = self;
-        for taken in 0..most {
-            let Some(waiting) = transit.try_receive() else { return taken };
+        for taken in 0..BURST {
+            let Some(waiting) = transit.try_receive() else { return false };
             let (now_ns, body) = (monotonic_ns(), waiting.body());
             let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body };
             let alone = taken == 0 && !waiting.is_followed();
@@ -84,8 +82,11 @@ impl Departures {
             {
                 outbound.unsent(&head, body, answers);
             }
+            if outbound.has_plenty() {
+                break;
+            }
         }
-        most
+        true
     }
 
     fn send(&mut self, to: NodeIndex, bytes: usize) {
