@@ -22,14 +22,22 @@ pub(super) struct Peer {
     /// The life that is heard; 0: none yet.
     incarnation: u64,
     began_ns: u64,
-    /// Lives that are over; 0: none.
-    old: [u64; OLD_KEPT],
+    old: [Old; OLD_KEPT],
     old_next: usize,
     pub(super) window: Window,
     pub(super) order: Order,
     pub(super) reassembly: Reassembly,
     pub(super) refusing: Refusing,
     told: Told,
+}
+
+/// A life that is over.
+#[derive(Clone, Copy, Debug, Default)]
+struct Old {
+    /// 0: none.
+    incarnation: u64,
+    /// The sequence that was expected next of it: what it sent before may have been delivered.
+    next: u64,
 }
 
 /// What was said of a peer and is not over.
@@ -45,15 +53,17 @@ struct Told {
 
 impl Peer {
     /// Whether a datagram is of the life that is heard. A life that was not known begins; of one that is over nothing is taken, unless
-    /// the one that was taken for its successor is silent: then it was the other way round.
+    /// it goes on, and the one that was taken for its successor is silent: then it was the other way round. What it sent before it was
+    /// over says nothing: that may be a copy, which the wire or a stranger kept.
     pub(super) fn lives(&mut self, now_ns: u64, head: &FrameHead, way: &Way<'_>, deliver: &mut impl Deliver) -> bool {
         if head.incarnation == self.incarnation {
             return true;
         }
-        let was = self.old.iter().position(|old| *old == head.incarnation);
+        let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
-        if was.is_some() && !is_silent && !broken!(TakesOldLives) {
-            if now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
+        let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
+        if was.is_some() && !(is_silent && goes_on) && !broken!(TakesOldLives) {
+            if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
                 deliver.event(Event::Twice { peer: way.from });
             }
@@ -61,10 +71,11 @@ impl Peer {
         }
         let is_first = self.incarnation == 0;
         if !is_first {
+            let next = self.window.next();
             self.end_life(way, deliver);
             let place = was.unwrap_or(self.old_next % OLD_KEPT);
             self.old_next += usize::from(was.is_none());
-            self.old[place] = self.incarnation;
+            self.old[place] = Old { incarnation: self.incarnation, next };
             self.told = Told { heard: true, twice: self.told.twice, ..Told::default() };
             deliver.event(Event::Restarted { peer: way.from });
         }

@@ -11,6 +11,8 @@ use std::sync::Arc;
 
 /// Longest answer.
 const ANSWER_BYTES_MAX: usize = 1024;
+/// After so long the wire holds no copy any more of what the router's life before took.
+const YOUNG_NS: u64 = 500_000_000;
 
 /// Why a command goes no further.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -59,7 +61,23 @@ impl Answers {
         }
     }
 
-    /// Answers a command, of whose body this is the beginning; for all other packages nobody waits.
+    /// Answers a command that came from another node, unless this life of the router has just begun: then it may be a copy of one that
+    /// the life before has delivered. Its caller's next try brings the truth.
+    pub(super) fn answer_arrived(
+        &mut self,
+        peer: Option<NodeIndex>,
+        head: &Head,
+        body: &[u8],
+        cause: Cause,
+        takes_bytes: Option<usize>,
+    ) {
+        if monotonic_ns().saturating_sub(self.stats.started_ns) >= YOUNG_NS {
+            self.answer(peer, head, body, cause, takes_bytes);
+        }
+    }
+
+    /// Answers a command, of whose body this is the beginning; for all other packages nobody waits. Of one that is handed out again
+    /// nothing is said: the router's life that died with it in its hand may have sent it.
     pub(super) fn answer(
         &mut self,
         peer: Option<NodeIndex>,
@@ -69,7 +87,7 @@ impl Answers {
         takes_bytes: Option<usize>,
     ) {
         let Kind::Command(number) = head.kind.kind() else { return };
-        if !head.from.is_mailbox() {
+        if !head.from.is_mailbox() || head.options.has(Options::REDELIVERED) {
             return;
         }
         let settings = self.settings.clone();
@@ -93,5 +111,86 @@ impl Answers {
         };
         // Who has gone, or takes no more answers, waits for its timeout.
         let _ = self.ways.send(&answer, &self.body);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::{module, settings};
+    use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
+
+    /// Says the cause's word.
+    struct Words;
+
+    impl Faults for Words {
+        fn write(&self, _: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool {
+            answer.extend_from_slice(why.cause.word().as_bytes());
+            true
+        }
+    }
+
+    /// A router that began so long ago, ns, and the mailbox of a caller.
+    struct Ground {
+        answers: Answers,
+        replies: Receiver,
+        _folder: tempfile::TempDir,
+    }
+
+    impl Ground {
+        fn new(age_ns: Option<u64>) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+            let participant = Participant::join(&node, Name::NONE).unwrap();
+            let replies = participant.receiver(caller(), Shape { slots: 4, ..Shape::default() }).unwrap();
+            let settings = Arc::new(settings(0, 2));
+            // A beginning that never is over.
+            let started_ns = age_ns.map_or(u64::MAX, |age_ns| monotonic_ns() - age_ns);
+            let faults: Arc<dyn Faults> = Arc::new(Words);
+            let answers = Answers::new(&settings, &Stats::new(&settings, started_ns), &faults, &participant);
+            Self { answers, replies, _folder: folder }
+        }
+
+        fn answered(&mut self) -> Option<String> {
+            let package = self.replies.try_receive()?;
+            assert!(package.head().options.has(Options::ERROR));
+            Some(String::from_utf8_lossy(package.body()).into_owned())
+        }
+    }
+
+    fn caller() -> Name {
+        module(50, 0).with_local(local::REPLIES)
+    }
+
+    fn command(options: Options) -> Head {
+        Head { to: module(60, 1), from: caller(), kind: Type::command(16), options, ..Head::default() }
+    }
+
+    #[test]
+    fn of_a_command_that_is_handed_out_again_nothing_is_said() {
+        let mut ground = Ground::new(Some(YOUNG_NS));
+        for cause in Cause::ALL {
+            let again = command(Options::default().with(Options::REDELIVERED));
+            ground.answers.answer(Some(1), &again, b"call", cause, None);
+            ground.answers.answer_arrived(Some(1), &again, b"call", cause, None);
+            assert_eq!(ground.answered(), None, "{cause:?}: the life before may have sent it");
+        }
+        ground.answers.answer(Some(1), &command(Options::default()), b"call", Cause::Silent, None);
+        assert_eq!(ground.answered().as_deref(), Some(Cause::Silent.word()));
+    }
+
+    #[test]
+    fn who_has_just_begun_says_nothing_of_what_came() {
+        let command = command(Options::default());
+        let mut ground = Ground::new(None);
+        for cause in [Cause::NoMailbox, Cause::MailboxFull, Cause::TooLarge, Cause::Stale] {
+            ground.answers.answer_arrived(Some(1), &command, b"call", cause, None);
+            assert_eq!(ground.answered(), None, "{cause:?}: it may be a copy of what the life before delivered");
+        }
+        ground.answers.answer(Some(1), &command, b"call", Cause::Stale, None);
+        assert_eq!(ground.answered().as_deref(), Some(Cause::Stale.word()), "what is to leave is no copy");
+        let mut ground = Ground::new(Some(YOUNG_NS));
+        ground.answers.answer_arrived(Some(1), &command, b"call", Cause::MailboxFull, None);
+        assert_eq!(ground.answered().as_deref(), Some(Cause::MailboxFull.word()));
     }
 }

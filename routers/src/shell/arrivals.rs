@@ -67,7 +67,7 @@ pub(super) struct Desk {
 
 impl Report for Desk {
     fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
-        self.answers.answer(peer, head, body, cause, self.takes_bytes.take());
+        self.answers.answer_arrived(peer, head, body, cause, self.takes_bytes.take());
     }
 }
 

@@ -129,8 +129,8 @@ pub struct Package {
     pub(super) lower: u64,
     /// Whether it came marked as one that was handed out before.
     pub redelivered: bool,
-    /// Lives of both routers, at each delivery.
-    pub deliveries: Vec<(u32, u32)>,
+    /// At each delivery, incarnation of the router that sent it and life of the one that delivered.
+    pub deliveries: Vec<(u64, u32)>,
 }
 
 /// The books.

@@ -6,7 +6,7 @@ use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
 use super::plan::{Plan, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::fragment::PARTIAL_MAX;
-use crate::frame::{Frame, NodeIndex};
+use crate::frame::{Frame, FrameHead, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS};
 use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 use crate::outbound::{Accepted, Outbound, Output, Package};
@@ -81,6 +81,8 @@ pub struct Packages {
     polled_ns: u64,
     /// When each peer was heard last, or the router began.
     heard_ns: Vec<u64>,
+    /// Since when each is heard without being silent: what it says of us is waited for from then on.
+    present_since_ns: Vec<u64>,
     /// Losses when all began to be well.
     lost_before: Option<(u64, u64)>,
     /// Commands that could not be delivered here; their callers are to be told.
@@ -102,6 +104,7 @@ impl Packages {
             steady_since_ns: now_ns,
             polled_ns: now_ns,
             heard_ns: vec![now_ns; settings.nodes.len()],
+            present_since_ns: vec![now_ns; settings.nodes.len()],
             settings: settings.clone(),
             stats,
         }
@@ -129,8 +132,7 @@ impl Packages {
 
     fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) {
         let package = Package { head, published_ns, body };
-        let mut watch =
-            Watch { io, arrived_ns: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+        let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
         if let Accepted::Send { to, head } =
             self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch)
         {
@@ -141,8 +143,7 @@ impl Packages {
 
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
         if io.host.unsendable > 0 && io.chance.percent(50) {
-            let mut watch =
-                Watch { io, arrived_ns: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             return self.outbound.unsent(&bytes, &[], &mut watch);
         }
         io.book.leaves(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
@@ -208,7 +209,10 @@ impl Packages {
     /// A datagram of a peer was taken.
     fn hears(&mut self, io: &mut Io<'_>, source: Option<usize>) {
         let Some(peer) = source else { return };
-        self.heard_ns[peer] = io.now.monotonic_ns;
+        let before_ns = std::mem::replace(&mut self.heard_ns[peer], io.now.monotonic_ns);
+        if io.now.monotonic_ns - before_ns >= SILENT_AFTER_NS {
+            self.present_since_ns[peer] = io.now.monotonic_ns;
+        }
         let heard = (io.now.true_ns, io.life, io.lives[peer]);
         io.book.heard.insert((io.node, peer), heard);
     }
@@ -229,7 +233,7 @@ impl Packages {
             }
             let (heard_ns, life, own_life) = io.book.heard.get(&(peer, io.node)).copied().unwrap_or_default();
             let goes_on = life == io.lives[peer] && own_life == io.life;
-            let doubt_ns = (io.now.true_ns - heard_ns.min(io.now.true_ns)).min(now_ns - self.steady_since_ns);
+            let doubt_ns = (io.now.true_ns - heard_ns.min(io.now.true_ns)).min(since_ns(self.present_since_ns[peer]));
             if is_there && goes_on && doubt_ns > UNHEARD_AFTER_NS + TELL_EVERY_NS + 2 * STILL_NS {
                 let text = format!("node {peer} is {state:?} for node {}, which it does not hear", io.node);
                 io.book.broken(io.now, Promise::Links, text);
@@ -274,8 +278,10 @@ impl Layer for Packages {
             arrived_ns: arrived.stamp.monotonic_ns,
             bytes: &arrived.bytes,
         };
-        let (arrived_ns, is_young) = (Some(datagram.arrived_ns), self.is_young(io.now));
-        let mut watch = Watch { io, arrived_ns, is_out: false, is_young, undelivered: &mut self.undelivered };
+        let incarnation = FrameHead::parse(&arrived.bytes).map_or(0, |(head, _)| head.incarnation);
+        let came = Some(Came { at_ns: datagram.arrived_ns, incarnation });
+        let is_young = self.is_young(io.now);
+        let mut watch = Watch { io, came, is_out: false, is_young, undelivered: &mut self.undelivered };
         self.inbound.handle(watch.io.now.monotonic_ns, &datagram, &mut watch);
         let after = self.counted(source);
         let (taken, copies, dropped) = (after.0 - before.0, after.1 - before.1, after.2 - before.2);
@@ -308,7 +314,7 @@ impl Layer for Packages {
         let mut until_ns = u64::MAX;
         let is_young = self.is_young(io.now);
         loop {
-            let mut watch = Watch { io, arrived_ns: None, is_out: false, is_young, undelivered: &mut self.undelivered };
+            let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 inbound::Output::Refuse { to, bytes } => {
                     let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
@@ -325,8 +331,7 @@ impl Layer for Packages {
         }
         self.answer(io);
         loop {
-            let mut watch =
-                Watch { io, arrived_ns: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             match self.outbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 Output::Send { to, bytes } => {
                     let bytes = Rc::from(&self.buffer[..bytes]);
@@ -380,11 +385,20 @@ impl Sums {
     }
 }
 
+/// A datagram that came.
+#[derive(Clone, Copy)]
+struct Came {
+    /// To this computer, ns of its monotonic clock.
+    at_ns: u64,
+    /// Life of its sender, as it says.
+    incarnation: u64,
+}
+
 /// Takes what the cores tell of.
 struct Watch<'a, 'b> {
     io: &'a mut Io<'b>,
-    /// When the datagram came that is being looked at.
-    arrived_ns: Option<u64>,
+    /// The datagram that is being looked at.
+    came: Option<Came>,
     is_out: bool,
     /// The router began so short a time ago that the wire may hold copies of what its last life took.
     is_young: bool,
@@ -425,10 +439,11 @@ impl Deliver for Watch<'_, '_> {
             Closed::Full => NotDelivered::MailboxFull,
         })?;
         io.book.saw("delivered");
-        if self.arrived_ns.is_some_and(|arrived_ns| io.now.monotonic_ns.saturating_sub(arrived_ns) > SOCKET_MAX_NS) {
+        if self.came.is_some_and(|came| io.now.monotonic_ns.saturating_sub(came.at_ns) > SOCKET_MAX_NS) {
             io.book.broken(io.now, Promise::Fresh, format!("package {number} waited in the socket, and is delivered"));
         }
-        io.book.delivered(io.now, io.life, number, head.options.has(Options::REDELIVERED));
+        let incarnation = self.came.map_or(0, |came| came.incarnation);
+        io.book.delivered(io.now, (incarnation, io.life), number, head.options.has(Options::REDELIVERED));
         Ok(())
     }
 

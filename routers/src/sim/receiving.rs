@@ -127,12 +127,13 @@ impl Book {
         known
     }
 
-    /// A mailbox took it.
-    pub fn delivered(&mut self, now: Now, life: u32, number: u32, redelivered: bool) {
+    /// A mailbox took it. `lives`: incarnation of the router that sent the datagram, not of the one that has the package by now (it may
+    /// have found it again when it began), and life of the one that delivers.
+    pub fn delivered(&mut self, now: Now, lives: (u64, u32), number: u32, redelivered: bool) {
+        let (_, life) = lives;
         self.receipt(life, number).ended = true;
         let package = &mut self.packages[number as usize];
         package.redelivered |= redelivered;
-        let lives = (package.life, life);
         let twice = package.deliveries.contains(&lives);
         package.deliveries.push(lives);
         let (head, place) = (package.head, package.place);

@@ -104,6 +104,40 @@ fn a_life_that_was_taken_for_over_comes_back() {
     base.assert_balanced();
 }
 
+#[test]
+fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
+    let mut base = End::new(0, |_| {});
+    let lives = |incarnation| End::new(1, |settings| settings.incarnation = incarnation);
+    let (mut first, mut second) = (lives(11), lives(12));
+    let old: Vec<_> = (0..5).map(|_| first.send(START, data(1, 0), b"", true).unwrap().1).collect();
+    let new: Vec<_> = (0..2).map(|_| second.send(START, data(1, 0), b"", true).unwrap().1).collect();
+    old[1..4].iter().for_each(|datagram| base.take(START, 1, datagram));
+    base.take(START, 1, &new[0]);
+    let before = base.log.delivered.len();
+    // The second life is silent, and the wire or a stranger has kept what the first one sent.
+    let now_ns = START + 3 * S;
+    old[..4].iter().for_each(|datagram| base.take(now_ns, 1, datagram));
+    let stats = base.stats.clone();
+    let received = &stats.peer(1).received;
+    assert_eq!(
+        (base.log.delivered.len(), received.old.get(), received.restarts.get()),
+        (before, 4, 1),
+        "nothing twice"
+    );
+    assert!(!base.log.events.contains(&Event::Twice { peer: 1 }), "that router may have ended");
+    base.take(now_ns, 1, &new[1]);
+    assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 1, 1), "the second life goes on");
+    base.take(now_ns + S, 1, &old[4]);
+    assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 2, 2), "what goes on is no copy");
+    new.iter().for_each(|datagram| base.take(now_ns + 2 * S, 1, datagram));
+    assert_eq!(
+        (base.log.delivered.len(), received.restarts.get()),
+        (before + 2, 2),
+        "nothing twice of the second either"
+    );
+    base.assert_balanced();
+}
+
 pub(super) fn check_one_way() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
@@ -131,6 +165,28 @@ pub(super) fn check_one_way() {
 #[test]
 fn a_one_way_link_is_noticed() {
     check_one_way();
+}
+
+#[test]
+fn who_is_heard_again_has_a_second_to_hear_us() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
+    base.meet(START, &mut arm);
+    (0..40).for_each(|step| drop(base.refusals(START + step * 100 * MS)));
+    assert_eq!(base.stats.state(1, START + 4 * S), State::Silent);
+    // Both directions were cut, and only this one is whole again.
+    let mut denied_ns = None;
+    for step in 0..=130 {
+        let now_ns = START + 4 * S + step * 10 * MS;
+        for (_, datagram) in arm.leave(now_ns).into_iter().filter(|(to, _)| *to == 0) {
+            base.take(now_ns, 1, &datagram);
+            denied_ns.get_or_insert(now_ns);
+        }
+        base.refusals(now_ns);
+        let Some(denied_ns) = denied_ns else { continue };
+        let expected = if now_ns < denied_ns + S { State::Alive } else { State::Unheard };
+        assert_eq!(base.stats.state(1, now_ns), expected, "{} ns after it is heard again", now_ns - denied_ns);
+    }
+    assert!(denied_ns.is_some_and(|denied_ns| denied_ns < START + 4 * S + 200 * MS));
 }
 
 pub(super) fn check_socket() {
