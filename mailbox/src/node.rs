@@ -50,7 +50,8 @@ pub(crate) struct NodePage {
     pub(crate) registry_epoch: AtomicU32,
     /// Raised whenever somebody's death was noticed: receivers then look for what the dead left.
     pub(crate) deaths: AtomicU32,
-    pub(crate) incarnations: AtomicU32,
+    /// The last one that was given out.
+    incarnations: AtomicU32,
     launch_pid: AtomicU32,
     padding: [AtomicU32; 9],
     entries: [Entry; PARTICIPANTS_MAX],
@@ -253,6 +254,13 @@ impl Node {
         let same = || self.entry(who.participant).incarnation.load(Ordering::Acquire) == who.incarnation;
         // A lock that cannot be asked about counts as held: taking a slot from the living is the worse mistake.
         !same() || !lock::is_locked(&self.file, u64::from(who.participant)).unwrap_or(true)
+    }
+
+    /// A number that is later than all that this node gave out before; they count upwards, wrap, and are never 0. Participants
+    /// have one each, from when they joined. That says nothing of the order in which they then have a name, so whoever must be
+    /// told from earlier owners of a name asks for one of its own, when the name's mailbox is its own.
+    pub fn next_incarnation(&self) -> u32 {
+        self.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1)
     }
 
     /// Tells all receivers that somebody died, so that they look for what was left. Sleeping needs no timeout because

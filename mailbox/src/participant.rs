@@ -41,7 +41,7 @@ impl Participant {
             }
             step!("join: locked");
             node.check_present(&file)?;
-            let incarnation = node.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1);
+            let incarnation = node.next_incarnation();
             let me = Claimant { participant, incarnation };
             // Before the entry says so: a table is read if the entry has the same incarnation.
             let traffic = Table::make(node, me)?;

@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_mailbox::{Head, Label, Name, Node, Options, Participant, Receiver, SendError, Sender, Shape, Type};
-use rohrpost_modules::call::{CallEnvelope, CallError, Fault, Link, Pending, REPLIES_KEPT, ReplyEnvelope};
+use rohrpost_modules::call::{
+    CallEnvelope, CallError, Fault, Link, Once, Pending, REPLIES_KEPT, ReplyEnvelope, Request, Verdict,
+};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -233,4 +235,33 @@ fn a_missing_mailbox_is_looked_for_again_only_when_something_came_or_went() {
     send(&mut ground).unwrap();
     ground.link.send(third, &Label::default(), &[b"first"]).unwrap();
     assert_eq!(late.try_receive().unwrap().body(), b"first");
+}
+
+/// Tools that start at once join one after the other, and may take the first name that is free in another order.
+#[test]
+fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
+    let mut ground = ground();
+    let name = Name::new(1, 90, 2, 0);
+    let [first, second] = [(); 2].map(|()| Participant::join(&ground.node, Name::NONE).unwrap());
+    let mut once = Once::new(0);
+    for participant in [&second, &first, &second] {
+        let replies = participant.receiver(name.with_local(1), Shape::default()).unwrap();
+        let mut link = Link::new(participant, name, replies);
+        link.begin(SERVER, 16, 77, LONG, |_| Ok(())).unwrap();
+        let package = ground.server.try_receive().unwrap();
+        let (envelope, _) = CallEnvelope::split(package.body()).unwrap();
+        let request = Request {
+            from: package.head().from,
+            incarnation: envelope.incarnation,
+            sequence: envelope.sequence,
+            valid_for_ns: u64::from(envelope.valid_for_us) * 1000,
+            age_ns: 0,
+            repeat: false,
+            redelivered: false,
+            idempotent: false,
+        };
+        assert_eq!(once.judge(&request, 1), Verdict::Run, "{request:?}");
+        once.done(&request, 1, false, &[]);
+        link.close();
+    }
 }

@@ -25,6 +25,8 @@ const BURST: usize = 64;
 pub struct Link {
     participant: Arc<Participant>,
     me: Name,
+    /// Tells its calls from those of whoever had this name before.
+    incarnation: u32,
     replies: Receiver,
     senders: Vec<Sender>,
     absent: Absent,
@@ -57,6 +59,9 @@ impl Link {
         Self {
             participant: participant.clone(),
             me,
+            // Not the participant's: of two that join, the first may have the name after the other, and whoever served that
+            // other would take these calls for those of an earlier life. The mailbox is ours, so all earlier owners have theirs.
+            incarnation: participant.node().next_incarnation(),
             replies,
             senders: Vec::new(),
             absent: Absent::default(),
@@ -156,7 +161,7 @@ impl Link {
         let mut body = self.spare.pop().unwrap_or_default();
         let envelope = CallEnvelope {
             interface,
-            incarnation: self.participant.incarnation(),
+            incarnation: self.incarnation,
             sequence,
             valid_for_us: micros(timeout),
             age_us: 0,
@@ -267,7 +272,6 @@ impl Link {
 
     /// Moves the answers that have come to their calls. Answers to nobody (late, or to an earlier life) are dropped.
     pub fn collect(&mut self) {
-        let incarnation = self.participant.incarnation();
         for _ in 0..BURST {
             let Some(package) = self.replies.try_receive() else { return };
             let head = package.head();
@@ -278,7 +282,7 @@ impl Link {
                     && head.kind.0 == -call.kind.0
                     && call.answer.is_none()
             };
-            let call = self.calls.iter_mut().find(its).filter(|_| envelope.incarnation == incarnation);
+            let call = self.calls.iter_mut().find(its).filter(|_| envelope.incarnation == self.incarnation);
             // One try that was refused says nothing of the others that are under way.
             let refused = |call: &Call| call.repeated && head.options.has(Options::ERROR) && is_of_one_try(result);
             if let Some(call) = call.filter(|call| !refused(call)) {
