@@ -50,7 +50,11 @@ const SEEN_IN_A_HUNDRED: [(&str, u64); 22] = [
 /// are never the same twice, and copies of a part are dropped as datagrams.
 const UNSEEN: [Mistake; 2] = [Mistake::Packages(Broken::MixesPackages), Mistake::Packages(Broken::CountsPartsTwice)];
 /// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them.
-const SELDOM: [Mistake; 2] = [Mistake::Packages(Broken::NeverUnheard), Mistake::Time(time::Broken::OldSamples)];
+const SELDOM: [Mistake; 3] = [
+    Mistake::Packages(Broken::NeverUnheard),
+    Mistake::Packages(Broken::ForgetsFloor),
+    Mistake::Time(time::Broken::OldSamples),
+];
 
 /// The real guard of commands.
 struct RealGuard(Once);
