@@ -256,6 +256,7 @@ mod tests {
             missed: 4,
             copies: 0,
             damaged: 0,
+            refused: 0,
             overtaken: 0,
             restarts: 0,
         };
