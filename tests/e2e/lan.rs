@@ -6,10 +6,14 @@ use crate::probe::ProbingInterface;
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::mailbox::monotonic_ns;
 use rohrpost::{CallError, Fault};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
+
+/// Routers that joined so long ago are not young any more.
+const YOUNG_NS: u64 = 1_500_000_000;
 
 /// Two nodes, `base` with probe.0 and `arm` with probe.1.
 struct Lan {
@@ -50,6 +54,12 @@ impl Lan {
             let started = lan.start(node, environment);
             lan.nodes.push(started);
         }
+        // A router says nothing of what comes in its first half second: that may be a copy of what the one before it has delivered.
+        wait("routers that answer", || {
+            let routers = lan.nodes.iter().zip(["router.0", "router.1"]);
+            let mut began_ns = routers.filter_map(|((_, robot), router)| Some(robot.process(router)?.joined_ns));
+            began_ns.all(|ns| monotonic_ns() > ns + YOUNG_NS).then_some(())
+        });
         lan
     }
 

@@ -30,7 +30,7 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
             return None;
         }
         // Of several nodes, see `lan`.
-        "net" | "router" => return None,
+        "net" | "time" | "router" => return None,
         other => panic!("`{other}` is new: say here how it is tested"),
     };
     Some([&[command], after].concat())
