@@ -104,8 +104,8 @@ fn a_drawing_that_is_switched_on_again_is_whole_and_the_last_one_is_kept() {
     let (file, old) = (folder.path().join("map.rrd"), folder.path().join("map.old.rrd"));
     std::fs::write(folder.path().join("map.toml"), configuration(r#"file = "map.rrd""#)).unwrap();
     let launch = Launched::start(folder.path(), "map.toml");
-    // States and charts come each half second; by then the map, which is asked for at once, has come, too.
-    let enough = |launch: &Launched| wait("something is drawn", || (launch.count("drawn")? > 40).then_some(()));
+    // States and charts come each half second, some twenty rows; after several times the map, which is asked for at once, has come, too.
+    let enough = |launch: &Launched| wait("something is drawn", || (launch.count("drawn")? > 100).then_some(()));
     enough(&launch);
     ok("off", &launch.tool(&["call", "gui.0", "off"]));
     wait("the first ends", || std::fs::read(&file).unwrap().windows(4).any(|mark| mark == b"FOOT").then_some(()));
