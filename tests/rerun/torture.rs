@@ -6,15 +6,21 @@
 //! and comes and goes; what a fault does stays. Faults are interleaved with two kinds of peace: a viewer that is `well`, which costs
 //! the computer more than one that does nothing; and none at all, `absent`, which costs it less. With a fault the robot must be no
 //! slower than with either. How many windows there are does not depend on what they say: only when peace itself is noisy
-//! are they as many again, once, and all count. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` makes each fault come that often.
+//! are they as many again, once, and all count.
+//!
+//! A few rounds on a computer that others use as well tell a robot that waits for its viewer from one that does not, and no
+//! tenth: they are held to a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` makes each fault come that often, and
+//! holds them to the narrow one.
 
 use super::load::{Load, on_one_processor};
 use super::robot::{Mark, Robot};
 use super::viewer::{Viewer, free_port};
 use std::time::{Duration, Instant};
 
-/// The robot's latencies with a viewer that misbehaves, by those in peace.
+/// The robot's latencies with a viewer that misbehaves, by those in peace; in as many rounds as somebody asked for.
 const RATIO_MAX: f64 = 1.1;
+/// The same in the few rounds of the usual tests.
+const RATIO_MAX_OF_FEW: f64 = 2.0;
 /// Peace is noisy when its median lies so far above its lower quartile, as a share of that.
 const SPREAD_MAX: f64 = 0.15;
 /// Beats of a window: a tenth of a second.
@@ -186,10 +192,14 @@ impl Figures {
     }
 }
 
+fn rounds_asked_for() -> Option<usize> {
+    let rounds = std::env::var("ROHRPOST_TORTURE_ROUNDS").ok()?;
+    Some(rounds.parse().expect("a number of rounds"))
+}
+
 /// Figures of so many rounds, and of as many again if peace was noisy.
 fn measure(test: &mut Test, when: &str, marks: &[(Mark, &str); 2], freeze: bool) -> f64 {
-    let rounds = std::env::var("ROHRPOST_TORTURE_ROUNDS").ok();
-    let rounds = rounds.map_or(ROUNDS, |rounds| rounds.parse().expect("a number of rounds"));
+    let rounds = rounds_asked_for().unwrap_or(ROUNDS);
     let mut figures = Figures::default();
     figures.take(test, rounds, marks.clone(), freeze);
     if figures.is_noisy() {
@@ -230,8 +240,12 @@ fn a_viewer_that_misbehaves_does_not_slow_the_robot() {
     let said = test.robot.said();
     assert!(said.contains("stands still") && said.contains("has gone"), "it says what the viewer does:\n{said}");
     assert!(threads_are_nice(&test.robot), "all threads are as nice as their class");
+    let most = if rounds_asked_for().is_some() { RATIO_MAX } else { RATIO_MAX_OF_FEW };
     for (when, worst) in [("usual", quiet), ("flood", flooded)] {
-        assert!(worst <= RATIO_MAX, "{when}: with a fault the robot's latencies are {worst:.2} times those in peace");
+        assert!(
+            worst <= most,
+            "{when}: with a fault the robot's latencies are {worst:.2} times those in peace, not {most}"
+        );
     }
 }
 
