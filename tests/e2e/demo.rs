@@ -1,8 +1,9 @@
 //! The demo, as its user sees it.
 
-use crate::harness::{Place, probe, runs, skipped, wait};
+use crate::harness::{Place, probe, runs, skipped, wait, wait_heard};
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use rohrpost::mailbox::{Node, node_directory};
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
 
@@ -100,7 +101,6 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let arguments: &[&str] =
             if log { &["demo", "--no-gui", "--log", LOG, "--speed", "0.01"] } else { &["demo", "--no-gui"] };
         let mut demo = Running::start(place.command(arguments));
-        // Told to end before all are on, it would be a start that failed.
         wait("the demo is on", || {
             let list = place.say(&["list", "--json"]);
             let all_on =
@@ -110,6 +110,9 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let list = place.say(&["list", "--json"]).json();
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
         assert!(pids.len() >= 3, "{list}");
+        let directory = node_directory("demo", "main");
+        let node = Node::open(&place.memory().join(directory.file_name().unwrap())).unwrap();
+        wait_heard(&node, 0, list["modules"].as_array().unwrap().len());
         let said = demo.stop();
         assert!(said.contains(" packages received, ") && said.contains("map: "), "{said}");
         assert_eq!(said.contains("log: "), log, "{said}");
