@@ -82,9 +82,7 @@ impl Lan {
 
     /// A command of a person at `base`.
     fn say(&self, arguments: &[&str]) -> crate::process::Said {
-        let at = ["--config", self.config.to_str().unwrap(), "--node", "base"];
-        let (command, rest) = arguments.split_first().unwrap();
-        self.place.say(&[&[*command], &at[..], rest].concat())
+        self.place.say_at(&self.config, "base", arguments)
     }
 
     /// What counting at `arm` brings, called from `base`.
