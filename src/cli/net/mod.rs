@@ -17,7 +17,8 @@ const LOOK_AGAIN: Duration = Duration::from_millis(600);
   rohrpost net                all nodes, once
   rohrpost net --watch        again and again; Ctrl-C ends it
   rohrpost net --node arm --json
-`lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. Packages lost in routers stand below, by class and cause. The \
+`lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. `refused` are \
+those that came from the peer's address and were not taken. Packages lost in routers stand below, by class and cause. The \
 exit code is 1 if a router does not answer or a peer is not alive.")]
 pub(super) struct Arguments {
     #[command(flatten)]
