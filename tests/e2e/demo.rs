@@ -110,7 +110,7 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let list = place.say(&["list", "--json"]).json();
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
         assert!(pids.len() >= 3, "{list}");
-        let directory = node_directory("demo", "main");
+        let directory = node_directory(if log { "demo-log" } else { "demo" }, "main");
         let node = Node::open(&place.memory().join(directory.file_name().unwrap())).unwrap();
         wait_heard(&node, 0, list["modules"].as_array().unwrap().len());
         let said = demo.stop();

@@ -228,7 +228,6 @@ impl Drop for Place {
     }
 }
 
-/// A node that runs, seen by a test that takes part as a tool.
 /// Waits until launch, which has this place of a tool, has heard from so many modules: until then a stop is a start that failed.
 pub(crate) fn wait_heard(node: &Node, launch: u8, modules: usize) {
     let replies = Name::new(1, 16, launch, local::REPLIES);
@@ -238,6 +237,7 @@ pub(crate) fn wait_heard(node: &Node, launch: u8, modules: usize) {
     });
 }
 
+/// A node that runs, seen by a test that takes part as a tool.
 pub(crate) struct Robot {
     pub(crate) installation: Installation,
     pub(crate) node: Arc<Node>,
