@@ -1,6 +1,6 @@
 //! The demo, as its user sees it.
 
-use crate::harness::{Place, probe, runs, skipped, wait, wait_heard};
+use crate::harness::{Place, lacks_namespaces, probe, runs, wait, wait_heard};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::mailbox::{Node, node_directory};
@@ -42,8 +42,8 @@ fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_f
     let place = Place::new();
     let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
     let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "--impair", bad]);
-    if said.err.contains("network namespaces cannot be made here") {
-        return skipped(&said.err);
+    if lacks_namespaces(&said.err) {
+        return;
     }
     assert_eq!(said.code, Some(0), "{said:?}");
     let said = said.out;
@@ -110,7 +110,7 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let list = place.say(&["list", "--json"]).json();
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
         assert!(pids.len() >= 3, "{list}");
-        let directory = node_directory("demo", "main");
+        let directory = node_directory(if log { "demo-log" } else { "demo" }, "main");
         let node = Node::open(&place.memory().join(directory.file_name().unwrap())).unwrap();
         wait_heard(&node, 0, list["modules"].as_array().unwrap().len());
         let said = demo.stop();

@@ -53,6 +53,15 @@ pub(crate) fn skipped(why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: {why}");
 }
 
+/// Whether this was said for want of network namespaces; then what needs them was not tested.
+pub(crate) fn lacks_namespaces(said: &str) -> bool {
+    let lacks = said.contains("network namespaces cannot be made here");
+    if lacks {
+        skipped(said);
+    }
+    lacks
+}
+
 /// A table's line in a configuration: a probe with these settings and other keys.
 pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
     let program = super::probe::program();
@@ -159,6 +168,12 @@ impl Place {
         Running::start(self.command(arguments)).said()
     }
 
+    /// The same, from a node of this configuration.
+    pub(crate) fn say_at(&self, config: &Path, node: &str, arguments: &[&str]) -> Said {
+        let (command, rest) = arguments.split_first().unwrap();
+        self.say(&[&[*command, "--config", config.to_str().unwrap(), "--node", node], rest].concat())
+    }
+
     /// Starts `rohrpost launch`.
     pub(crate) fn launch(&self, config: &Path) -> Running {
         Running::start(self.command(&["launch", config.to_str().unwrap()]))
@@ -213,7 +228,6 @@ impl Drop for Place {
     }
 }
 
-/// A node that runs, seen by a test that takes part as a tool.
 /// Waits until launch, which has this place of a tool, has heard from so many modules: until then a stop is a start that failed.
 pub(crate) fn wait_heard(node: &Node, launch: u8, modules: usize) {
     let replies = Name::new(1, 16, launch, local::REPLIES);
@@ -223,6 +237,7 @@ pub(crate) fn wait_heard(node: &Node, launch: u8, modules: usize) {
     });
 }
 
+/// A node that runs, seen by a test that takes part as a tool.
 pub(crate) struct Robot {
     pub(crate) installation: Installation,
     pub(crate) node: Arc<Node>,

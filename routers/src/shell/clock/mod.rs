@@ -67,6 +67,8 @@ pub struct ClockParts {
     pub node: Option<Arc<Node>>,
     /// A bad network before its socket.
     pub impair: Option<impair::Settings>,
+    /// Whether the kernel stamps datagrams, if it can; else the clock does, as where it cannot.
+    pub kernel_stamps: bool,
     /// For tests: see [`Skew`].
     pub skew: Option<Skew>,
     /// For measurements: each exchange, as long as there is room.
@@ -88,7 +90,8 @@ impl ClockParts {
             incarnation: router.incarnation,
         };
         let nodes = router.nodes.iter().map(|node| SocketAddr::new(node.address, port)).collect();
-        Some(Self { settings, nodes, node: Some(node.clone()), impair: None, skew: None, observer: None })
+        let node = Some(node.clone());
+        Some(Self { settings, nodes, node, impair: None, kernel_stamps: true, skew: None, observer: None })
     }
 }
 
@@ -106,10 +109,10 @@ impl ClockService {
     /// # Errors
     /// [`ClockError`]
     pub fn start(parts: ClockParts) -> Result<Self, ClockError> {
-        let ClockParts { settings, nodes, node, impair, skew, observer } = parts;
+        let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
         let own = settings.own;
         let at = nodes.get(usize::from(own)).copied().unwrap_or(SocketAddr::new(IpAddr::from([0; 16]), 0));
-        let socket = TimeSocket::open(at, &nodes).map_err(|error| ClockError::Socket(at, error))?;
+        let socket = TimeSocket::open(at, &nodes, kernel_stamps).map_err(|error| ClockError::Socket(at, error))?;
         let keeper = node.as_ref().map(TimeKeeper::resume).transpose()?;
         let page = keeper.as_ref().and_then(TimeKeeper::record);
         let local = LocalClock::new(skew);
