@@ -1,9 +1,10 @@
 //! The demo, as its user sees it.
 
-use crate::harness::{Place, lacks_namespaces, probe, runs, wait, wait_heard};
+use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, runs, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost::mailbox::{Node, node_directory};
+use rohrpost::launch::{Phase, launcher_of};
+use std::path::Path;
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
 
@@ -110,9 +111,13 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let list = place.say(&["list", "--json"]).json();
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
         assert!(pids.len() >= 3, "{list}");
-        let directory = node_directory(if log { "demo-log" } else { "demo" }, "main");
-        let node = Node::open(&place.memory().join(directory.file_name().unwrap())).unwrap();
-        wait_heard(&node, 0, list["modules"].as_array().unwrap().len());
+        // Told to end before launch knows that all are, it would be a start that failed.
+        let robot = place.robot_at(Path::new(if log { "config/demo-log.toml" } else { "config/demo.toml" }), "main");
+        let launcher = launcher_of(&robot.installation, "main").unwrap();
+        wait("launch has switched all on", || {
+            let children = robot.tool(PATIENCE).children(launcher).ok()?;
+            children.iter().all(|child| child.phase == Phase::Running).then_some(())
+        });
         let said = demo.stop();
         assert!(said.contains(" packages received, ") && said.contains("map: "), "{said}");
         assert_eq!(said.contains("log: "), log, "{said}");

@@ -228,15 +228,6 @@ impl Drop for Place {
     }
 }
 
-/// Waits until launch, which has this place of a tool, has heard from so many modules: until then a stop is a start that failed.
-pub(crate) fn wait_heard(node: &Node, launch: u8, modules: usize) {
-    let replies = Name::new(1, 16, launch, local::REPLIES);
-    wait("launch has heard from all", || {
-        let heard = node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
-        (heard >= modules as u64).then_some(())
-    });
-}
-
 /// A node that runs, seen by a test that takes part as a tool.
 pub(crate) struct Robot {
     pub(crate) installation: Installation,
@@ -292,8 +283,13 @@ impl Robot {
                 (self.state(name) == "on").then_some(())
             });
         }
+        // Launch takes the first place of a tool. Until it has heard from each module, a stop is a start that failed.
         let tools = self.installation.node(&self.node_name).unwrap().tools.clone();
-        wait_heard(&self.node, *tools.start(), names.len());
+        let replies = Name::new(1, 16, *tools.start(), local::REPLIES);
+        wait("launch has heard from all", || {
+            let heard = self.node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
+            (heard >= names.len() as u64).then_some(())
+        });
     }
 
     /// Packages that wait in a module's command mailbox.
