@@ -13,6 +13,7 @@ use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
+use crate::tdma::Tdma;
 use crate::time::TimeSource;
 use rohrpost_mailbox::{Class, Name};
 use std::path::{Path, PathBuf};
@@ -41,6 +42,8 @@ pub struct Installation {
     pub modules: Vec<Module>,
     /// How nodes reach each other; none if there is one only.
     pub network: Option<Network>,
+    /// When each node sends; none if each sends as packages come.
+    pub tdma: Option<Tdma>,
     /// Where system time comes from.
     pub time: TimeSource,
     /// What the output service keeps.
@@ -176,6 +179,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         nodes,
         modules,
         network,
+        tdma: None,
         time,
         output,
         gui,

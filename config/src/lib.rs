@@ -51,6 +51,7 @@ mod reader;
 mod saved;
 mod scheduling;
 mod settings;
+mod tdma;
 mod time;
 mod units;
 
@@ -72,6 +73,7 @@ pub use rohrpost_mailbox::Full;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
+pub use tdma::{Tdma, TimeSlot};
 pub use time::TimeSource;
 pub use units::{UnitError, duration_text, parse_duration, parse_size, size_text};
 
