@@ -73,9 +73,9 @@ pub use rohrpost_mailbox::Full;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
-pub use tdma::{Tdma, TimeSlot};
+pub use tdma::{Tdma, TimeSlot, Tunnel};
 pub use time::TimeSource;
-pub use units::{UnitError, duration_text, parse_duration, parse_size, size_text};
+pub use units::{UnitError, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text};
 
 #[doc = include_str!("../../docs/src/configuration.md")]
 pub mod manual {}

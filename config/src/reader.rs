@@ -246,6 +246,25 @@ impl<'d> Item<'d> {
         }
     }
 
+    /// The rate of a link, in bits a second.
+    pub(crate) fn rate(&self, range: RangeInclusive<u64>, example: &str) -> Option<u64> {
+        let Some(text) = self.value.get_ref().as_str() else {
+            return self.wrong(&format!("a rate with its unit, such as `{} = \"{example}\"`", self.key));
+        };
+        match units::parse_rate(text) {
+            Ok(rate) if range.contains(&rate) => Some(rate),
+            Ok(_) => self.wrong(&format!(
+                "{} to {}, such as \"{example}\"",
+                units::rate_text(*range.start()),
+                units::rate_text(*range.end())
+            )),
+            Err(error) => {
+                self.report(format!("`{}`: {error}", self.key));
+                None
+            }
+        }
+    }
+
     /// The elements of a list.
     pub(crate) fn list(&self, example: &str) -> Option<Vec<Self>> {
         let Some(array) = self.value.get_ref().as_array() else {
