@@ -78,7 +78,9 @@ pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
 pub use tdma::{LATE, Tdma, TimeSlot, Tunnel};
 pub use time::TimeSource;
-pub use units::{UnitError, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text};
+pub use units::{
+    UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,
+};
 
 #[doc = include_str!("../../docs/src/configuration.md")]
 pub mod manual {}

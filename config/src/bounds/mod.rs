@@ -199,6 +199,7 @@ impl<'f> Sent<'f> {
         Stream {
             period_ns: ns(self.flow.period).max(1),
             takes_ns: parcel.takes_ns,
+            datagrams: parcel.datagrams,
             largest_ns: parcel.largest_ns,
             end_ns: parcel.end_ns,
             last_ns: parcel.last_ns,

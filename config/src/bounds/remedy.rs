@@ -3,7 +3,7 @@
 use super::bound;
 use crate::installation::Installation;
 use crate::tdma::{Tdma, TimeSlot};
-use crate::units::duration_text;
+use crate::units::duration_decimal;
 use std::time::Duration;
 
 /// Slots are changed in such steps.
@@ -13,8 +13,8 @@ const STEP: Duration = Duration::from_micros(10);
 pub(crate) fn remedy(installation: &Installation, tdma: &Tdma, flow: usize) -> String {
     let search = Search { installation, tdma, flow };
     let longer = search.longer().map(|(slot, length)| {
-        let by = duration_text(length - slot.length);
-        let (whose, length) = (search.whose(slot), duration_text(length));
+        let by = duration_decimal(length - slot.length);
+        let (whose, length) = (search.whose(slot), duration_decimal(length));
         format!("lengthen {whose} by {by}: `length = \"{length}\"`")
     });
     let oftener = || {
@@ -24,15 +24,20 @@ pub(crate) fn remedy(installation: &Installation, tdma: &Tdma, flow: usize) -> S
     };
     let another = || {
         let slot = search.another()?;
-        let (offset, length) = (duration_text(slot.offset), duration_text(slot.length));
+        let (offset, length) = (duration_decimal(slot.offset), duration_decimal(slot.length));
         let node = &installation.nodes[usize::from(slot.node)].name;
         Some(format!("add a [[slot]]: `node = \"{node}\"`, `offset = \"{offset}\"`, `length = \"{length}\"`"))
     };
     longer.or_else(oftener).or_else(another).unwrap_or_else(|| {
         let later = search.latency(tdma).map(round_up).filter(|bound| *bound <= installation.flows[flow].period);
         match later {
-            Some(bound) => format!("no slot of its node can be made so long; allow `deadline = \"{}\"`", duration_text(bound)),
-            None => "no slot of its node can be made so long; write a smaller `size`, a longer `period`, or let others send less".into(),
+            Some(bound) => {
+                format!("no change of one slot suffices; allow `deadline = \"{}\"`", duration_decimal(bound))
+            }
+            None => {
+                "no change of one slot suffices; write a smaller `size`, a longer `period`, or let others send less"
+                    .into()
+            }
         }
     })
 }

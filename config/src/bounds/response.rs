@@ -12,8 +12,9 @@
 //!
 //! A *chain* is a series of slots each of which leaves something of what it found. Before it comes slot v, which left nothing; so whatever
 //! is ahead of our package was published after slot v took what it sends. A slot of a chain carries at least its room less the largest
-//! datagram (and one ns): had it carried less, the head that ended it would have fitted. The chain ends with the slot that has room for all that
-//! is left and our package. Which slot was v, and how long after it our package was published, are tried out.
+//! datagram (and one ns), and as many datagrams as would fit if all were largest ones: had it carried less, the head that ended it would have
+//! fitted. The chain ends with the slot that has room for all that is left and our package. Which slot was v, and how long after it our
+//! package was published, are tried out.
 
 use super::mistakes::mistake;
 
@@ -49,9 +50,33 @@ pub(crate) struct Stream {
     pub(crate) period_ns: u64,
     /// What one takes, see [`Parcel`](crate::wire::Parcel).
     pub(crate) takes_ns: u64,
+    pub(crate) datagrams: u64,
     pub(crate) largest_ns: u64,
     pub(crate) end_ns: u64,
     pub(crate) last_ns: u64,
+}
+
+/// What there is to carry, or what a slot carries at least.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+struct Work {
+    ns: u64,
+    datagrams: u64,
+}
+
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, more: Self) {
+        self.ns += more.ns;
+        self.datagrams += more.datagrams;
+    }
+}
+
+impl std::iter::Sum for Work {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |mut sum, work| {
+            sum += work;
+            sum
+        })
+    }
 }
 
 /// How other packages stand to ours.
@@ -119,6 +144,12 @@ impl Supply {
     }
 }
 
+impl Stream {
+    fn work(&self, packages: u64) -> Work {
+        Work { ns: packages * self.takes_ns, datagrams: packages * self.datagrams }
+    }
+}
+
 /// The worst for a package of a stream beside others of the same node; none waits longer than `longest_ns`.
 pub(crate) fn worst(
     supply: &Supply,
@@ -126,22 +157,39 @@ pub(crate) fn worst(
     others: &[(Stream, Ahead)],
     longest_ns: u64,
 ) -> Result<Worst, Never> {
-    let analysis = Analysis { supply, own, others, longest_ns };
+    let largest_ns = others.iter().map(|(stream, _)| stream).chain([own]).map(|stream| stream.largest_ns).max();
+    let analysis = Analysis { supply, own, others, largest_ns: largest_ns.unwrap_or(1).max(1), longest_ns };
     analysis.judge()?;
     let mut worst: Option<Worst> = None;
     let firsts = if mistake!(OneSlotFirst) { 1 } else { supply.windows.len() };
     for first in 0..firsts {
-        let found = analysis.after(first)?;
-        worst = Some(worst.filter(|worst| worst.latency_ns >= found.latency_ns).unwrap_or(found));
+        worst = worse(worst, analysis.after(first)?);
     }
     worst.ok_or(Never::TooShort)
+}
+
+fn worse(one: Option<Worst>, other: Worst) -> Option<Worst> {
+    Some(one.filter(|one| one.latency_ns >= other.latency_ns).unwrap_or(other))
 }
 
 struct Analysis<'a> {
     supply: &'a Supply,
     own: &'a Stream,
     others: &'a [(Stream, Ahead)],
+    /// Of all datagrams.
+    largest_ns: u64,
     longest_ns: u64,
+}
+
+/// Where a chain has come to.
+#[derive(Clone, Copy)]
+struct Chain {
+    /// Until when slot v took what it sent, ns.
+    from_ns: u64,
+    /// The next slot.
+    index: usize,
+    /// What those before it carried.
+    carried: Work,
 }
 
 impl Analysis<'_> {
@@ -150,49 +198,60 @@ impl Analysis<'_> {
     }
 
     /// What a slot of a chain carries at least.
-    fn carries_ns(&self, index: usize) -> u64 {
-        if mistake!(WastesNothing) {
-            return self.supply.room_ns(index);
-        }
-        let largest_ns = self.streams().map(|stream| stream.largest_ns).max().unwrap_or(0);
-        self.supply.room_ns(index).saturating_sub(largest_ns - 1)
+    fn carries(&self, index: usize) -> Work {
+        let room_ns = self.supply.room_ns(index);
+        let wasted_ns = if mistake!(WastesNothing) { 0 } else { self.largest_ns - 1 };
+        Work { ns: room_ns.saturating_sub(wasted_ns), datagrams: room_ns / self.largest_ns }
+    }
+
+    /// What may be left of work after some was carried, ns.
+    fn left_ns(&self, all: Work, carried: Work) -> u64 {
+        let datagrams = all.datagrams.saturating_sub(carried.datagrams);
+        all.ns.saturating_sub(carried.ns).min(datagrams.saturating_mul(self.largest_ns))
     }
 
     /// Whether all that comes can leave in the long run.
     fn judge(&self) -> Result<(), Never> {
         let count = self.supply.windows.len();
-        let carried_ns: u64 = (0..count).map(|index| self.carries_ns(index)).sum();
-        if carried_ns == 0 {
+        let carried: Work = (0..count).map(|index| self.carries(index)).sum();
+        if carried.datagrams == 0 {
             return Err(Never::TooShort);
         }
-        let a_second = |ns: u64, period_ns: u64| (u128::from(ns) * 1_000_000_000 / u128::from(period_ns)) as u64;
-        let asked_ns_s = self.streams().map(|stream| a_second(stream.takes_ns, stream.period_ns)).sum();
-        let carried_ns_s = a_second(carried_ns, self.supply.repeats_ns);
-        if asked_ns_s >= carried_ns_s { Err(Never::TooMuch { asked_ns_s, carried_ns_s }) } else { Ok(()) }
+        let a_second = |all: u64, period_ns: u64| (u128::from(all) * 1_000_000_000_000 / u128::from(period_ns)) as u64;
+        let asked = self.streams().map(|stream| {
+            let Work { ns, datagrams } = stream.work(1);
+            // Thousandths, since there may be less than one datagram a second.
+            Work { ns: a_second(ns, stream.period_ns), datagrams: a_second(datagrams, stream.period_ns) }
+        });
+        let asked: Work = asked.sum();
+        let repeats_ns = self.supply.repeats_ns;
+        let (ns, datagrams) = (a_second(carried.ns, repeats_ns), a_second(carried.datagrams, repeats_ns));
+        if asked.ns >= ns && asked.datagrams >= datagrams {
+            return Err(Never::TooMuch { asked_ns_s: asked.ns / 1000, carried_ns_s: ns / 1000 });
+        }
+        Ok(())
     }
 
     /// The worst if the slot before the chain is this one.
     fn after(&self, first: usize) -> Result<Worst, Never> {
-        let from_ns = self.supply.takes_until_ns(first);
         let misses = usize::from(!mistake!(CatchesTheSlot));
-        let (mut carried_ns, mut index) = (0, first + misses);
-        let mut worst: Option<Worst> = None;
-        let mut later_ns = 0;
+        let from_ns = self.supply.takes_until_ns(first);
+        let mut chain = Chain { from_ns, index: first + misses, carried: Work::default() };
+        let (mut worst, mut later_ns) = (None, 0);
         loop {
             // What slots found and left before ours was published.
-            while self.supply.takes_until_ns(index) < from_ns + later_ns + misses as u64 {
-                let found_ns = self.published_ns(self.supply.takes_until_ns(index) - from_ns);
-                if found_ns.saturating_sub(carried_ns) <= self.supply.room_ns(index) {
+            while self.supply.takes_until_ns(chain.index) < from_ns + later_ns + misses as u64 {
+                let found = self.published(self.supply.takes_until_ns(chain.index) - from_ns);
+                if self.left_ns(found, chain.carried) <= self.supply.room_ns(chain.index) {
                     return worst.ok_or(Never::TooShort);
                 }
-                carried_ns += self.carries_ns(index);
-                index += 1;
+                chain.carried += self.carries(chain.index);
+                chain.index += 1;
             }
             if later_ns > self.longest_ns {
                 return Err(Never::TooLong);
             }
-            let found = self.ends(first, index, carried_ns, from_ns, later_ns)?;
-            worst = Some(worst.filter(|worst| worst.latency_ns >= found.latency_ns).unwrap_or(found));
+            worst = worse(worst, self.ends(chain, later_ns)?);
             later_ns = self.next_ns(later_ns);
             if mistake!(FirstOnly) {
                 return worst.ok_or(Never::TooShort);
@@ -208,64 +267,69 @@ impl Analysis<'_> {
     }
 
     /// All that could be published within a time after slot v.
-    fn published_ns(&self, within_ns: u64) -> u64 {
-        self.streams().map(|stream| within_ns.div_ceil(stream.period_ns) * stream.takes_ns).sum()
+    fn published(&self, within_ns: u64) -> Work {
+        self.streams().map(|stream| stream.work(within_ns.div_ceil(stream.period_ns))).sum()
     }
 
-    /// The end of the package that is published `later_ns` after slot v took what it sends, if the first slot that finds it is `index`.
-    fn ends(&self, first: usize, index: usize, carried_ns: u64, from_ns: u64, later_ns: u64) -> Result<Worst, Never> {
-        let published_ns = from_ns + later_ns;
+    /// The end of the package that is published `later_ns` after slot v took what it sends, if the chain's next slot is the first to find it.
+    fn ends(&self, chain: Chain, later_ns: u64) -> Result<Worst, Never> {
+        let published_ns = chain.from_ns + later_ns;
         let own_earlier = if mistake!(ForgetsOwn) { 0 } else { later_ns / self.own.period_ns };
-        let (mut carried_ns, mut last) = (carried_ns, index);
+        let mut at = chain;
         loop {
-            let begin_ns = self.supply.begin_ns(last);
+            let begin_ns = self.supply.begin_ns(at.index);
             if begin_ns > published_ns + self.longest_ns {
                 return Err(Never::TooLong);
             }
-            if let Some((others_ns, starts_ns)) = self.fits(last, carried_ns, from_ns, later_ns, own_earlier) {
-                let end_ns = (starts_ns + self.own.last_ns).min(self.supply.sends_ns(last));
+            if let Some((others_ns, starts_ns)) = self.fits(at, later_ns, own_earlier) {
+                let end_ns = (starts_ns + self.own.last_ns).min(self.supply.sends_ns(at.index));
                 return Ok(Worst {
                     latency_ns: begin_ns + end_ns - published_ns,
                     waits_ns: begin_ns.saturating_sub(published_ns),
-                    window: last % self.supply.windows.len(),
-                    slots: (last - first).max(1) as u64,
+                    window: at.index % self.supply.windows.len(),
+                    slots: (at.index + 1 - chain.index) as u64,
                     others_ns,
                     own_earlier,
                 });
             }
-            carried_ns += self.carries_ns(last);
-            last += 1;
+            at.carried += self.carries(at.index);
+            at.index += 1;
         }
     }
 
-    /// Whether all that is left, and our package, have room in a slot; what of others was ahead, and when its last datagram starts at the
-    /// latest, counted from the slot's beginning.
-    fn fits(&self, index: usize, carried_ns: u64, from_ns: u64, later_ns: u64, own_earlier: u64) -> Option<(u64, u64)> {
-        let (begin_ns, room_ns) = (self.supply.begin_ns(index), self.supply.room_ns(index));
+    /// Whether all that is left, and our package, have room in the next slot; what of others was ahead, and when its last datagram starts at
+    /// the latest, counted from the slot's beginning.
+    fn fits(&self, chain: Chain, later_ns: u64, own_earlier: u64) -> Option<(u64, u64)> {
+        let (begin_ns, room_ns) = (self.supply.begin_ns(chain.index), self.supply.room_ns(chain.index));
         let said_ns = if mistake!(SaysNothing) { 0 } else { self.supply.said_ns + self.supply.late_ns };
         let mut starts_ns = said_ns;
         loop {
-            let until_ns = begin_ns + starts_ns - from_ns;
-            let others_ns = self.others.iter().map(|(stream, ahead)| {
-                let count = match ahead {
-                    _ if mistake!(ComesOnce) => 1,
-                    Ahead::Always => until_ns.div_ceil(stream.period_ns),
-                    Ahead::Earlier if mistake!(ForgetsEqual) => 0,
-                    Ahead::Earlier => later_ns / stream.period_ns + 1,
-                };
-                count * stream.takes_ns
-            });
-            let others_ns: u64 = others_ns.sum();
-            let left_ns = (others_ns + (own_earlier + 1) * self.own.takes_ns).saturating_sub(carried_ns);
-            let left_ns = left_ns.max(self.own.end_ns);
-            if left_ns > room_ns {
+            let others = self.others_ahead(begin_ns + starts_ns - chain.from_ns, later_ns);
+            // All but the last datagram of ours.
+            let mut ahead = self.own.work(own_earlier);
+            ahead += others;
+            ahead += Work { ns: self.own.takes_ns - self.own.end_ns, datagrams: self.own.datagrams - 1 };
+            let left_ns = self.left_ns(ahead, chain.carried);
+            if left_ns + self.own.end_ns > room_ns {
                 return None;
             }
-            let starts = said_ns + left_ns - self.own.end_ns;
-            if starts <= starts_ns {
-                return Some((others_ns, starts_ns));
+            if said_ns + left_ns <= starts_ns {
+                return Some((others.ns, starts_ns));
             }
-            starts_ns = starts;
+            starts_ns = said_ns + left_ns;
         }
+    }
+
+    /// What others published that goes before our package, if its last datagram starts `within_ns` after slot v.
+    fn others_ahead(&self, within_ns: u64, later_ns: u64) -> Work {
+        let ahead = |(stream, ahead): &(Stream, Ahead)| {
+            stream.work(match ahead {
+                _ if mistake!(ComesOnce) => 1,
+                Ahead::Always => within_ns.div_ceil(stream.period_ns),
+                Ahead::Earlier if mistake!(ForgetsEqual) => 0,
+                Ahead::Earlier => later_ns / stream.period_ns + 1,
+            })
+        };
+        self.others.iter().map(ahead).sum()
     }
 }

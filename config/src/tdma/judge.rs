@@ -5,7 +5,7 @@ use crate::bounds::{self, Unbounded};
 use crate::installation::Installation;
 use crate::node::Node;
 use crate::reader::Reader;
-use crate::units::duration_text;
+use crate::units::duration_decimal;
 use crate::wire::Link;
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ struct Judge<'a> {
 
 impl Judge<'_> {
     fn report(&self, slot: &TimeSlot, message: impl std::fmt::Display) {
-        let at = duration_text(slot.offset);
+        let at = duration_decimal(slot.offset);
         let node = &self.installation.nodes[usize::from(slot.node)].name;
         self.reader.report(slot.line, format!("[[slot]] of `{node}` at {at} {message}"));
     }
@@ -53,8 +53,8 @@ impl Judge<'_> {
             report(format!(
                 "`guard` {} is less than clocks of Linux computers are known to be off each other; write `guard = \"{}\"` or more, \
                  better \"150 us\"",
-                duration_text(*guard),
-                duration_text(GUARD_MIN)
+                duration_decimal(*guard),
+                duration_decimal(GUARD_MIN)
             ));
         }
         let others = self.installation.nodes.len() - 1;
@@ -64,8 +64,8 @@ impl Judge<'_> {
             report(format!(
                 "`synchronisation` {} has no room for a warm-up and a Sync to each of {others} other nodes before its guard; write \
                  `synchronisation = \"{}\"` or more",
-                duration_text(*synchronisation),
-                duration_text(needed)
+                duration_decimal(*synchronisation),
+                duration_decimal(needed)
             ));
         }
         let masters = self.masters().len() as u32;
@@ -74,8 +74,8 @@ impl Judge<'_> {
             report(format!(
                 "the synchronisation windows of {masters} masters, {} each, leave nothing of the cycle of {}; write a longer `cycle`, or \
                  fewer `masters` in [time]",
-                duration_text(*synchronisation),
-                duration_text(*cycle)
+                duration_decimal(*synchronisation),
+                duration_decimal(*cycle)
             ));
         }
         let cycles = self.tdma.cycles();
@@ -102,18 +102,18 @@ impl Judge<'_> {
                 } else {
                     format!("the synchronisation windows of {masters} masters, which end")
                 };
-                let begin = duration_text(begin);
+                let begin = duration_decimal(begin);
                 self.report(slot, format!("lies in {windows} at {begin}; write `offset = \"{begin}\"` or later"));
             }
             if slot.offset >= *cycle {
-                let right = duration_text(cycle.saturating_sub(slot.length));
-                let cycle = duration_text(*cycle);
+                let right = duration_decimal(cycle.saturating_sub(slot.length));
+                let cycle = duration_decimal(*cycle);
                 self.report(
                     slot,
                     format!("begins when the cycle of {cycle} is over; write `offset = \"{right}\"` or earlier"),
                 );
             } else if end > *cycle {
-                let (over, right) = (duration_text(end - *cycle), duration_text(*cycle - slot.offset));
+                let (over, right) = (duration_decimal(end - *cycle), duration_decimal(*cycle - slot.offset));
                 self.report(
                     slot,
                     format!(
@@ -127,21 +127,21 @@ impl Judge<'_> {
             let end = first.offset + first.length;
             let cycles = self.tdma.cycles();
             let both = (0..cycles).find(|cycle| first.is_in(*cycle) && second.is_in(*cycle));
-            let when = both.filter(|_| cycles > 1).map(|cycle| format!(" in cycle {cycle} of {cycles}"));
+            let when = both.filter(|_| cycles > 1).map(|cycle| format!(", in cycle {cycle} of {cycles}"));
             let shorter = second.offset - first.offset;
-            let or_shorter = if shorter.is_zero() {
+            let or_shorter = if shorter < self.length_min() {
                 String::new()
             } else {
-                format!(", or `length = \"{}\"` there", duration_text(shorter))
+                format!(", or `length = \"{}\"` there", duration_decimal(shorter))
             };
             self.report(
                 second,
                 format!(
-                    "begins{} {} before {} ends; write `offset = \"{}\"`{or_shorter}",
-                    when.unwrap_or_default(),
-                    duration_text(end - second.offset),
+                    "begins {} before {} ends{}; write `offset = \"{}\"` or later{or_shorter}",
+                    duration_decimal(end - second.offset),
                     self.tdma.whose(first, &self.installation.nodes),
-                    duration_text(end)
+                    when.unwrap_or_default(),
+                    duration_decimal(end)
                 ),
             );
         }
@@ -156,8 +156,8 @@ impl Judge<'_> {
     fn lengths(&self) {
         let needed = self.length_min();
         for slot in self.tdma.slots.iter().filter(|slot| slot.length < needed) {
-            let (length, guard) = (duration_text(slot.length), duration_text(self.tdma.guard));
-            let lacking = duration_text(needed - slot.length);
+            let (length, guard) = (duration_decimal(slot.length), duration_decimal(self.tdma.guard));
+            let lacking = duration_decimal(needed - slot.length);
             let what = if slot.length <= self.tdma.guard {
                 format!("is {length} long, all of it guard: nobody ever sends in the last {guard} of a slot")
             } else {
@@ -165,7 +165,7 @@ impl Judge<'_> {
                     "is {length} long, {guard} of it guard, which leaves no room for what routers say to each other and one largest datagram"
                 )
             };
-            self.report(slot, format!("{what}; lengthen it by {lacking}: `length = \"{}\"`", duration_text(needed)));
+            self.report(slot, format!("{what}; lengthen it by {lacking}: `length = \"{}\"`", duration_decimal(needed)));
         }
     }
 
@@ -177,9 +177,9 @@ impl Judge<'_> {
             let needed = self.length_min();
             let gap = self.tdma.gaps(self.masters()).into_iter().find(|(_, free)| *free >= needed);
             let right = gap.map_or_else(
-                || format!("no {} of the cycle are free for one: shorten others", duration_text(needed)),
+                || format!("no {} of the cycle are free for one: shorten others", duration_decimal(needed)),
                 |(offset, _)| {
-                    let (offset, length) = (duration_text(offset), duration_text(needed));
+                    let (offset, length) = (duration_decimal(offset), duration_decimal(needed));
                     format!(
                         "add a [[slot]]: `node = \"{}\"`, `offset = \"{offset}\"`, `length = \"{length}\"`",
                         node.name
@@ -195,18 +195,18 @@ impl Judge<'_> {
     fn flows(&self) {
         for bound in bounds::bounds(self.installation) {
             let flow = &self.installation.flows[bound.flow];
-            let deadline = duration_text(flow.deadline);
+            let deadline = duration_decimal(flow.deadline);
             let why = match bound.latency {
                 Ok(bound) if bound.latency <= flow.deadline => continue,
                 Ok(bound) => format!(
                     "a package may take {}, and must be there within {deadline}",
-                    duration_text(round_up(bound.latency))
+                    duration_decimal(round_up(bound.latency))
                 ),
                 Err(why) => format!("nothing says that a package is there within {deadline}: {why}"),
             };
             let right = match bound.latency {
                 Err(Unbounded::NotRealTime) => {
-                    "give who sends or asks for it a class above `bulk-below` of [network]".into()
+                    "give the module that sends or subscribes a class from `bulk-below` of [network] up".into()
                 }
                 _ => bounds::remedy(self.installation, self.tdma, bound.flow),
             };
@@ -226,7 +226,7 @@ impl Tdma {
     /// A slot as messages name it.
     pub(crate) fn whose(&self, slot: &TimeSlot, nodes: &[Node]) -> String {
         let node = nodes.get(usize::from(slot.node)).map_or("?", |node| node.name.as_str());
-        format!("that of `{node}` at {} (line {})", duration_text(slot.offset), slot.line)
+        format!("that of `{node}` at {} (line {})", duration_decimal(slot.offset), slot.line)
     }
 
     /// Slots that are there at the same time, the one that begins first before the other.
