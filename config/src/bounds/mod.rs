@@ -127,12 +127,12 @@ fn worst(
     }
     let longest_ns = ns(LONGEST);
     let worst = response::worst(&supply, &own.stream(link), others, longest_ns).map_err(|never| match never {
-        Never::TooShort => Unbounded::TooShort,
-        Never::TooMuch { asked_ns_s, carried_ns_s } => Unbounded::TooMuch {
+        Never::NoRoom => Unbounded::TooShort,
+        Never::Overload { asked_ns_s, carried_ns_s } => Unbounded::TooMuch {
             asked_permille: asked_ns_s.div_ceil(1_000_000),
             carried_permille: carried_ns_s / 1_000_000,
         },
-        Never::TooLong => Unbounded::TooLong,
+        Never::Late => Unbounded::TooLong,
     })?;
     let parcel = link.package(own.flow.size as usize);
     Ok(Bound {

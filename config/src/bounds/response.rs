@@ -109,16 +109,16 @@ pub(crate) struct Worst {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Never {
     /// No slot has room for one of its datagrams, or of those before it.
-    TooShort,
+    NoRoom,
     /// More comes than leaves; both in ns a second.
-    TooMuch {
+    Overload {
         /// Comes.
         asked_ns_s: u64,
         /// Leaves.
         carried_ns_s: u64,
     },
     /// It takes longer than any package may wait.
-    TooLong,
+    Late,
 }
 
 impl Supply {
@@ -165,7 +165,7 @@ pub(crate) fn worst(
     for first in 0..firsts {
         worst = worse(worst, analysis.after(first)?);
     }
-    worst.ok_or(Never::TooShort)
+    worst.ok_or(Never::NoRoom)
 }
 
 fn worse(one: Option<Worst>, other: Worst) -> Option<Worst> {
@@ -215,7 +215,7 @@ impl Analysis<'_> {
         let count = self.supply.windows.len();
         let carried: Work = (0..count).map(|index| self.carries(index)).sum();
         if carried.datagrams == 0 {
-            return Err(Never::TooShort);
+            return Err(Never::NoRoom);
         }
         let a_second = |all: u64, period_ns: u64| (u128::from(all) * 1_000_000_000_000 / u128::from(period_ns)) as u64;
         let asked = self.streams().map(|stream| {
@@ -227,7 +227,7 @@ impl Analysis<'_> {
         let repeats_ns = self.supply.repeats_ns;
         let (ns, datagrams) = (a_second(carried.ns, repeats_ns), a_second(carried.datagrams, repeats_ns));
         if asked.ns >= ns && asked.datagrams >= datagrams {
-            return Err(Never::TooMuch { asked_ns_s: asked.ns / 1000, carried_ns_s: ns / 1000 });
+            return Err(Never::Overload { asked_ns_s: asked.ns / 1000, carried_ns_s: ns / 1000 });
         }
         Ok(())
     }
@@ -243,18 +243,18 @@ impl Analysis<'_> {
             while self.supply.takes_until_ns(chain.index) < from_ns + later_ns + misses as u64 {
                 let found = self.published(self.supply.takes_until_ns(chain.index) - from_ns);
                 if self.left_ns(found, chain.carried) <= self.supply.room_ns(chain.index) {
-                    return worst.ok_or(Never::TooShort);
+                    return worst.ok_or(Never::NoRoom);
                 }
                 chain.carried += self.carries(chain.index);
                 chain.index += 1;
             }
             if later_ns > self.longest_ns {
-                return Err(Never::TooLong);
+                return Err(Never::Late);
             }
             worst = worse(worst, self.ends(chain, later_ns)?);
             later_ns = self.next_ns(later_ns);
             if mistake!(FirstOnly) {
-                return worst.ok_or(Never::TooShort);
+                return worst.ok_or(Never::NoRoom);
             }
         }
     }
@@ -279,7 +279,7 @@ impl Analysis<'_> {
         loop {
             let begin_ns = self.supply.begin_ns(at.index);
             if begin_ns > published_ns + self.longest_ns {
-                return Err(Never::TooLong);
+                return Err(Never::Late);
             }
             if let Some((others_ns, starts_ns)) = self.fits(at, later_ns, own_earlier) {
                 let end_ns = (starts_ns + self.own.last_ns).min(self.supply.sends_ns(at.index));
