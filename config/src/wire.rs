@@ -16,6 +16,8 @@ pub const FRAGMENT_HEAD_BYTES: usize = 32;
 pub const TIME_BYTES: usize = 72;
 /// What a datagram says that only says "still there".
 pub const ALIVE_BYTES: usize = 24;
+/// What a datagram says that refuses others.
+pub const REFUSAL_BYTES: usize = 16;
 /// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
 pub const HAND_OVER: Duration = Duration::from_micros(20);
 
@@ -66,13 +68,14 @@ impl Link {
         (sends_ns / self.wire_ns(FRAME_HEAD_BYTES + TIME_BYTES)) as usize
     }
 
-    /// What routers say to each other in a slot at most, before any package, ns: frames of time, and one to each other node that says "still
-    /// there". A slave sends a warm-up and a request, or a request to each master; a master its replies, unless its synchronisation window has
-    /// room for them besides a warm-up and a Sync to each.
+    /// What routers say to each other in a slot at most, before any package, ns: frames of time, one to each other node that says "still
+    /// there", and a refusal. A slave sends a warm-up and a request, or a request to each master; a master its replies, unless its
+    /// synchronisation window has room for them besides a warm-up and a Sync to each.
     pub(crate) fn said_ns(&self, tdma: &Tdma, nodes: usize, masters: usize) -> u64 {
         let others = nodes.saturating_sub(1);
         let replies = if self.frames_in_synchronisation(tdma) >= 3 * others { 0 } else { others };
-        replies.max(2).max(masters) as u64 * self.time_ns() + others as u64 * self.alive_ns()
+        let refusal_ns = self.takes_ns(FRAME_HEAD_BYTES + REFUSAL_BYTES);
+        replies.max(2).max(masters) as u64 * self.time_ns() + others as u64 * self.alive_ns() + refusal_ns
     }
 
     /// What the datagrams of a package take, none of them shared with another package.

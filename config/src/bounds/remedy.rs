@@ -4,6 +4,7 @@ use super::bound;
 use crate::installation::Installation;
 use crate::tdma::{Tdma, TimeSlot};
 use crate::units::duration_decimal;
+use crate::wire::Link;
 use std::time::Duration;
 
 /// Slots are changed in such steps.
@@ -109,15 +110,20 @@ impl<'a> Search<'a> {
     /// A slot where there is none yet.
     fn another(&self) -> Option<TimeSlot> {
         let (_, model) = self.own().next()?;
+        let network = self.installation.network.as_ref()?;
+        let link = Link::new(self.tdma, network, &self.installation.nodes);
+        let length_min = self.tdma.length_min(self.installation, &link);
         let tries = self.tdma.gaps(self.installation.time.masters()).into_iter().filter_map(|(offset, free)| {
-            let slot = |steps: u32| TimeSlot { offset, length: STEP * steps, period: 1, phase: 0, ..*model };
+            let length = |steps: u32| length_min + STEP * (steps - 1);
+            let slot = |steps: u32| TimeSlot { offset, length: length(steps), period: 1, phase: 0, ..*model };
             let suffices = |steps| {
                 let mut tdma = self.tdma.clone();
                 tdma.slots.push(slot(steps));
                 tdma.slots.sort_by_key(|slot| (slot.offset, slot.phase));
                 self.keeps(&tdma)
             };
-            least((free.as_nanos() / STEP.as_nanos()) as u32, suffices).map(slot)
+            let longer = free.checked_sub(length_min)?;
+            least((longer.as_nanos() / STEP.as_nanos()) as u32 + 1, suffices).map(slot)
         });
         tries.min_by_key(|slot| slot.length)
     }

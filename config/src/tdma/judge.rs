@@ -129,7 +129,7 @@ impl Judge<'_> {
             let both = (0..cycles).find(|cycle| first.is_in(*cycle) && second.is_in(*cycle));
             let when = both.filter(|_| cycles > 1).map(|cycle| format!(", in cycle {cycle} of {cycles}"));
             let shorter = second.offset - first.offset;
-            let or_shorter = if shorter < self.length_min() {
+            let or_shorter = if shorter < self.tdma.length_min(self.installation, &self.link) {
                 String::new()
             } else {
                 format!(", or `length = \"{}\"` there", duration_decimal(shorter))
@@ -147,14 +147,8 @@ impl Judge<'_> {
         }
     }
 
-    /// What a slot needs at least: its guard, what routers say to each other, and a largest datagram.
-    fn length_min(&self) -> Duration {
-        let said_ns = self.link.said_ns(self.tdma, self.installation.nodes.len(), self.masters().len());
-        round_up(self.tdma.guard + LATE + Duration::from_nanos(said_ns + self.link.largest_ns()))
-    }
-
     fn lengths(&self) {
-        let needed = self.length_min();
+        let needed = self.tdma.length_min(self.installation, &self.link);
         for slot in self.tdma.slots.iter().filter(|slot| slot.length < needed) {
             let (length, guard) = (duration_decimal(slot.length), duration_decimal(self.tdma.guard));
             let lacking = duration_decimal(needed - slot.length);
@@ -174,7 +168,7 @@ impl Judge<'_> {
         let has_one = |index: u8| self.tdma.slots.iter().any(|slot| slot.node == index);
         for (node, index) in self.installation.nodes.iter().zip(0..).filter(|(_, index)| !has_one(*index)) {
             let master = if self.masters().contains(&index) { ", although it may be master of time" } else { "" };
-            let needed = self.length_min();
+            let needed = self.tdma.length_min(self.installation, &self.link);
             let gap = self.tdma.gaps(self.masters()).into_iter().find(|(_, free)| *free >= needed);
             let right = gap.map_or_else(
                 || format!("no {} of the cycle are free for one: shorten others", duration_decimal(needed)),
@@ -227,6 +221,12 @@ impl Tdma {
     pub(crate) fn whose(&self, slot: &TimeSlot, nodes: &[Node]) -> String {
         let node = nodes.get(usize::from(slot.node)).map_or("?", |node| node.name.as_str());
         format!("that of `{node}` at {} (line {})", duration_decimal(slot.offset), slot.line)
+    }
+
+    /// What a slot needs at least: its guard, what routers say to each other, and a largest datagram.
+    pub(crate) fn length_min(&self, installation: &Installation, link: &Link) -> Duration {
+        let said_ns = link.said_ns(self, installation.nodes.len(), installation.time.masters().len());
+        round_up(self.guard + LATE + Duration::from_nanos(said_ns + link.largest_ns()))
     }
 
     /// Slots that are there at the same time, the one that begins first before the other.
