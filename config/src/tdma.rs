@@ -196,7 +196,7 @@ impl Tdma {
 
 /// Cycles after which these slots repeat themselves.
 pub(crate) fn cycles<'s>(slots: impl Iterator<Item = &'s TimeSlot>) -> u64 {
-    slots.fold(1, |all, slot| all / common(all, slot.period.into()) * u64::from(slot.period))
+    slots.fold(1, |all: u64, slot| (all / common(all, slot.period.into())).saturating_mul(slot.period.into()))
 }
 
 /// Greatest common divisor.

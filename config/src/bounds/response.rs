@@ -18,6 +18,9 @@
 
 use super::mistakes::mistake;
 
+/// Moments at which a package may come that are tried for one slot v: whatever takes more has no bound worth knowing.
+const TRIES_MAX: usize = 5_000;
+
 /// What slots of a node have room for, over and over.
 #[derive(Clone, Debug)]
 pub(crate) struct Supply {
@@ -238,7 +241,7 @@ impl Analysis<'_> {
         let from_ns = self.supply.takes_until_ns(first);
         let mut chain = Chain { from_ns, index: first + misses, carried: Work::default() };
         let (mut worst, mut later_ns) = (None, 0);
-        loop {
+        for _ in 0..TRIES_MAX {
             // What slots found and left before ours was published.
             while self.supply.takes_until_ns(chain.index) < from_ns + later_ns + misses as u64 {
                 let found = self.published(self.supply.takes_until_ns(chain.index) - from_ns);
@@ -257,6 +260,7 @@ impl Analysis<'_> {
                 return worst.ok_or(Never::NoRoom);
             }
         }
+        Err(Never::Late)
     }
 
     /// When the next package could be published that goes before later ones of ours: nothing else makes it worse to be later.

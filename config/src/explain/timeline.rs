@@ -112,3 +112,62 @@ fn step(cycle: Duration) -> Duration {
         unit *= 10;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tdma::TimeSlot;
+
+    #[test]
+    fn whatever_the_cycle_is_each_window_is_seen_and_a_row_fits() {
+        for cycle_us in [1_000, 1_234, 5_000, 7_300, 16_000, 100_000, 999_999, 1_000_000] {
+            let cycle = Duration::from_micros(cycle_us);
+            let slot = |node: u8| {
+                let (offset, length) = (cycle * (2 + u32::from(node)) / 8, cycle / 100);
+                TimeSlot { node, offset, length, period: 1 + u32::from(node), phase: 0, line: 0 }
+            };
+            let (synchronisation, guard) = (cycle / 100, cycle / 200);
+            let slots: Vec<_> = (0..6).map(slot).collect();
+            let tdma = Tdma { cycle, synchronisation, guard, link_bytes_s: 12_500_000, slots, tunnel: None, line: 0 };
+            let node = |index: u8| Node {
+                name: format!("node-{index}"),
+                address: None,
+                mode: 0o700,
+                tools: index..=index,
+                line: 0,
+            };
+            let nodes: Vec<_> = (0..6).map(node).collect();
+            let rows = rows(&tdma, &nodes, &[0, 1]);
+            let wide: Vec<_> = rows.iter().take(9).filter(|row| row.chars().count() > 80).collect();
+            assert!(wide.is_empty(), "{cycle:?}: {wide:#?}");
+            for (row, sends) in rows[2..9].iter().zip([SENDS, SENDS].into_iter().chain([SENDS_SOMETIMES; 5])) {
+                assert!(row.contains(sends), "{cycle:?}: {row}");
+            }
+            let last = duration_decimal(cycle);
+            assert!(rows[0].contains('0') && (rows[0].contains("us") || rows[0].contains("ms")), "{last}: {}", rows[0]);
+        }
+    }
+
+    #[test]
+    fn ticks_stand_below_their_numbers_and_windows_below_the_ticks() {
+        let ms = Duration::from_millis;
+        let (numbers, ticks) = scale(ms(8));
+        assert_eq!(numbers, "0       1 ms    2 ms    3 ms    4 ms    5 ms    6 ms    7 ms 8 ms");
+        assert_eq!(ticks, format!("{}|", "|       ".repeat(8)));
+        let slots = vec![TimeSlot { node: 0, offset: ms(2), length: ms(2), period: 1, phase: 0, line: 0 }];
+        let tdma = Tdma {
+            cycle: ms(8),
+            synchronisation: ms(1),
+            guard: Duration::from_micros(500),
+            link_bytes_s: 12_500_000,
+            slots,
+            tunnel: None,
+            line: 0,
+        };
+        let mut row = Row::new(&tdma);
+        row.window(ms(2), ms(2), SENDS);
+        let expected = [(FREE, 16), (SENDS, 12), (GUARD, 4), (FREE, 32)];
+        let expected: String = expected.map(|(cell, count)| cell.to_string().repeat(count)).concat();
+        assert_eq!(row.text(), expected);
+    }
+}
