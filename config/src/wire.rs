@@ -57,7 +57,12 @@ impl Link {
         self.takes_ns(FRAME_HEAD_BYTES + TIME_BYTES)
     }
 
-    /// The same of one that says "still there".
+    /// How long the wire carries one, ns.
+    pub(crate) fn time_wire_ns(&self) -> u64 {
+        self.wire_ns(FRAME_HEAD_BYTES + TIME_BYTES)
+    }
+
+    /// How long one that says "still there" keeps a slot busy, ns.
     pub(crate) fn alive_ns(&self) -> u64 {
         self.takes_ns(FRAME_HEAD_BYTES + ALIVE_BYTES)
     }
@@ -65,7 +70,7 @@ impl Link {
     /// Frames of time that a synchronisation window has room for.
     pub(crate) fn frames_in_synchronisation(&self, tdma: &Tdma) -> usize {
         let sends_ns = tdma.synchronisation.saturating_sub(tdma.guard).as_nanos() as u64;
-        (sends_ns / self.wire_ns(FRAME_HEAD_BYTES + TIME_BYTES)) as usize
+        (sends_ns / self.time_wire_ns()) as usize
     }
 
     /// What routers say to each other in a slot at most, before any package, ns: frames of time, one to each other node that says "still

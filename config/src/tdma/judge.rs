@@ -9,8 +9,10 @@ use crate::units::duration_decimal;
 use crate::wire::Link;
 use std::time::Duration;
 
-/// Clocks of two Linux computers that ask each other all the time are known to half of it, and frames of time arrive within a quarter.
+/// Clocks of two Linux computers that ask each other all the time are known to half of it.
 const GUARD_MIN: Duration = Duration::from_micros(40);
+/// The part of the guard within which a node that joins takes frames of time to arrive.
+const ARRIVES_WITHIN: u32 = 4;
 /// Who examines all cycles of a table must come to an end.
 const CYCLES_MAX: u64 = 64;
 
@@ -55,6 +57,17 @@ impl Judge<'_> {
                  better \"150 us\"",
                 duration_decimal(*guard),
                 duration_decimal(GUARD_MIN)
+            ));
+        }
+        // From a node to a switch and on.
+        let way = Duration::from_nanos(2 * self.link.time_wire_ns());
+        if *guard >= GUARD_MIN && *guard < way * ARRIVES_WITHIN {
+            report(format!(
+                "`guard` {} is too short for such a link: who joins takes it that a frame of time arrives within a quarter of it, and over two \
+                 links it takes {}; write `guard = \"{}\"` or more",
+                duration_decimal(*guard),
+                duration_decimal(round_up(way)),
+                duration_decimal(round_up(way * ARRIVES_WITHIN))
             ));
         }
         let others = self.installation.nodes.len() - 1;
