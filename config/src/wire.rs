@@ -18,6 +18,8 @@ pub const TIME_BYTES: usize = 72;
 pub const ALIVE_BYTES: usize = 24;
 /// What a datagram says that refuses others.
 pub const REFUSAL_BYTES: usize = 16;
+/// A router keeps the body of a package that waits in pieces of so many bytes.
+pub const KEPT_IN_BYTES: u64 = 256;
 /// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
 pub const HAND_OVER: Duration = Duration::from_micros(20);
 

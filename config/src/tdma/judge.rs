@@ -5,8 +5,8 @@ use crate::bounds::{self, Unbounded};
 use crate::installation::Installation;
 use crate::node::Node;
 use crate::reader::Reader;
-use crate::units::duration_decimal;
-use crate::wire::Link;
+use crate::units::{duration_decimal, size_text};
+use crate::wire::{KEPT_IN_BYTES, Link};
 use std::time::Duration;
 
 /// Clocks of two Linux computers that ask each other all the time are known to half of it.
@@ -27,6 +27,9 @@ pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
     judge.nodes();
     if reader.is_content() {
         judge.flows();
+    }
+    if reader.is_content() {
+        judge.quotas();
     }
 }
 
@@ -222,6 +225,33 @@ impl Judge<'_> {
             self.reader.report(flow.line, format!("{what}: {why}; {right}"));
         }
     }
+
+    /// Of each flow one package may wait: it is there before the next. All those of a module have room, since what gives way has no bound.
+    fn quotas(&self) {
+        let quota = self.installation.network.map_or(usize::MAX, |network| network.quota_bytes) as u64;
+        let flows = bounds::bounds(self.installation).into_iter().map(|bound| &self.installation.flows[bound.flow]);
+        let flows: Vec<_> = flows.collect();
+        for module in &self.installation.modules {
+            let own = || flows.iter().filter(|flow| module.names().any(|name| name == flow.from));
+            let bytes: u64 = own().map(|flow| kept_bytes(flow.size)).sum();
+            if let Some(flow) = own().next().filter(|_| bytes > quota) {
+                let message = format!(
+                    "[[flow]]s of `{}`: {} of them may wait at once, and its router keeps {} of a sender; write `quota = \"{}\"` in \
+                     [network]",
+                    self.installation.classes.format(module.name),
+                    size_text(bytes.next_multiple_of(1 << 10)),
+                    size_text(quota),
+                    size_text(bytes.next_power_of_two())
+                );
+                self.reader.report(flow.line, message);
+            }
+        }
+    }
+}
+
+/// What a router takes of a quota for a body.
+fn kept_bytes(body_bytes: u32) -> u64 {
+    u64::from(body_bytes).next_multiple_of(KEPT_IN_BYTES).max(KEPT_IN_BYTES)
 }
 
 /// Up to ten microseconds, as people write.
