@@ -21,7 +21,9 @@ pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
     let (Some(tdma), Some(network)) = (&installation.tdma, &installation.network) else { return };
     let link = Link::new(tdma, network, &installation.nodes);
     let judge = Judge { installation, tdma, link, reader };
+    judge.guard();
     judge.synchronisation();
+    judge.periods();
     judge.places();
     judge.lengths();
     judge.nodes();
@@ -51,33 +53,38 @@ impl Judge<'_> {
         self.installation.time.masters()
     }
 
-    fn synchronisation(&self) {
-        let Tdma { cycle, synchronisation, guard, line, .. } = self.tdma;
-        let report = |message: String| self.reader.report(*line, format!("[tdma]: {message}"));
-        if *guard < GUARD_MIN {
-            report(format!(
-                "`guard` {} is less than clocks of Linux computers are known to be off each other; write `guard = \"{}\"` or more, \
-                 better \"150 us\"",
-                duration_decimal(*guard),
-                duration_decimal(GUARD_MIN)
-            ));
-        }
+    fn report_table(&self, message: impl std::fmt::Display) {
+        self.reader.report(self.tdma.line, format!("[tdma]: {message}"));
+    }
+
+    fn guard(&self) {
+        let guard = self.tdma.guard;
         // From a node to a switch and on.
         let way = Duration::from_nanos(2 * self.link.time_wire_ns());
-        if *guard >= GUARD_MIN && *guard < way * ARRIVES_WITHIN {
-            report(format!(
-                "`guard` {} is too short for such a link: who joins takes it that a frame of time arrives within a quarter of it, and over two \
-                 links it takes {}; write `guard = \"{}\"` or more",
-                duration_decimal(*guard),
-                duration_decimal(round_up(way)),
-                duration_decimal(round_up(way * ARRIVES_WITHIN))
-            ));
+        let least = round_up(GUARD_MIN.max(way * ARRIVES_WITHIN));
+        if guard >= least {
+            return;
         }
+        let why = if guard < GUARD_MIN {
+            "is less than clocks of Linux computers are known to be off each other".into()
+        } else {
+            let way = duration_decimal(round_up(way));
+            format!(
+                "is too short for such a link: who joins takes it that a frame of time arrives within a quarter of it, and over two links it \
+                 takes {way}"
+            )
+        };
+        let (guard, least) = (duration_decimal(guard), duration_decimal(least));
+        self.report_table(format!("`guard` {guard} {why}; write `guard = \"{least}\"` or more"));
+    }
+
+    fn synchronisation(&self) {
+        let Tdma { cycle, synchronisation, guard, .. } = self.tdma;
         let others = self.installation.nodes.len() - 1;
         let frames = Duration::from_nanos(2 * others as u64 * self.link.time_ns());
         let needed = round_up(*guard + LATE + frames);
         if *synchronisation < needed {
-            report(format!(
+            self.report_table(format!(
                 "`synchronisation` {} has no room for a warm-up and a Sync to each of {others} other nodes before its guard; write \
                  `synchronisation = \"{}\"` or more",
                 duration_decimal(*synchronisation),
@@ -87,17 +94,20 @@ impl Judge<'_> {
         let masters = self.masters().len() as u32;
         let end = *synchronisation * masters;
         if end >= *cycle {
-            report(format!(
+            self.report_table(format!(
                 "the synchronisation windows of {masters} masters, {} each, leave nothing of the cycle of {}; write a longer `cycle`, or \
                  fewer `masters` in [time]",
                 duration_decimal(*synchronisation),
                 duration_decimal(*cycle)
             ));
         }
+    }
+
+    fn periods(&self) {
         let cycles = self.tdma.cycles();
         if cycles > CYCLES_MAX {
             let longest = self.tdma.slots.iter().max_by_key(|slot| slot.period).map_or(1, |slot| slot.period);
-            report(format!(
+            self.report_table(format!(
                 "slots with such periods come together again after {cycles} cycles, and it may be {CYCLES_MAX}; write periods that divide each \
                  other, such as {} in place of {longest}",
                 longest.next_power_of_two().min(CYCLES_MAX as u32)
