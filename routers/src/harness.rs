@@ -46,6 +46,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
             quota_bytes: 128 << 10,
             bulk_below: 16,
         },
+        tdma: None,
         routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
         senders: vec![vec![module(200, own)], vec![module(100, own)]],
     }

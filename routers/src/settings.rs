@@ -3,7 +3,7 @@
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
-use rohrpost_config::{Installation, Network, Route};
+use rohrpost_config::{Installation, Network, Route, Tdma};
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name};
 use std::net::IpAddr;
 
@@ -42,6 +42,8 @@ pub struct Settings {
     pub incarnation: u64,
     /// How it sends.
     pub network: Network,
+    /// When it sends; none: as packages come.
+    pub tdma: Option<Tdma>,
     /// Where names are that are not on this node; sorted, without overlap.
     pub routes: Vec<Route>,
     /// The modules of this node: the names of a group have a quota together, and so have all other names.
@@ -89,6 +91,7 @@ impl Settings {
             digest: installation.digest().lan(),
             incarnation,
             network,
+            tdma: installation.tdma.clone(),
             routes: installation.routes_from(node),
             senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
         })

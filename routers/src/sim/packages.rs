@@ -58,6 +58,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
             port: 21117,
             mtu: u16::MAX,
         },
+        tdma: None,
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
     }

@@ -93,6 +93,7 @@ impl Pair {
                     digest: 7,
                     incarnation: 1,
                     network,
+                    tdma: None,
                     routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
                     senders: vec![vec![module(own)]],
                 },
