@@ -214,7 +214,10 @@ impl Clock {
             slots.coarse.clear();
             slots.heard_cycle = 0;
         }
-        slots.unsure |= contested;
+        // A master that had no time begins another: to go on by the old one is to send in the slots of those who follow it.
+        let off_ns = sync.sent_ns.abs_diff(self.line.at(received.ns).ns);
+        let is_other = sync.epoch != self.line.record().epoch || off_ns > 2 * slots.settings.delay_max_ns;
+        slots.unsure |= contested || (turned && is_other);
         slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
         if slots.heard_cycle != 0 {
             slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
@@ -231,6 +234,7 @@ impl Clock {
         if sync.term != master.term || !self.election.stands_behind(head.from, sync.term) {
             return Err(Ignored::Late);
         }
+        self.election.replaced(received.ns);
         slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
         slots.lives_cycle = sync.cycle;
         if broken!(ReplacementCalibrates) {
