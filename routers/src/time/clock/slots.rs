@@ -203,7 +203,7 @@ impl Clock {
         match self.election.state() {
             State::Listening => false,
             State::Slave(master) => received_ns.saturating_sub(master.heard_ns) < 3 * self.interval_ns,
-            State::Master(_) => !broken!(KeepsOwnTime),
+            State::Master(_) => true,
         }
     }
 
@@ -217,7 +217,7 @@ impl Clock {
         // A master that had no time begins another: to go on by the old one is to send in the slots of those who follow it.
         let off_ns = sync.sent_ns.abs_diff(self.line.at(received.ns).ns);
         let is_other = sync.epoch != self.line.record().epoch || off_ns > 2 * slots.settings.delay_max_ns;
-        slots.unsure |= contested || (turned && is_other);
+        slots.unsure |= (contested || (turned && is_other)) && !broken!(KeepsOwnTime);
         slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
         if slots.heard_cycle != 0 {
             slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
