@@ -121,7 +121,7 @@ impl Book {
     }
 
     /// A datagram leaves a router: all that is in it was waiting, and may go now.
-    pub fn leaves(&mut self, now: Now, life: u32, datagram: &[u8], shape: &Shape, overhead_bytes: usize) {
+    pub fn leaves(&mut self, now: Now, life: u32, datagram: &[u8]) {
         let mut first = LEVELS;
         match Frame::parse(datagram) {
             Ok((_, Frame::Packages(packages))) => {
@@ -153,10 +153,16 @@ impl Book {
         }
         let sending = self.sending.entry(life).or_default();
         sending.below[..first.min(LEVELS)].iter_mut().for_each(|count| *count += u64::from(first < LEVELS));
+    }
+
+    /// Without time slots no router sends faster than it may; "still there" goes anyway.
+    pub fn paces(&mut self, now: Now, life: u32, datagram: &[u8], shape: &Shape, overhead_bytes: usize) {
+        let sending = self.sending.entry(life).or_default();
         let ahead_ns = sending.through_ns.saturating_sub(now.monotonic_ns);
         let takes_ns = (datagram.len() + overhead_bytes) as u64 * 1_000_000_000 / shape.rate_bytes_s;
         sending.through_ns = sending.through_ns.max(now.monotonic_ns) + takes_ns;
-        if first < LEVELS && ahead_ns > AHEAD_NS_MAX {
+        let is_paced = matches!(Frame::parse(datagram), Ok((_, Frame::Packages(_) | Frame::Fragment(_))));
+        if is_paced && ahead_ns > AHEAD_NS_MAX {
             self.broken(now, Promise::Pace, format!("a datagram leaves {ahead_ns} ns before its time"));
         }
     }
