@@ -54,6 +54,8 @@ const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 2] = [("delivered", 100_000), ("t
 /// Mistakes that cannot show here, since each has something else before it; the tests of `fragment` see them. Heads in this simulation
 /// are never the same twice, and copies of a part are dropped as datagrams.
 const UNSEEN: [Mistake; 2] = [Mistake::Packages(Broken::MixesPackages), Mistake::Packages(Broken::CountsPartsTwice)];
+/// Mistakes in what carries packages that matter only in time slots.
+const IN_SLOTS: [Broken; 3] = [Broken::OvertakesInSlot, Broken::OverrunsSlot, Broken::AnyCompany];
 /// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them.
 const SELDOM: [Mistake; 3] = [
     Mistake::Packages(Broken::NeverUnheard),
@@ -189,23 +191,37 @@ fn a_seed_gives_the_same_network_again() {
 }
 
 /// The first seed whose network shows a mistake.
-fn noticed(mistake: Mistake) -> Option<(u64, Promise)> {
+fn noticed(mistake: Mistake, plan: fn(u64) -> Plan) -> Option<(u64, Promise)> {
     (0..MISTAKE_SEEDS).find_map(|seed| {
-        let outcome = run_broken(Plan::rough(seed), guard, mistake);
+        let outcome = run_broken(plan(seed), guard, mistake);
         outcome.problems.first().map(|problem| (seed, problem.promise))
     })
 }
 
-#[test]
-fn every_mistake_of_a_core_is_noticed() {
-    let packages = Broken::ALL.into_iter().map(Mistake::Packages);
-    let time = time::Broken::ALL.into_iter().map(Mistake::Time);
-    let mistakes: Vec<Mistake> =
-        packages.chain(time).filter(|mistake| !UNSEEN.contains(mistake) && !SELDOM.contains(mistake)).collect();
-    let found = for_all(mistakes.len() as u64, |index| (mistakes[index as usize], noticed(mistakes[index as usize])));
+/// Each of them breaks a promise in some network.
+fn all_are_noticed(mistakes: &[Mistake], plan: fn(u64) -> Plan) {
+    let found = for_all(mistakes.len() as u64, |index| {
+        let mistake = mistakes[index as usize];
+        (mistake, noticed(mistake, plan))
+    });
     for (mistake, seed) in &found {
         eprintln!("{mistake:?}: {seed:?}");
     }
     let missed: Vec<_> = found.iter().filter(|(_, seed)| seed.is_none()).collect();
     assert!(missed.is_empty(), "went unnoticed in {MISTAKE_SEEDS} networks: {missed:?}");
+}
+
+#[test]
+fn every_mistake_of_a_core_is_noticed() {
+    let packages = Broken::ALL.into_iter().filter(|broken| !IN_SLOTS.contains(broken)).map(Mistake::Packages);
+    let time = time::Broken::ALL.into_iter().map(Mistake::Time);
+    let mistakes: Vec<Mistake> =
+        packages.chain(time).filter(|mistake| !UNSEEN.contains(mistake) && !SELDOM.contains(mistake)).collect();
+    all_are_noticed(&mistakes, Plan::rough);
+}
+
+#[test]
+fn every_mistake_in_time_slots_is_noticed() {
+    let mistakes = Broken::SLOTS.into_iter().chain(IN_SLOTS).map(Mistake::Packages);
+    all_are_noticed(&mistakes.collect::<Vec<_>>(), Plan::slotted);
 }

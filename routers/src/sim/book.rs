@@ -68,6 +68,9 @@ pub enum Promise {
     /// [`HOLDOVER_NS`]: super::slots::HOLDOVER_NS
     /// [`HEALED_CYCLES`]: super::slots::HEALED_CYCLES
     Exclusive,
+    /// With time slots each datagram is on the wire in a window of its sender, before its guard, as the sender reckons, and none is sent
+    /// in a window whose wake-up came too late.
+    InWindow,
     /// With time slots nobody sends while its own bound is greater than what is allowed.
     SilentWhenUnsure,
 }

@@ -153,7 +153,9 @@ impl Packages {
             return self.outbound.unsent(&bytes, &[], &mut watch);
         }
         io.book.leaves(io.now, io.life, &bytes);
-        if io.plan.slots.is_none() {
+        if io.plan.slots.is_some() {
+            io.book.is_strict(io.now, io.life, &bytes);
+        } else {
             io.book.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
         }
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));

@@ -155,6 +155,23 @@ impl Book {
         sending.below[..first.min(LEVELS)].iter_mut().for_each(|count| *count += u64::from(first < LEVELS));
     }
 
+    /// In time slots nothing leaves while something more important waits, whoever it is for and however large.
+    pub fn is_strict(&mut self, now: Now, life: u32, datagram: &[u8]) {
+        let last = match Frame::parse(datagram) {
+            Ok((_, Frame::Packages(packages))) => packages.map(|(head, _)| self.level(head.priority.0)).max(),
+            Ok((_, Frame::Fragment(part))) => Some(self.level(part.head.priority.0)),
+            _ => None,
+        };
+        let waiting = self.sending.get(&life).into_iter().flat_map(|sending| sending.waiting.values());
+        let first = waiting.filter_map(|waiting| waiting.packages.first()).min().copied();
+        if let (Some(last), Some((first, _, number))) = (last, first)
+            && first < last
+        {
+            let text = format!("a package of level {last} leaves, and {number} of level {first} waits");
+            self.broken(now, Promise::Urgency, text);
+        }
+    }
+
     /// Without time slots no router sends faster than it may; "still there" goes anyway.
     pub fn paces(&mut self, now: Now, life: u32, datagram: &[u8], shape: &Shape, overhead_bytes: usize) {
         let sending = self.sending.entry(life).or_default();

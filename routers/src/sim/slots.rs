@@ -4,6 +4,7 @@
 use super::chance::Chance;
 use super::link::Quality;
 use super::plan::{Fault, MS, Plan, Planned, S, US};
+use crate::frame::NodeIndex;
 use crate::time::{JOINING_SYNCS, TIME_BYTES};
 use rohrpost_config::{Tdma, TimeSlot};
 use std::ops::Range;
@@ -29,6 +30,8 @@ const TIME_WIRE_BYTES: usize = TIME_BYTES + AROUND_BYTES;
 pub struct Slots {
     /// Who may send when.
     pub table: Tdma,
+    /// Who may be master, in order.
+    pub masters: Vec<NodeIndex>,
     /// Wake-ups beyond what the late gate lets through, of a million.
     pub late_ppm: u32,
     /// When faults divide the network, and until it has healed, true ns.
@@ -48,12 +51,28 @@ impl Slots {
         divided.is_some_and(|range| range.start + HOLDOVER_NS <= true_ns || range.contains(&began_ns))
     }
 
+    /// The window of a node in which a moment of system time is, from its beginning to its guard, system ns.
+    pub fn window(&self, node: usize, system_ns: u64) -> Option<Range<u64>> {
+        let ns = |duration: Duration| duration.as_nanos() as u64;
+        let table = &self.table;
+        let (cycle, in_cycle_ns) = (system_ns / ns(table.cycle), system_ns % ns(table.cycle));
+        let sync_ns = ns(table.synchronisation);
+        let rank = self.masters.iter().position(|master| usize::from(*master) == node);
+        let synchronisation = rank.map(|rank| (rank as u64 * sync_ns, sync_ns));
+        let own = table.slots.iter().filter(|slot| usize::from(slot.node) == node);
+        let own = own.filter(|slot| cycle % u64::from(slot.period) == u64::from(slot.phase));
+        let mut all = own.map(|slot| (ns(slot.offset), ns(slot.length))).chain(synchronisation);
+        let (offset_ns, length_ns) = all.find(|(offset, length)| (*offset..offset + length).contains(&in_cycle_ns))?;
+        let begin_ns = system_ns - in_cycle_ns + offset_ns;
+        Some(begin_ns..begin_ns + length_ns - ns(table.guard))
+    }
+
     /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late that others
     /// take over from a master.
     pub fn late_ns(&self, mended: bool, chance: &mut Chance) -> u64 {
         if chance.per_million(self.late_ppm) {
             let late_ns = chance.scale(50 * US, LATE_NS_MAX);
-            return if mended { late_ns.min(2 * self.table.cycle.as_nanos() as u64) } else { late_ns };
+            return if mended { late_ns.min(self.table.cycle.as_nanos() as u64) } else { late_ns };
         }
         if chance.percent(5) { chance.below(45 * US) } else { chance.below(3 * US) }
     }
@@ -78,7 +97,7 @@ impl Plan {
         plan.shape.interval_ns = table.cycle.as_nanos() as u64;
         plan.shape.rate_bytes_s = (0..plan.nodes.len()).map(|node| node_bytes_s(&table, node)).min().unwrap_or(0);
         plan.mended_ns = chance.between(2 * S, 4 * S);
-        plan.slots = Some(Slots { table, late_ppm: 2000, divided: Vec::new() });
+        plan.slots = Some(Slots { table, masters: plan.masters.clone(), late_ppm: 2000, divided: Vec::new() });
         plan.time();
         // Who joins hears some Syncs before it asks, and so long a master is given to answer.
         plan.timed_ns += 2 * u64::from(JOINING_SYNCS) * plan.shape.interval_ns + DEAF_NS;

@@ -53,8 +53,9 @@ impl Slotted {
     fn send(&mut self, io: &mut Io<'_>, mut permit: Permit) {
         let before = io.sent.len();
         let is_sure = self.is_sure(io);
-        let term = self.time.clock().reading(io.now.monotonic_ns).term;
-        io.book.wire.goes_by(io.node, if is_sure { term } else { Term::NONE });
+        let clock = self.time.clock();
+        let term = if is_sure { clock.reading(io.now.monotonic_ns).term } else { Term::NONE };
+        io.book.wire.goes_by(io.node, term, clock.reckoning().filter(|_| is_sure));
         self.time.poll_in(io, Some(&mut permit));
         if permit.carries == Carries::All {
             self.packages.poll_in(io, &mut permit);

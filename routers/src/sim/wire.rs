@@ -3,11 +3,14 @@
 use super::book::{Problem, Promise};
 use super::plan::US;
 use super::slots::Slots;
-use crate::time::Term;
+use crate::tdma::LATE_NS;
+use crate::time::{Reckoning, Term};
 use std::collections::VecDeque;
 
 /// From the call to the first bit, ns: usually the shorter, and by chance up to the longer.
 pub const LEAD_NS: (u64, u64) = (8 * US, 20 * US);
+/// Clocks change their rate a little meanwhile, and stamps are a little off, ns.
+const SLACK_NS: u64 = US;
 /// Transmissions that one which begins now may still meet.
 const RECENT_MAX: usize = 64;
 
@@ -33,6 +36,8 @@ pub struct Wire {
     began_ns: Vec<u64>,
     /// The term that each goes by.
     terms: Vec<Term>,
+    /// What each reckons by.
+    reckonings: Vec<Option<Reckoning>>,
     recent: VecDeque<Transmission>,
 }
 
@@ -43,6 +48,7 @@ impl Wire {
             free_ns: vec![0; nodes],
             began_ns: vec![0; nodes],
             terms: vec![Term::NONE; nodes],
+            reckonings: vec![None; nodes],
             recent: VecDeque::with_capacity(RECENT_MAX),
         }
     }
@@ -53,8 +59,23 @@ impl Wire {
     }
 
     /// From now on a node sends by the time of this term; none: by what it has heard only.
-    pub fn goes_by(&mut self, node: usize, term: Term) {
-        self.terms[node] = term;
+    pub fn goes_by(&mut self, node: usize, term: Term, reckoning: Option<Reckoning>) {
+        (self.terms[node], self.reckonings[node]) = (term, reckoning);
+    }
+
+    /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its node.
+    pub fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 3]) -> Option<String> {
+        let reckoning = self.reckonings[node]?;
+        let [called_ns, begin_ns, end_ns] = local_ns.map(|local_ns| reckoning.system_ns(local_ns));
+        let window = slots.window(node, called_ns + LEAD_NS.1);
+        let is_well = window.as_ref().is_some_and(|window| {
+            // Who does not know its lead yet may end later by as much, who does by what it varies.
+            let ends = end_ns <= window.end + LEAD_NS.1 + SLACK_NS;
+            begin_ns + SLACK_NS >= window.start && ends && called_ns <= window.start + LATE_NS + SLACK_NS
+        });
+        let told =
+            || format!("node {node}, {bytes} bytes, called at {called_ns}, from {begin_ns} to {end_ns} in {window:?}");
+        (!is_well).then(told)
     }
 
     /// A node hands over a datagram that will reach its interface then; `bytes` with all heads. What comes of it, and whether it meets

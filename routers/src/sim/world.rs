@@ -1,7 +1,7 @@
 //! A network of simulated computers in virtual time: events in their order, datagrams on their links, layers called as their threads
 //! would be.
 
-use super::book::{Book, Problem};
+use super::book::{Book, Problem, Promise};
 use super::calls::{Calls, NewGuard, Server};
 use super::chance::Chance;
 use super::clock::{Clock, Now};
@@ -270,6 +270,11 @@ impl<'a> World<'a> {
         let book = &mut self.book;
         let at_ns = self.now_ns + self.chance.between(LEAD_NS.0, LEAD_NS.1);
         let sent = book.wire.transmit(node, at_ns, bytes, slots, &mut book.problems);
+        let clock = &self.stations[node].clock;
+        let local_ns = [self.now_ns, sent.begin_ns, sent.end_ns].map(|true_ns| clock.at(true_ns).monotonic_ns);
+        if let Some(text) = book.wire.window(node, bytes, slots, local_ns) {
+            book.problems.push(Problem { promise: Promise::InWindow, at_ns: sent.begin_ns, text });
+        }
         self.trace.line(self.now_ns, || format!("{node} transmits from {} to {} ns", sent.begin_ns, sent.end_ns));
         (sent.begin_ns, sent.end_ns)
     }
