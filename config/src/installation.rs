@@ -145,11 +145,13 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     );
     let scheduling = SchedulingRule::read(file.section("scheduling", "[scheduling]"));
     let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
-    let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes));
-    let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes);
+    let tdma = Tdma::read(&file, sections(&file, "slot"), &nodes);
+    let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes, tdma.as_ref()));
+    let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
+    let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
     network::judge(&file, &nodes, &classes);
 
-    let sections = sections(&file, "module");
+    let sections = self::sections(&file, "module");
     if sections.is_empty() {
         file.report("no module; add one: `[[module]]` with `name` and `builtin` or `program`");
     }
@@ -179,7 +181,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         nodes,
         modules,
         network,
-        tdma: None,
+        tdma,
         time,
         output,
         gui,

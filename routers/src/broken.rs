@@ -57,6 +57,12 @@ mod variants {
         Hurries,
         /// Outbound: what waited too long leaves nevertheless.
         SendsStale,
+        /// Outbound: in a slot what fits goes before what is more important and does not.
+        OvertakesInSlot,
+        /// Outbound: more leaves than the slot has room for.
+        OverrunsSlot,
+        /// Outbound: in a slot a datagram has company that is less important than what waits for others.
+        AnyCompany,
         /// Link: nobody is ever silent.
         NeverSilent,
         /// Link: nobody is ever unheard.
@@ -105,7 +111,7 @@ mod variants {
 
     impl Broken {
         /// All mistakes of carrying packages.
-        pub const ALL: [Self; 22] = [
+        pub const ALL: [Self; 25] = [
             Self::SkipsCheck,
             Self::IgnoresLevels,
             Self::TakesNewest,
@@ -115,6 +121,9 @@ mod variants {
             Self::Unpaced,
             Self::Hurries,
             Self::SendsStale,
+            Self::OvertakesInSlot,
+            Self::OverrunsSlot,
+            Self::AnyCompany,
             Self::NeverSilent,
             Self::NeverUnheard,
             Self::TakesCopies,

@@ -60,6 +60,8 @@ pub(super) struct Slots {
     synced_cycle: u64,
     next: usize,
     is_warm: bool,
+    /// When this node was awake last, local ns.
+    advanced_ns: u64,
 }
 
 impl Slots {
@@ -86,6 +88,7 @@ impl Clock {
             synced_cycle: 0,
             next: 0,
             is_warm: false,
+            advanced_ns: 0,
         }));
         self.forget();
         self
@@ -110,6 +113,15 @@ impl Clock {
             }
         }
         Step::Wait { until_ns: self.deadline_ns(now_ns) }
+    }
+
+    /// In time slots this node is awake at least once in a cycle.
+    pub(super) fn stood_still(&mut self, now_ns: u64) {
+        let Some(slots) = &mut self.slots else { return };
+        let before_ns = std::mem::replace(&mut slots.advanced_ns, now_ns);
+        if before_ns != 0 && now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
+            self.election.awakes(now_ns);
+        }
     }
 
     fn next_in(&mut self, now_ns: u64, allowed: Allowed) -> Option<(NodeIndex, Draft)> {

@@ -7,8 +7,18 @@ use crate::stats::Cause;
 use proptest::prelude::*;
 use rohrpost_mailbox::Type;
 
-pub(crate) const CHECKS: &[fn()] =
-    &[check_what_does_not_go, check_pace, check_commands_do_not_hurry, check_order_on_the_wire, check_waiting_too_long];
+mod slot;
+
+pub(crate) const CHECKS: &[fn()] = &[
+    check_what_does_not_go,
+    check_pace,
+    check_commands_do_not_hurry,
+    check_order_on_the_wire,
+    check_waiting_too_long,
+    slot::check_strict_order,
+    slot::check_room,
+    slot::check_company,
+];
 
 /// The packages of a datagram, by their ids; a part stands for its package.
 fn ids(datagram: &[u8]) -> Vec<u16> {
