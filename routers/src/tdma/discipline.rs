@@ -157,11 +157,8 @@ impl Discipline {
         let sure = self.reckon(now_ns, clock);
         let basis = sure.as_ref().ok().map(|(reckoning, _)| *reckoning);
         self.pass(now_ns, basis.or_else(|| clock.reckoning()).or_else(|| clock.coarse(now_ns)), sure.is_ok());
-        self.silent = match &sure {
-            Ok((_, Carries::All)) => None,
-            Ok((_, Carries::Time)) => Some(self.why_silent(now_ns, clock)),
-            Err(why) => Some(*why),
-        };
+        let asks_only = matches!(sure, Ok((_, Carries::Time)));
+        self.silent = asks_only.then(|| self.why_silent(now_ns, clock));
         let planned = sure.and_then(|(reckoning, carries)| {
             let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
             let window = self.next_window(from_ns, clock, carries);
@@ -169,7 +166,10 @@ impl Discipline {
         });
         match planned {
             Ok(planned) => Next::Window(planned),
-            Err(why) => Next::Silent { why, until_ns: now_ns.saturating_add(self.table.cycle_ns()) },
+            Err(why) => {
+                self.silent = Some(why);
+                Next::Silent { why, until_ns: now_ns.saturating_add(self.table.cycle_ns()) }
+            }
         }
     }
 

@@ -176,5 +176,5 @@ fn what_waits_too_long_for_a_slot_is_lost_between_slots_and_in_them() {
         end.assert_balanced();
         assert_eq!(end.stats.waiting_in_all(), 0);
     }
-    assert!(WAIT_MAX_NS > S);
+    const { assert!(WAIT_MAX_NS > S) };
 }

@@ -184,6 +184,9 @@ pub(super) fn no_frame_starts_before_its_slot() {
     assert!(matches!(verdict, Verdict::Send(_)), "{verdict:?}");
     assert_eq!(planned.begin_ns - planned.call_ns, 12 * US, "as much as can be compensated");
     assert_eq!(one.discipline.lead_ns().0, 17 * US, "the median");
+    let doubtful = Stamp { ns: one.now_ns + 12 * US, doubt_ns: 10_000, by_kernel: true };
+    [doubtful, Stamp::by_us(one.now_ns)].into_iter().for_each(|stamp| one.discipline.left(one.now_ns, stamp));
+    assert_eq!(one.discipline.lead_ns().1, 12 * US, "what may be far off says nothing");
     let last = Stamp { ns: one.now_ns + 3 * US, doubt_ns: 500, by_kernel: true };
     one.discipline.left(one.now_ns, last);
     assert_eq!(one.discipline.lead_ns().1, 2_500, "the quickest of all, by the least that its stamp says");
