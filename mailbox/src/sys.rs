@@ -15,6 +15,33 @@ pub enum Scheduling {
     Normal(i8),
 }
 
+/// Time of a processor that a thread needs again and again, for SCHED_DEADLINE.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reservation {
+    /// So much of it in each period, ns. Who uses it up stands still until the next period. From 1024 on.
+    pub runtime_ns: u64,
+    /// It has got it so long after it has become ready to run, at the latest, ns; at least the runtime, at most the period.
+    pub deadline_ns: u64,
+    /// The period, ns; at most four seconds.
+    pub period_ns: u64,
+}
+
+/// Why the system grants no reservation.
+#[derive(Debug, thiserror::Error)]
+pub enum ReservationError {
+    /// The user has no right to.
+    #[error(
+        "SCHED_DEADLINE needs CAP_SYS_NICE, which no limit of users brings: `setcap cap_sys_nice+ep` on the program,          `AmbientCapabilities=CAP_SYS_NICE` in its unit, or `--cap-add=SYS_NICE` for its container; nor is it given to who is bound to          some of the processors"
+    )]
+    NotAllowed,
+    /// Others have reserved too much.
+    #[error("processors have too little time left that is not reserved; let others reserve less")]
+    TooMuch,
+    /// It is no reservation, or the kernel cannot.
+    #[error("the kernel does not take {0:?}: {1}")]
+    NotTaken(Reservation, io::Error),
+}
+
 /// A FIFO process that runs for so long without sleeping is ended by the kernel (RLIMIT_RTTIME), µs.
 const RUNAWAY_US: u64 = 2_000_000;
 
@@ -37,6 +64,44 @@ pub fn schedule(how: Scheduling) -> io::Result<()> {
             check(unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, i32::from(nice)) })
         }
     }
+}
+
+/// What `sched_setattr` reads, as the kernel has known it from the first on (SCHED_ATTR_SIZE_VER0).
+const _: () = {
+    assert!(size_of::<libc::sched_attr>() == 48);
+    assert!(std::mem::offset_of!(libc::sched_attr, sched_flags) == 8);
+    assert!(std::mem::offset_of!(libc::sched_attr, sched_runtime) == 24);
+    assert!(std::mem::offset_of!(libc::sched_attr, sched_period) == 40);
+};
+
+/// Reserves time of a processor for the calling thread: it goes before all others, and on whichever processor is free. The threads
+/// that it starts run as ordinary ones.
+///
+/// # Errors
+/// [`ReservationError`]
+pub fn reserve(reservation: Reservation) -> Result<(), ReservationError> {
+    let attributes = libc::sched_attr {
+        size: size_of::<libc::sched_attr>() as u32,
+        sched_policy: libc::SCHED_DEADLINE as u32,
+        sched_flags: libc::SCHED_FLAG_RESET_ON_FORK as u64,
+        sched_nice: 0,
+        sched_priority: 0,
+        sched_runtime: reservation.runtime_ns,
+        sched_deadline: reservation.deadline_ns,
+        sched_period: reservation.period_ns,
+    };
+    // SAFETY: reads as many bytes of the attributes, which live here, as these say of themselves; 0 is the calling thread, and there
+    // are no flags.
+    let result = unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) };
+    if result == 0 {
+        return Ok(());
+    }
+    let error = io::Error::last_os_error();
+    Err(match error.raw_os_error() {
+        Some(libc::EPERM) => ReservationError::NotAllowed,
+        Some(libc::EBUSY) => ReservationError::TooMuch,
+        _ => ReservationError::NotTaken(reservation, error),
+    })
 }
 
 /// How the calling thread is scheduled.
@@ -100,4 +165,43 @@ pub fn room(path: &Path) -> io::Result<Room> {
 
 fn check(result: i32) -> io::Result<()> {
     if result < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn reserved(runtime_ns: u64, period_ns: u64) -> Result<i32, ReservationError> {
+        let reserve = move || {
+            reserve(Reservation { runtime_ns, deadline_ns: period_ns, period_ns })?;
+            // SAFETY: takes a number only.
+            Ok(unsafe { libc::sched_getscheduler(0) })
+        };
+        // Of a thread of its own, with which it ends.
+        std::thread::spawn(reserve).join().unwrap()
+    }
+
+    #[test]
+    fn a_reservation_is_granted_or_refused_with_a_reason() {
+        match reserved(MS / 10, 10 * MS) {
+            Ok(policy) => assert_eq!(policy & !libc::SCHED_RESET_ON_FORK, libc::SCHED_DEADLINE),
+            Err(ReservationError::NotAllowed | ReservationError::TooMuch) => {}
+            Err(error) => panic!("{error}"),
+        }
+        // More than there is, and nothing: whoever asks, it is refused.
+        let error = reserved(2 * MS, MS).unwrap_err();
+        assert!(matches!(error, ReservationError::NotTaken(..) | ReservationError::NotAllowed), "{error}");
+    }
+
+    #[test]
+    fn what_a_thread_with_a_reservation_starts_is_ordinary() {
+        let of_child = std::thread::spawn(|| {
+            // Without the right to it, the child is as ordinary as this one.
+            let _ = reserve(Reservation { runtime_ns: MS / 10, deadline_ns: 10 * MS, period_ns: 10 * MS });
+            std::thread::spawn(scheduling).join().unwrap().unwrap()
+        });
+        assert!(matches!(of_child.join().unwrap(), Scheduling::Normal(_)));
+    }
 }
