@@ -27,4 +27,5 @@ pub mod settings;
 pub mod shell;
 pub mod sim;
 pub mod stats;
+pub mod tdma;
 pub mod time;

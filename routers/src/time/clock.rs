@@ -2,6 +2,7 @@
 
 mod master;
 mod slave;
+mod slots;
 
 use super::broken::Broken;
 use super::election::{Election, State};
@@ -13,6 +14,9 @@ use super::{Stamp, TIME_BYTES, Term};
 use crate::frame::{FrameHead, HEAD_BYTES, NodeIndex};
 use rohrpost_mailbox::{TimeRecord, TimeSource};
 use std::collections::VecDeque;
+
+pub use slots::Allowed;
+use slots::Slots;
 
 /// Exchanges in an interval, and the shortest pause between two with one slave.
 const EXCHANGES: u64 = 8;
@@ -83,6 +87,8 @@ pub struct Clock {
     last: Option<Exchange>,
     offset_ns: i64,
     contradictions: u64,
+    /// What time slots need besides; none in free mode.
+    slots: Option<Box<Slots>>,
     #[cfg(any(test, feature = "broken-variants"))]
     pub(super) broken: Option<Broken>,
 }
@@ -125,6 +131,7 @@ impl Clock {
             last: None,
             offset_ns: 0,
             contradictions: 0,
+            slots: None,
             #[cfg(any(test, feature = "broken-variants"))]
             broken: None,
             settings,
@@ -167,16 +174,7 @@ impl Clock {
     /// What is to be done now. To be called again after each datagram sent or taken, and when the time has come. `now_ns` goes into the
     /// datagram: it is to be read just before.
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8; TIME_BYTES]) -> Step {
-        self.line.end_slew(now_ns);
-        self.keep_bound(now_ns);
-        if self.election.falls_silent(now_ns) {
-            self.line.stop_slew(now_ns);
-            self.forget();
-            self.hello_ns = now_ns;
-        }
-        if let Some(term) = self.election.takes_over(now_ns, self.line.is_synchronised()) {
-            self.reign(now_ns, term);
-        }
+        self.advance(now_ns);
         if self.drafts.is_empty() {
             self.draft(now_ns);
         }
@@ -278,6 +276,20 @@ impl Clock {
         self.asked = [Asked::default(); PENDING];
         self.asked_ns = 0;
         self.far = false;
+    }
+
+    /// What the passing of time does.
+    fn advance(&mut self, now_ns: u64) {
+        self.line.end_slew(now_ns);
+        self.keep_bound(now_ns);
+        if self.election.falls_silent(now_ns) {
+            self.line.stop_slew(now_ns);
+            self.forget();
+            self.hello_ns = now_ns;
+        }
+        if let Some(term) = self.election.takes_over(now_ns, self.line.is_synchronised()) {
+            self.reign(now_ns, term);
+        }
     }
 
     /// What is due without anybody having asked.

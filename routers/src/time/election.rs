@@ -87,7 +87,7 @@ impl Election {
         self.highest_epoch
     }
 
-    fn rank(&self) -> Option<u8> {
+    pub(super) fn rank(&self) -> Option<u8> {
         let rank = self.masters.iter().position(|master| *master == self.own)?;
         u8::try_from(rank).ok()
     }

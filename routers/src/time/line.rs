@@ -7,7 +7,7 @@ use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemTime, TimeRecord, TimeSource};
 const SLOWER_LEAD_NS: u64 = 1_000_000;
 /// What lines may be off by being whole numbers, until the source is heard again.
 const ROUNDING_NS: u64 = 4;
-const BILLION: i128 = 1_000_000_000;
+pub(super) const BILLION: i128 = 1_000_000_000;
 /// As the local clock.
 pub(super) const EVEN_PPB: u64 = 1_000_000_000;
 

@@ -37,18 +37,22 @@
 )]
 mod broken;
 mod clock;
+mod coarse;
 mod election;
 mod history;
 mod line;
 pub mod message;
+mod reckoning;
 #[cfg(test)]
 mod tests;
 mod types;
 
 #[cfg(any(test, feature = "broken-variants"))]
 pub use broken::Broken;
-pub use clock::Clock;
-pub use types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
+pub use clock::{Allowed, Clock};
+pub use coarse::JOINING_SYNCS;
+pub use reckoning::Reckoning;
+pub use types::{Exchange, Ignored, InSlots, Reading, Role, SentId, Step, SyncCounts, TimeSettings};
 
 /// The bound of a node that does not know the time.
 pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;
