@@ -42,7 +42,8 @@ impl Side {
         self.settings.incarnation += 1;
         let name = Name::new(1, 250, self.settings.own, 0);
         let (settings, faults) = (self.settings.clone(), Arc::new(Words));
-        self.shell = Some(Shell::start(Parts { node: &self.node, name, settings, faults, impair: None }).unwrap());
+        self.shell =
+            Some(Shell::start(Parts { node: &self.node, name, settings, faults, impair: None, clock: None }).unwrap());
     }
 
     pub(crate) fn join(&self) -> Arc<Participant> {

@@ -7,7 +7,7 @@ use super::state::{ClockState, Snapshot};
 use super::{ClockError, ClockParts};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::impair::{Impairment, Output};
-use crate::time::{Clock, Exchange, SentId, Stamp, TIME_BYTES};
+use crate::time::{Clock, Exchange, InSlots, SentId, Stamp, TIME_BYTES};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, realtime_ns};
 use std::net::{IpAddr, SocketAddr};
 use std::os::fd::{AsFd, BorrowedFd};
@@ -63,6 +63,11 @@ impl Works {
             state: Arc::new(ClockState::new(snapshot)),
             snapshot,
         })
+    }
+
+    /// From now on its clock goes by the rules of time slots.
+    pub(in crate::shell) fn in_slots(self, settings: InSlots) -> Self {
+        Self { clock: self.clock.in_slots(settings), ..self }
     }
 
     /// What others may look at.
