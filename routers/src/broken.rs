@@ -89,10 +89,28 @@ mod variants {
         KeepsParts,
         /// Fragment: as many packages are put together at a time as have begun.
         Unbounded,
+        /// Time slots: a wake-up that comes too late is none too late.
+        NoLateGate,
+        /// Time slots: a node sends however far off its clock may be.
+        SendsWhenUnsure,
+        /// Time slots: a window ends where its guard does.
+        IgnoresGuard,
+        /// Time slots: calls are made earlier than frames need to reach the wire.
+        LeadTooLong,
+        /// Time slots: what was handed over does not count for what still fits.
+        ForgetsHandedOver,
+        /// Time slots: a Sync of another in the master's place is taken for the master's.
+        ReplacementCalibrates,
+        /// Time slots: a backup master sends also when the master's Sync came.
+        ReplacesHeard,
+        /// Time slots: a master sends Syncs in its slots.
+        SyncInForeignWindow,
+        /// Time slots: whoever yields to another master goes on by its own time.
+        KeepsOwnTime,
     }
 
     impl Broken {
-        /// All mistakes.
+        /// All mistakes of carrying packages.
         pub const ALL: [Self; 25] = [
             Self::SkipsCheck,
             Self::IgnoresLevels,
@@ -119,6 +137,19 @@ mod variants {
             Self::CountsPartsTwice,
             Self::KeepsParts,
             Self::Unbounded,
+        ];
+
+        /// All mistakes of time slots.
+        pub const SLOTS: [Self; 9] = [
+            Self::NoLateGate,
+            Self::SendsWhenUnsure,
+            Self::IgnoresGuard,
+            Self::LeadTooLong,
+            Self::ForgetsHandedOver,
+            Self::ReplacementCalibrates,
+            Self::ReplacesHeard,
+            Self::SyncInForeignWindow,
+            Self::KeepsOwnTime,
         ];
     }
 

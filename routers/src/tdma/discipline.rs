@@ -4,6 +4,7 @@ use super::LATE_NS;
 use super::lead::Lead;
 use super::permit::{Carries, Permit};
 use super::table::{Kind, Table, Window};
+use crate::broken::broken;
 use crate::time::{Clock, JOINING_SYNCS, Reckoning, Role, Stamp, SyncCounts};
 
 /// What comes next.
@@ -42,7 +43,7 @@ pub enum Silent {
     #[error("no system time, and no master is heard")]
     NoTime,
     /// It has no system time, and listens to a master.
-    #[error("joining: {heard} of {JOINING_SYNCS} Syncs heard")]
+    #[error("joining: {heard} of {JOINING_SYNCS} Syncs heard, then it measures")]
     Joining {
         /// Syncs that count, so far.
         heard: u8,
@@ -155,17 +156,20 @@ impl Discipline {
         }
         let sure = self.reckon(now_ns, clock);
         self.pass(now_ns, clock, sure.is_ok());
-        self.silent = sure.err();
-        let (reckoning, carries) = match sure {
-            Ok(sure) => sure,
-            Err(why) => return Next::Silent { why, until_ns: now_ns.saturating_add(self.table.cycle_ns()) },
+        self.silent = match &sure {
+            Ok((_, Carries::All)) => None,
+            Ok((_, Carries::Time)) => Some(self.why_silent(now_ns, clock)),
+            Err(why) => Some(*why),
         };
-        let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
-        let planned = self.next_window(from_ns, clock, carries).and_then(|window| self.plan(window, &reckoning));
-        planned.map_or_else(
-            || Next::Silent { why: Silent::NoSlot, until_ns: now_ns.saturating_add(self.table.cycle_ns()) },
-            Next::Window,
-        )
+        let planned = sure.and_then(|(reckoning, carries)| {
+            let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
+            let window = self.next_window(from_ns, clock, carries);
+            window.and_then(|window| self.plan(window, &reckoning)).ok_or(Silent::NoSlot)
+        });
+        match planned {
+            Ok(planned) => Next::Window(planned),
+            Err(why) => Next::Silent { why, until_ns: now_ns.saturating_add(self.table.cycle_ns()) },
+        }
     }
 
     /// Whether a planned window may be used: to be asked at its call, when all that came was handed to the clock. Once for each window,
@@ -203,30 +207,34 @@ impl Discipline {
     fn reckon(&self, now_ns: u64, clock: &Clock) -> Result<(Reckoning, Carries), Silent> {
         let allowance_ns = self.table.allowance_ns();
         let is_sure = |reckoning: &Reckoning| reckoning.bound_ns(now_ns) <= allowance_ns;
-        let own = clock.reckoning(now_ns);
-        if let Some(own) = own.filter(is_sure) {
-            return Ok((own, Carries::All));
-        }
-        if let Some(coarse) = clock.coarse(now_ns).filter(is_sure) {
-            return Ok((coarse, Carries::Time));
-        }
-        Err(match (own, clock.joining()) {
-            (Some(own), _) => Silent::BoundTooLarge { bound_ns: own.bound_ns(now_ns), allowance_ns },
+        let own = clock.reckoning().filter(|own| is_sure(own) || broken!(SendsWhenUnsure));
+        let coarse = || clock.coarse(now_ns).filter(is_sure).map(|coarse| (coarse, Carries::Time));
+        own.map(|own| (own, Carries::All)).or_else(coarse).ok_or_else(|| self.why_silent(now_ns, clock))
+    }
+
+    /// Why this node does not go by its own time.
+    fn why_silent(&self, now_ns: u64, clock: &Clock) -> Silent {
+        match (clock.reckoning(), clock.joining()) {
+            (Some(own), _) => {
+                Silent::BoundTooLarge { bound_ns: own.bound_ns(now_ns), allowance_ns: self.table.allowance_ns() }
+            }
             (None, Some(heard)) => Silent::Joining { heard },
             (None, None) => Silent::NoTime,
-        })
+        }
     }
 
     /// Counts the slots that went by since it was asked last.
     fn pass(&mut self, now_ns: u64, clock: &Clock, sure: bool) {
-        let Some(reckoning) = clock.reckoning(now_ns).or_else(|| clock.coarse(now_ns)) else {
+        let Some(reckoning) = clock.reckoning().or_else(|| clock.coarse(now_ns)) else {
             self.done = None;
             return;
         };
-        let reached_ns = reckoning.system_ns(now_ns).saturating_sub(LATE_NS);
+        let system_ns = reckoning.system_ns(now_ns);
+        let reached_ns = system_ns.saturating_sub(LATE_NS);
         let done_ns = match self.done {
             Some((epoch, done_ns)) if epoch == reckoning.epoch() => done_ns,
-            _ => reached_ns,
+            // In another epoch the window of just now may be one that was used.
+            _ => system_ns,
         };
         let passed = self.table.slots_between(done_ns, reached_ns);
         let was_silent = self.silent.is_some() || !sure;
@@ -260,11 +268,11 @@ impl Discipline {
         if now_ns < planned.call_ns {
             return Verdict::Early;
         }
-        if now_ns > planned.begin_ns.saturating_add(LATE_NS) {
+        if now_ns > planned.begin_ns.saturating_add(LATE_NS) && !broken!(NoLateGate) {
             return Verdict::Late;
         }
         let (bound_ns, allowance_ns) = (reckoning.bound_ns(planned.end_ns), self.table.allowance_ns());
-        if bound_ns > allowance_ns {
+        if bound_ns > allowance_ns && !broken!(SendsWhenUnsure) {
             return Verdict::Silent(Silent::BoundTooLarge { bound_ns, allowance_ns });
         }
         let carries = match window.kind {

@@ -1,5 +1,6 @@
 //! How long it takes from the call to the wire, so that the call can be made so much earlier.
 
+use crate::broken::broken;
 use crate::time::Stamp;
 
 /// So many of the latest count for the median.
@@ -54,6 +55,10 @@ impl Lead {
 
     /// By how much a call may be earlier, ns, and yet no frame has been seen that would have left too early.
     pub(super) fn ns(&self) -> u64 {
-        if self.count < HISTORY { 0 } else { self.median_ns().min(self.least[0]).min(self.least[1]) }
+        if self.count < HISTORY {
+            return 0;
+        }
+        let median_ns = self.median_ns();
+        if broken!(LeadTooLong) { 2 * median_ns } else { median_ns.min(self.least[0]).min(self.least[1]) }
     }
 }

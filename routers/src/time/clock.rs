@@ -55,6 +55,7 @@ struct Asked {
 enum Draft {
     WarmUp,
     Sync { nominal_ns: u64 },
+    Replacement { nominal_ns: u64 },
     Request { id: u64 },
     Reply { id: u64, came: Stamp },
 }
@@ -173,7 +174,11 @@ impl Clock {
 
     /// What is to be done now. To be called again after each datagram sent or taken, and when the time has come. `now_ns` goes into the
     /// datagram: it is to be read just before.
+    /// In time slots it sends nothing so: see [`Self::poll_in`].
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8; TIME_BYTES]) -> Step {
+        if self.slots.is_some() {
+            return self.poll_in(now_ns, Allowed::Nothing, datagram);
+        }
         self.advance(now_ns);
         if self.drafts.is_empty() {
             self.draft(now_ns);
@@ -295,13 +300,8 @@ impl Clock {
     /// What is due without anybody having asked.
     fn draft(&mut self, now_ns: u64) {
         match self.election.state() {
-            State::Listening if self.hello_ns <= now_ns => {
-                self.hello_ns = now_ns.saturating_add(self.interval_ns);
-                for master in self.election.masters().iter().filter(|master| **master != self.settings.own) {
-                    self.drafts.push_back((*master, Draft::Request { id: 0 }));
-                }
-            }
-            State::Listening | State::Slave(_) => {}
+            State::Listening => self.draft_hello(now_ns),
+            State::Slave(_) => {}
             State::Master(_) => {
                 let due = (0..self.settings.nodes)
                     .filter(|node| *node != self.settings.own)
@@ -313,8 +313,20 @@ impl Clock {
         }
     }
 
+    /// Who hears no master says so.
+    fn draft_hello(&mut self, now_ns: u64) {
+        if self.hello_ns <= now_ns {
+            self.hello_ns = now_ns.saturating_add(self.interval_ns);
+            for master in self.election.masters().iter().filter(|master| **master != self.settings.own) {
+                self.drafts.push_back((*master, Draft::Request { id: 0 }));
+            }
+        }
+    }
+
     fn deadline_ns(&self, now_ns: u64) -> u64 {
         let role_ns = match self.election.state() {
+            // Its windows are somebody else's affair.
+            _ if self.slots.is_some() => None,
             State::Master(_) => {
                 let others = self.slaves.iter().enumerate().filter(|(node, _)| *node != usize::from(self.settings.own));
                 others.map(|(_, slave)| slave.next_ns).min()
@@ -340,6 +352,7 @@ impl Clock {
         let message = match draft {
             Draft::WarmUp => Message::WarmUp,
             Draft::Sync { nominal_ns } => Message::Sync(self.write_sync(now_ns, to, nominal_ns, sequence)?),
+            Draft::Replacement { nominal_ns } => Message::Sync(self.write_replacement(now_ns, nominal_ns)?),
             Draft::Request { id } => Message::Request(self.write_request(now_ns, id, sequence)?),
             Draft::Reply { id, came } => Message::Reply(self.write_reply(now_ns, to, id, came)?),
         };

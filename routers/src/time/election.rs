@@ -49,6 +49,8 @@ pub(super) struct Election {
     own: NodeIndex,
     masters: Vec<NodeIndex>,
     interval_ns: u64,
+    /// So long a master is given to answer.
+    deaf_ns: u64,
     state: State,
     /// Since when no master is heard, and who was the last.
     quiet_since_ns: u64,
@@ -66,6 +68,7 @@ impl Election {
             own,
             masters,
             interval_ns,
+            deaf_ns: DEAF_NS_MIN,
             state: State::Listening,
             quiet_since_ns: now_ns,
             lost: None,
@@ -73,6 +76,11 @@ impl Election {
             highest_epoch: 0,
             timed_heard_ns: None,
         }
+    }
+
+    /// A slave takes so many intervals until it asks: a master must not be replaced before that for not having answered.
+    pub(super) fn asks_after(&mut self, intervals: u64) {
+        self.deaf_ns = DEAF_NS_MIN.max(self.interval_ns.saturating_mul(2 * intervals));
     }
 
     pub(super) fn state(&self) -> State {
@@ -87,12 +95,18 @@ impl Election {
         self.highest_epoch
     }
 
-    pub(super) fn rank(&self) -> Option<u8> {
+    fn rank(&self) -> Option<u8> {
         let rank = self.masters.iter().position(|master| *master == self.own)?;
         u8::try_from(rank).ok()
     }
 
-    fn silence_ns(&self) -> u64 {
+    /// Whether somebody who stands behind the master of a term may act for it.
+    pub(super) fn stands_behind(&self, node: NodeIndex, term: Term) -> bool {
+        let mut behind = self.masters.iter().skip(usize::from(term.rank()) + 1);
+        behind.any(|master| *master == node)
+    }
+
+    pub(super) fn silence_ns(&self) -> u64 {
         self.interval_ns.saturating_mul(TAKEOVER_HALF_INTERVALS) / 2
     }
 
@@ -225,7 +239,7 @@ impl Election {
         let rank = self.rank()?;
         let (since_ns, patience_ns, last) = match self.state {
             State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
-            State::Slave(master) => (master.answered_ns, self.silence_ns().max(DEAF_NS_MIN), Some(master.node)),
+            State::Slave(master) => (master.answered_ns, self.silence_ns().max(self.deaf_ns), Some(master.node)),
             State::Master(_) => return None,
         };
         let before = self.masters[..usize::from(rank)].iter().filter(|master| Some(**master) != last).count();

@@ -1,9 +1,16 @@
 //! A clock in time slots: what it may send is asked of it window by window, and the interval is the cycle.
+//!
+//! Syncs leave in the master's synchronisation window alone. Questions wait for a slot of the slave, answers for the master's next window.
+//! So from a Sync to the Request after it may be a cycle or more, in which both clocks drift: the sample of the exchange says so.
 
-use super::Clock;
+use super::{Clock, Draft};
+use crate::broken::broken;
+use crate::frame::{FrameHead, NodeIndex};
 use crate::time::coarse::Coarse;
 use crate::time::election::State;
-use crate::time::{InSlots, Reckoning, Step, SyncCounts, TIME_BYTES};
+use crate::time::message::Sync;
+use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES};
+use rohrpost_mailbox::TimeRecord;
 
 /// What of time may leave now.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -24,22 +31,35 @@ pub enum Allowed {
 /// What a clock in time slots remembers besides.
 #[derive(Debug)]
 pub(super) struct Slots {
-    pub(super) settings: InSlots,
-    pub(super) coarse: Coarse,
-    pub(super) counts: SyncCounts,
+    settings: InSlots,
+    coarse: Coarse,
+    counts: SyncCounts,
     /// The page goes by something else than what others go by now: a master that is not measured yet.
     pub(super) unsure: bool,
     /// What the master was off an earlier term when the page was made, ns: all its followers are so.
-    pub(super) master_error_ns: u64,
-    /// The last cycles of which a Sync of the master came, and any.
-    pub(super) heard_cycle: u64,
-    pub(super) lives_cycle: u64,
+    master_error_ns: u64,
+    /// The last cycles of which a Sync of the master came, and of which any did.
+    heard_cycle: u64,
+    lives_cycle: u64,
+    /// The cycle that is being synchronised, and who is next; whether the way to it is warm.
+    synced_cycle: u64,
+    next: usize,
+    is_warm: bool,
 }
 
+impl Slots {
+    /// The page goes by the master's time, which may be so far off that of an earlier term.
+    pub(super) fn goes_by(&mut self, master_error_ns: u64) {
+        (self.unsure, self.master_error_ns) = (false, master_error_ns);
+    }
+}
+
+/// What goes in a window.
 impl Clock {
     /// From now on it sends only what it is asked for with [`Clock::poll_in`], and goes by the rules of time slots. The interval is the cycle.
-    /// For a clock that is new.
+    /// For a clock that is new: it listens first, whatever its page says.
     pub fn in_slots(mut self, settings: InSlots) -> Self {
+        self.election.asks_after(JOINING_SYNCS.into());
         self.slots = Some(Box::new(Slots {
             settings,
             coarse: Coarse::default(),
@@ -48,6 +68,9 @@ impl Clock {
             master_error_ns: 0,
             heard_cycle: 0,
             lives_cycle: 0,
+            synced_cycle: 0,
+            next: 0,
+            is_warm: false,
         }));
         self
     }
@@ -56,17 +79,147 @@ impl Clock {
     /// sends when it has not heard the master's Sync of this cycle.
     pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
         self.advance(now_ns);
-        let _ = (allowed, datagram);
+        if allowed == Allowed::Slot && self.drafts.is_empty() && self.election.state() == State::Listening {
+            self.draft_hello(now_ns);
+        }
+        while let Some((to, draft)) = self.next_in(now_ns, allowed) {
+            if let Some(stamp) = self.write(now_ns, to, draft, datagram) {
+                return Step::Send { to, stamp };
+            }
+        }
         Step::Wait { until_ns: self.deadline_ns(now_ns) }
     }
 
+    fn next_in(&mut self, now_ns: u64, allowed: Allowed) -> Option<(NodeIndex, Draft)> {
+        let replies_wait = self.slots.as_ref()?.settings.replies_in_synchronisation;
+        let is_reply = |draft: &Draft| matches!(draft, Draft::Reply { .. });
+        match allowed {
+            Allowed::Nothing => None,
+            Allowed::Synchronisation { cycle, nominal_ns } => {
+                self.next_sync(now_ns, cycle, nominal_ns).or_else(|| self.take_draft(is_reply))
+            }
+            Allowed::Slot if broken!(SyncInForeignWindow) => {
+                let cycle = self.line.at(now_ns).ns / self.interval_ns;
+                self.next_sync(now_ns, cycle, cycle * self.interval_ns)
+            }
+            Allowed::Slot => self.take_draft(|draft| !(replies_wait && is_reply(draft))),
+        }
+    }
+
+    fn take_draft(&mut self, may_leave: impl Fn(&Draft) -> bool) -> Option<(NodeIndex, Draft)> {
+        let at = self.drafts.iter().position(|(_, draft)| may_leave(draft))?;
+        self.drafts.remove(at)
+    }
+
+    /// The next Sync of a cycle, or what goes before it; none when everyone has got one.
+    fn next_sync(&mut self, now_ns: u64, cycle: u64, nominal_ns: u64) -> Option<(NodeIndex, Draft)> {
+        let is_master = matches!(self.election.state(), State::Master(_));
+        if self.slots.as_ref()?.synced_cycle != cycle {
+            if !self.synchronises(cycle) {
+                return None;
+            }
+            let slots = self.slots.as_mut()?;
+            (slots.synced_cycle, slots.next, slots.is_warm) = (cycle, 0, false);
+            *(if is_master { &mut slots.counts.sent } else { &mut slots.counts.replacements_sent }) += 1;
+        }
+        let slots = self.slots.as_ref()?;
+        let to = self.receiver(cycle, slots.next)?;
+        let warms = slots.settings.warm_ups && is_master && !slots.is_warm;
+        let warms = warms && self.answers(&self.slaves[usize::from(to)], now_ns);
+        let slots = self.slots.as_mut()?;
+        slots.is_warm = warms;
+        if warms {
+            return Some((to, Draft::WarmUp));
+        }
+        slots.next += 1;
+        Some((to, if is_master { Draft::Sync { nominal_ns } } else { Draft::Replacement { nominal_ns } }))
+    }
+
+    /// Who gets the Sync at this place of a cycle: other masters first, since they would send in the place of one they do not hear;
+    /// then the others, another one first in each cycle, should there be room for some only.
+    fn receiver(&self, cycle: u64, place: usize) -> Option<NodeIndex> {
+        let own = self.settings.own;
+        let masters = self.election.masters();
+        let mut others = masters.iter().copied().filter(|master| *master != own);
+        if let Some(master) = others.nth(place) {
+            return Some(master);
+        }
+        let slaves = || (0..self.settings.nodes).filter(|node| *node != own && !masters.contains(node));
+        let (count, place) = (slaves().count(), place - masters.iter().filter(|master| **master != own).count());
+        (place < count).then(|| slaves().nth((place + (cycle % count as u64) as usize) % count)).flatten()
+    }
+
+    pub(super) fn write_replacement(&mut self, now_ns: u64, nominal_ns: u64) -> Option<Sync> {
+        let State::Slave(master) = self.election.state() else { return None };
+        self.last_id += 1;
+        Some(Sync {
+            id: self.last_id,
+            cycle: nominal_ns / self.interval_ns,
+            nominal_ns,
+            sent_ns: self.line.at(now_ns).ns,
+            error_ns: self.line.error_ns(now_ns),
+            epoch: master.epoch,
+            term: master.term,
+            began: master.began,
+            followed: false,
+            replacement: true,
+        })
+    }
+}
+
+/// What came, as far as slots are concerned.
+impl Clock {
+    /// A Sync of a master that this node heard, or a later one: whether the present master has not fallen silent, so that the two are
+    /// masters at once. Then their times may be two.
+    pub(super) fn is_contested(&self, received_ns: u64) -> bool {
+        match self.election.state() {
+            State::Listening => false,
+            State::Slave(master) => received_ns.saturating_sub(master.heard_ns) < 3 * self.interval_ns,
+            State::Master(_) => !broken!(KeepsOwnTime),
+        }
+    }
+
+    /// A Sync was taken.
+    pub(super) fn heard_in_slots(&mut self, received: Stamp, sync: &Sync, contested: bool, turned: bool) {
+        let Some(slots) = &mut self.slots else { return };
+        if turned {
+            slots.coarse.clear();
+            slots.heard_cycle = 0;
+        }
+        slots.unsure |= contested;
+        slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
+        if slots.heard_cycle != 0 {
+            slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
+        }
+        (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
+        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+    }
+
+    /// Another sent in the master's place: the cycle lives. That the master was not heard remains as it is.
+    pub(super) fn replaced(&mut self, received: Stamp, head: &FrameHead, sync: &Sync) -> Result<(), Ignored> {
+        let (State::Slave(master), Some(slots)) = (self.election.state(), &mut self.slots) else {
+            return Err(Ignored::Late);
+        };
+        if sync.term != master.term || !self.election.stands_behind(head.from, sync.term) {
+            return Err(Ignored::Late);
+        }
+        slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
+        slots.lives_cycle = sync.cycle;
+        if broken!(ReplacementCalibrates) {
+            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+        }
+        Ok(())
+    }
+}
+
+/// What a node in time slots goes by.
+impl Clock {
     /// By what a node in time slots goes. None if it has no time, or one that the present master has not confirmed.
-    pub fn reckoning(&self, now_ns: u64) -> Option<Reckoning> {
+    pub fn reckoning(&self) -> Option<Reckoning> {
         let slots = self.slots.as_ref().filter(|slots| !slots.unsure && self.line.is_synchronised())?;
-        let _ = now_ns;
         let record = *self.line.record();
         let error_ns = record.error_ns.saturating_sub(slots.master_error_ns);
-        Some(Reckoning::new(rohrpost_mailbox::TimeRecord { error_ns, ..record }))
+        Some(Reckoning::new(TimeRecord { error_ns, ..record }))
     }
 
     /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.
@@ -85,7 +238,7 @@ impl Clock {
     pub fn may_synchronise(&self) -> bool {
         match self.election.state() {
             State::Master(_) => true,
-            State::Slave(master) => self.election.rank().is_some_and(|rank| rank > master.term.rank()),
+            State::Slave(master) => self.election.stands_behind(self.settings.own, master.term),
             State::Listening => false,
         }
     }
@@ -94,7 +247,7 @@ impl Clock {
     pub fn synchronises(&self, cycle: u64) -> bool {
         let is_master = matches!(self.election.state(), State::Master(_));
         let is_missing = self.slots.as_ref().is_some_and(|slots| slots.lives_cycle < cycle);
-        is_master || (is_missing && self.may_synchronise())
+        is_master || ((is_missing || broken!(ReplacesHeard)) && self.may_synchronise())
     }
 
     /// What was sent and heard of synchronisation in time slots.
