@@ -149,6 +149,15 @@ impl Lab {
         self.node(node)?.namespace.enter()
     }
 
+    /// Takes this thread to the bridge, which all frames between nodes cross: a packet socket made there sees each when it comes in by the
+    /// port of its sender. As [`Lab::enter`].
+    ///
+    /// # Errors
+    /// When the system does not allow it.
+    pub fn enter_bridge(&self) -> Result<Inside, LabError> {
+        self.hub.enter()
+    }
+
     /// Starts a program on a node. Its parent is this thread: what it asks to be told of its parent's death, it is told of this thread's.
     ///
     /// # Errors
