@@ -206,8 +206,10 @@ impl Shell {
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
         let works = Works::new(clock)?.in_slots(table.for_clock());
+        let spin_ns = slots::spin_ns(table.cycle_ns());
         let (refusals, line) = sync_channel(slots::REFUSALS);
-        let slots = Slots::new(departures, works, Discipline::new(table, slots::SPIN_NS), self.socket.clone(), line);
+        let discipline = Discipline::new(table, spin_ns);
+        let slots = Slots::new(departures, works, discipline, self.socket.clone(), line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(refusals)

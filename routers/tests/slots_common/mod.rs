@@ -31,7 +31,7 @@ pub(crate) const NODES: u8 = 3;
 pub(crate) const MASTERS: [u8; 2] = [0, 1];
 const PORT: u16 = 21_117;
 /// What takes longer does not come any more, however busy the computer is.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Slots of 1 ms in a cycle of 10 ms; guards are wide, since all nodes share the processors of one computer with its other work.
 pub(crate) fn table() -> Tdma {
@@ -267,12 +267,10 @@ fn watch(socket: &OwnedFd, ends: &AtomicBool) -> Vec<Crossed> {
     loop {
         let mut parts = [IoSliceMut::new(&mut bytes)];
         let read = recvmsg::<LinkAddr>(socket.as_raw_fd(), &mut parts, Some(&mut control), MsgFlags::empty());
-        let Ok(message) = read else {
-            if ends.load(Ordering::Relaxed) {
-                return seen;
-            }
-            continue;
-        };
+        if ends.load(Ordering::Relaxed) {
+            return seen;
+        }
+        let Ok(message) = read else { continue };
         let stamp = message.cmsgs().unwrap().find_map(|message| match message {
             ControlMessageOwned::ScmTimestampns(stamp) => Some(stamp.num_nanoseconds() as u64),
             _ => None,

@@ -32,8 +32,11 @@ use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc;
 
-/// It wakes up so much before the call, and spins: the kernel wakes it up to some ten microseconds late.
-pub(super) const SPIN_NS: u64 = 100_000;
+/// It wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it wakes
+/// up 50 µs late on average, and to read takes 30 µs.
+const SPIN_NS_MAX: u64 = 150_000;
+/// Of the cycle, at most this part for each window: short cycles leave less time for it.
+const SPIN_CYCLES: u64 = 20;
 /// In the last moments before the call nothing is begun that might last until then.
 const QUIET_NS: u64 = 20_000;
 /// The mailbox is looked into this often: it has room for a burst of 64 packages.
@@ -46,6 +49,11 @@ const FEW: usize = 4;
 pub(super) const REFUSAL_BYTES: usize = 128;
 /// Refusals that wait for a slot; more are lost, and said again a second later.
 pub(super) const REFUSALS: usize = 8;
+
+/// How long before the call it is to wake up, ns.
+pub(super) fn spin_ns(cycle_ns: u64) -> u64 {
+    SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)
+}
 
 /// A refusal that the thread that receives wants to have sent.
 pub(super) struct Refusal {
