@@ -92,7 +92,7 @@ pub(super) struct Slots {
 #[derive(Clone, Copy)]
 struct First {
     id: SentId,
-    /// When it was handed over, local ns.
+    /// When its window was asked for, local ns.
     called_ns: u64,
     /// When the window begins, local ns.
     begin_ns: u64,
@@ -217,7 +217,7 @@ impl Slots {
         let called_ns = self.works.now_ns();
         let Verdict::Send(mut permit) = self.discipline.judge(planned, called_ns, &self.works.clock) else { return };
         self.first = None;
-        self.send_time(&mut permit);
+        self.send_time(&mut permit, called_ns);
         if permit.carries == Carries::All {
             self.refuse(&mut permit);
             self.send_packages(&mut permit);
@@ -261,7 +261,8 @@ impl Slots {
         }
     }
 
-    fn send_time(&mut self, permit: &mut Permit) {
+    /// `called_ns`: when the window was asked for. From there on it counts how long the first frame takes to the wire.
+    fn send_time(&mut self, permit: &mut Permit, called_ns: u64) {
         let mut datagram = [0; TIME_BYTES];
         while permit.fits(self.works.now_ns(), TIME_BYTES)
             && let Step::Send { to, .. } =
@@ -273,11 +274,11 @@ impl Slots {
                 return;
             }
             permit.takes(now_ns, TIME_BYTES);
+            self.works.send(to, &datagram);
             if permit.datagrams() == 1 {
                 let id = FrameHead::parse(&datagram).ok().map(|(head, _)| SentId { to, sequence: head.sequence });
-                self.first = id.map(|id| First { id, called_ns: now_ns, begin_ns: permit.begin_ns });
+                self.first = id.map(|id| First { id, called_ns, begin_ns: permit.begin_ns });
             }
-            self.works.send(to, &datagram);
         }
     }
 
