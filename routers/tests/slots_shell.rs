@@ -91,7 +91,7 @@ fn tell(what: &str, judged: &Judged) {
     println!(
         "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us after their nominal time",
         judged.frames,
-        judged.outside,
+        judged.outside.len(),
         at(10),
         at(500),
         at(990),
@@ -103,7 +103,7 @@ fn assert_kept(what: &str, crossed: &[Crossed], time: &rohrpost_mailbox::TimeRec
     let judged = judge(crossed, time);
     tell(what, &judged);
     assert!(judged.frames > 100, "{judged:?}");
-    assert!(judged.outside * 1000 <= judged.frames * OUTSIDE_PER_THOUSAND, "{what}: {judged:?}");
+    assert!(judged.outside.len() * 1000 <= judged.frames * OUTSIDE_PER_THOUSAND, "{what}: {judged:?}");
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
     for station in &segment.stations[1..] {
         let counts = station.slots().counts;
         let given_up = counts.late + counts.skipped;
-        assert!(given_up * 4 <= counts.used + counts.empty, "node {}: {counts:?}", station.own);
+        assert!(given_up * 2 <= counts.used + counts.empty, "node {}: {counts:?}", station.own);
     }
 
     // It comes back, listens, and speaks again.
@@ -158,4 +158,31 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
     let numbers: Vec<_> = (0..20).collect();
     numbers.iter().for_each(|id| mouths_of_all.iter_mut().for_each(|mouth| mouth.say(*id)));
     ears.hear_all(&all, &numbers);
+}
+
+#[test]
+fn a_refusal_waits_for_a_slot() {
+    let Some(mut segment) = Segment::start() else { return };
+    segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
+    let time = segment.stations[0].clock().record;
+    segment.stations[2].shell = None;
+    let capture = Capture::start(&segment.lab);
+    // In the place of node 2 now somebody speaks who has another configuration, and whenever he likes.
+    let stranger = segment.socket(2);
+    let (mut heard, began) = ([0; 128], Instant::now());
+    let refusals = loop {
+        for node in [0, 1] {
+            stranger.send_to(&common::of_another_digest(2, node), common::at(node)).unwrap();
+        }
+        let seen = common::frames(&stranger, &mut heard).filter(|kind| *kind == Kind::Refusal).count();
+        if seen > 0 {
+            break seen;
+        }
+        assert!(began.elapsed() < PATIENCE, "nobody refuses");
+    };
+    let mut crossed = capture.end();
+    crossed.retain(|frame| frame.kind == Kind::Refusal);
+    assert!(crossed.len() >= refusals);
+    let judged = judge(&crossed, &time);
+    assert!(judged.outside.is_empty(), "{judged:?}");
 }

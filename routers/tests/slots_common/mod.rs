@@ -11,7 +11,7 @@ use rohrpost_config::{Network, Route, Tdma, TimeSlot};
 use rohrpost_mailbox::{
     Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type, monotonic_ns, realtime_ns,
 };
-use rohrpost_routers::frame::{FrameHead, Kind};
+use rohrpost_routers::frame::{Alive, FrameHead, Kind};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::{ClockParts, Skew};
@@ -19,10 +19,10 @@ use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered, slots};
 use rohrpost_routers::tdma::Table;
 use rohrpost_routers::time::TimeSettings;
 use std::io::{IoSliceMut, Write};
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::os::fd::{AsRawFd, OwnedFd};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -53,6 +53,26 @@ pub(crate) fn table() -> Tdma {
         tunnel: None,
         line: 0,
     }
+}
+
+/// Where the router of a node takes datagrams.
+pub(crate) fn at(node: u8) -> SocketAddr {
+    SocketAddr::new(address(node), PORT)
+}
+
+/// "Still there", from a node that was launched from another file.
+pub(crate) fn of_another_digest(from: u8, to: u8) -> Vec<u8> {
+    let alive = Alive::default().to_bytes();
+    let head = FrameHead { kind: Kind::Alive, system: 1, from, to, digest: 8, incarnation: 1, sequence: 0 };
+    [&head.to_bytes(&[&alive])[..], &alive].concat()
+}
+
+/// Kinds of the datagrams that came, until none comes for a moment.
+pub(crate) fn frames<'a>(socket: &'a UdpSocket, buffer: &'a mut [u8]) -> impl Iterator<Item = Kind> + 'a {
+    std::iter::from_fn(|| {
+        let bytes = socket.recv(buffer).ok()?;
+        FrameHead::parse(&buffer[..bytes]).ok().map(|(head, _)| head.kind)
+    })
 }
 
 fn address(node: u8) -> IpAddr {
@@ -151,11 +171,15 @@ pub(crate) struct Segment {
     pub(crate) stations: Vec<Station>,
     pub(crate) lab: Lab,
     _folder: tempfile::TempDir,
+    _turn: MutexGuard<'static, ()>,
 }
 
 impl Segment {
     /// Starts all; none where namespaces are not allowed.
     pub(crate) fn start() -> Option<Self> {
+        // Two networks at a time would be in each other's way.
+        static TURN: Mutex<()> = Mutex::new(());
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let spec = |node: u8| NodeSpec { name: format!("n{node}"), address: address(node) };
         let lab = match Lab::new(&(0..NODES).map(spec).collect::<Vec<_>>(), 1500) {
             Ok(lab) => lab,
@@ -181,7 +205,15 @@ impl Segment {
         };
         let mut stations: Vec<_> = (0..NODES).map(station).collect();
         stations.iter_mut().for_each(|station| station.start(&lab));
-        Some(Self { stations, lab, _folder: folder })
+        Some(Self { stations, lab, _folder: folder, _turn: turn })
+    }
+
+    /// In the place of a node's router.
+    pub(crate) fn socket(&self, node: u8) -> UdpSocket {
+        let _inside = self.lab.enter(&format!("n{node}")).unwrap();
+        let socket = UdpSocket::bind(at(node)).unwrap();
+        socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+        socket
     }
 
     pub(crate) fn wait_until(&self, what: &str, done: impl Fn(&Self) -> bool) {
@@ -291,7 +323,7 @@ fn watch(socket: &OwnedFd, ends: &AtomicBool) -> Vec<Crossed> {
 pub(crate) struct Judged {
     pub(crate) frames: usize,
     /// Of these, in a window of another, or in nobody's.
-    pub(crate) outside: usize,
+    pub(crate) outside: Vec<Kind>,
     /// Of the first frames of slots: how long after the beginning, ns; sorted.
     pub(crate) starts_ns: Vec<i64>,
 }
@@ -307,7 +339,7 @@ pub(crate) fn judge(crossed: &[Crossed], time: &TimeRecord) -> Judged {
         let moments = [at_ns, at_ns + table.allowance_ns()];
         let owner = moments.into_iter().filter_map(|ns| table.owner(ns)).find(|owner| owner.node == frame.from);
         let Some(owner) = owner else {
-            judged.outside += 1;
+            judged.outside.push(frame.kind);
             continue;
         };
         if last != Some((frame.from, owner.window)) {
