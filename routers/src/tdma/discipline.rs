@@ -87,7 +87,7 @@ pub struct Counts {
     pub late: u64,
     /// Slots that went by without any wake-up: the thread stood still.
     pub skipped: u64,
-    /// Slots not used because the time was not sure enough.
+    /// Slots without packages because the time was not sure enough.
     pub silent: u64,
     /// Datagrams in slots and synchronisation windows.
     pub datagrams: u64,
@@ -193,8 +193,11 @@ impl Discipline {
         self.counts.datagrams += permit.datagrams();
         self.counts.wire_bytes += permit.wire_bytes();
         if let Kind::Slot { .. } = permit.window.kind {
-            let count = if permit.datagrams() > 0 { &mut self.counts.used } else { &mut self.counts.empty };
-            *count += 1;
+            *match (permit.carries, permit.datagrams()) {
+                (Carries::Time, _) => &mut self.counts.silent,
+                (Carries::All, 0) => &mut self.counts.empty,
+                (Carries::All, _) => &mut self.counts.used,
+            } += 1;
         }
     }
 

@@ -69,7 +69,7 @@ pub struct TimeShare {
     pub warm_ups: bool,
     /// Replies go in the synchronisation window alone.
     pub replies_in_synchronisation: bool,
-    /// Every other node gets a Sync in each cycle. If not, backup masters get theirs first, and the others in turns: too few to rely on.
+    /// Every other node gets a Sync in each cycle. If not, some do in turns, and all others miss some: too few to rely on.
     pub suffices: bool,
     /// Frames of time at most in each slot of a node.
     pub frames_in_slot: usize,

@@ -6,7 +6,7 @@ mod slots;
 
 use super::broken::Broken;
 use super::election::{Election, State};
-use super::history::History;
+use super::history::{History, RATE_MAX};
 use super::line::{EVEN_PPB, Line};
 use super::message::{Message, Request};
 use super::types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
@@ -58,6 +58,13 @@ enum Draft {
     Replacement { nominal_ns: u64 },
     Request { id: u64 },
     Reply { id: u64, came: Stamp },
+}
+
+impl Draft {
+    /// Whether it matters when it leaves.
+    fn is_stamped(&self) -> bool {
+        matches!(self, Self::Sync { .. } | Self::Replacement { .. } | Self::Request { id: 1.. })
+    }
 }
 
 /// The sans-I/O core of time. See the module's own page.
@@ -277,6 +284,9 @@ impl Clock {
     fn forget(&mut self) {
         if !self.is(Broken::OldSamples) {
             self.history.clear();
+        }
+        if self.slots.is_some() {
+            self.history.fades(2.0 * RATE_MAX);
         }
         self.asked = [Asked::default(); PENDING];
         self.asked_ns = 0;

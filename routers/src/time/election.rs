@@ -189,6 +189,11 @@ impl Election {
         }
     }
 
+    /// Somebody that has time sent in the place of the master.
+    pub(super) fn replaced(&mut self, received_ns: u64) {
+        self.timed_heard_ns = Some(received_ns);
+    }
+
     pub(super) fn speaks_of(&mut self, term: Term, epoch: u64) {
         self.highest = self.highest.max(term);
         self.highest_epoch = self.highest_epoch.max(epoch);

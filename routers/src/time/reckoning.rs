@@ -11,7 +11,7 @@ pub struct Reckoning {
 }
 
 impl Reckoning {
-    pub(super) fn new(record: TimeRecord) -> Self {
+    pub(crate) fn new(record: TimeRecord) -> Self {
         Self { record }
     }
 

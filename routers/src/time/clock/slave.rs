@@ -105,6 +105,9 @@ impl Clock {
             return;
         };
         self.usual_rate = estimate.rate;
+        if self.slots.is_some() {
+            self.history.fades(estimate.rate_high - estimate.rate_low);
+        }
         let pace_ppb = EVEN_PPB.saturating_add_signed((estimate.rate * 1e9).round() as i64);
         let drift_ns_s = self.drift_ns_s(&estimate, pace_ppb);
         let target_ns = now_ns.saturating_add_signed(estimate.offset_ns);

@@ -18,14 +18,29 @@ pub enum Allowed {
     /// Nothing: only what the passing of time does, with roles, page and bound.
     Nothing,
     /// It is a slot of this node: what asks and answers.
-    Slot,
+    Slot {
+        /// What is stamped waits until then, local ns: when the wire has carried what was handed over before. Else it might stand in the
+        /// queue of a network card after its stamp, and the way seem longer than it is. 0: it does not wait.
+        free_ns: u64,
+    },
     /// It is the window of this node's synchronisation.
     Synchronisation {
         /// Of this cycle.
         cycle: u64,
         /// When the window begins, system ns.
         nominal_ns: u64,
+        /// As in a slot.
+        free_ns: u64,
     },
+}
+
+impl Allowed {
+    fn free_ns(self) -> u64 {
+        match self {
+            Self::Nothing => 0,
+            Self::Slot { free_ns } | Self::Synchronisation { free_ns, .. } => free_ns,
+        }
+    }
 }
 
 /// What a clock in time slots remembers besides.
@@ -72,17 +87,24 @@ impl Clock {
             next: 0,
             is_warm: false,
         }));
+        self.forget();
         self
     }
 
     /// As [`Clock::poll`], of a clock in time slots: what may leave now. All that came is to be handed over before: a backup master
-    /// sends when it has not heard the master's Sync of this cycle.
+    /// sends when it has not heard the master's Sync of this cycle. It may have to wait until the wire is free, within the window: until
+    /// then nothing else should be handed over. What has to wait for another window is not waited for.
     pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
         self.advance(now_ns);
-        if allowed == Allowed::Slot && self.drafts.is_empty() && self.election.state() == State::Listening {
+        let is_slot = matches!(allowed, Allowed::Slot { .. });
+        if is_slot && self.drafts.is_empty() && self.election.state() == State::Listening {
             self.draft_hello(now_ns);
         }
         while let Some((to, draft)) = self.next_in(now_ns, allowed) {
+            if draft.is_stamped() && now_ns < allowed.free_ns() {
+                self.put_back(to, draft);
+                return Step::Wait { until_ns: allowed.free_ns() };
+            }
             if let Some(stamp) = self.write(now_ns, to, draft, datagram) {
                 return Step::Send { to, stamp };
             }
@@ -95,14 +117,25 @@ impl Clock {
         let is_reply = |draft: &Draft| matches!(draft, Draft::Reply { .. });
         match allowed {
             Allowed::Nothing => None,
-            Allowed::Synchronisation { cycle, nominal_ns } => {
+            Allowed::Synchronisation { cycle, nominal_ns, .. } => {
                 self.next_sync(now_ns, cycle, nominal_ns).or_else(|| self.take_draft(is_reply))
             }
-            Allowed::Slot if broken!(SyncInForeignWindow) => {
+            Allowed::Slot { .. } if broken!(SyncInForeignWindow) => {
                 let cycle = self.line.at(now_ns).ns / self.interval_ns;
-                self.next_sync(now_ns, cycle, cycle * self.interval_ns)
+                let sync = self.next_sync(now_ns, cycle, cycle * self.interval_ns);
+                sync.or_else(|| self.take_draft(|_| true))
             }
-            Allowed::Slot => self.take_draft(|draft| !(replies_wait && is_reply(draft))),
+            Allowed::Slot { .. } => self.take_draft(|draft| !(replies_wait && is_reply(draft))),
+        }
+    }
+
+    /// It was next, and is again.
+    fn put_back(&mut self, to: NodeIndex, draft: Draft) {
+        match (draft, &mut self.slots) {
+            (Draft::Sync { .. } | Draft::Replacement { .. }, Some(slots)) => {
+                (slots.next, slots.is_warm) = (slots.next - 1, true)
+            }
+            _ => self.drafts.push_front((to, draft)),
         }
     }
 
@@ -135,18 +168,13 @@ impl Clock {
         Some((to, if is_master { Draft::Sync { nominal_ns } } else { Draft::Replacement { nominal_ns } }))
     }
 
-    /// Who gets the Sync at this place of a cycle: other masters first, since they would send in the place of one they do not hear;
-    /// then the others, another one first in each cycle, should there be room for some only.
+    /// Who gets the Sync at this place of a cycle: each time another one first, since the first finds the wire empty.
     fn receiver(&self, cycle: u64, place: usize) -> Option<NodeIndex> {
-        let own = self.settings.own;
-        let masters = self.election.masters();
-        let mut others = masters.iter().copied().filter(|master| *master != own);
-        if let Some(master) = others.nth(place) {
-            return Some(master);
-        }
-        let slaves = || (0..self.settings.nodes).filter(|node| *node != own && !masters.contains(node));
-        let (count, place) = (slaves().count(), place - masters.iter().filter(|master| **master != own).count());
-        (place < count).then(|| slaves().nth((place + (cycle % count as u64) as usize) % count)).flatten()
+        let (nodes, own) = (u64::from(self.settings.nodes), u64::from(self.settings.own));
+        let others = nodes.saturating_sub(1);
+        // Counted from this node on, without it.
+        let after = (place as u64) < others;
+        after.then(|| ((own + 1 + (place as u64 + cycle % others) % others) % nodes) as NodeIndex)
     }
 
     pub(super) fn write_replacement(&mut self, now_ns: u64, nominal_ns: u64) -> Option<Sync> {
@@ -186,7 +214,10 @@ impl Clock {
             slots.coarse.clear();
             slots.heard_cycle = 0;
         }
-        slots.unsure |= contested;
+        // A master that had no time begins another: to go on by the old one is to send in the slots of those who follow it.
+        let off_ns = sync.sent_ns.abs_diff(self.line.at(received.ns).ns);
+        let is_other = sync.epoch != self.line.record().epoch || off_ns > 2 * slots.settings.delay_max_ns;
+        slots.unsure |= contested || (turned && is_other);
         slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
         if slots.heard_cycle != 0 {
             slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
@@ -203,6 +234,7 @@ impl Clock {
         if sync.term != master.term || !self.election.stands_behind(head.from, sync.term) {
             return Err(Ignored::Late);
         }
+        self.election.replaced(received.ns);
         slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
         slots.lives_cycle = sync.cycle;
         if broken!(ReplacementCalibrates) {
