@@ -1,9 +1,11 @@
-//! What the kernel is asked for a process: its scheduling and its memory. A refusal is told, not fatal.
+//! What the kernel is asked for a process: its scheduling, its memory, a device for IP packets. A refusal is told, not fatal.
 
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use nix::sys::statvfs::statvfs;
+use std::fs::File;
 use std::io;
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::path::Path;
 
 /// How a process is scheduled.
@@ -161,6 +163,27 @@ pub struct Room {
 pub fn room(path: &Path) -> io::Result<Room> {
     let told = statvfs(path)?;
     Ok(Room { bytes: told.blocks() * told.fragment_size(), free: told.blocks_available() * told.fragment_size() })
+}
+
+/// Makes a TUN device in the network of the calling thread; `%d` in its name becomes a number that is free. Each read brings one IP packet
+/// that the kernel sends by it, each write hands the kernel one that has come. It vanishes with the last descriptor.
+///
+/// # Errors
+/// Mostly EPERM: it needs CAP_NET_ADMIN; ENOENT: the kernel has no `tun`, or a container no `/dev/net/tun`.
+pub fn tun(name: &str) -> io::Result<(OwnedFd, String)> {
+    let device = File::options().read(true).write(true).open("/dev/net/tun")?;
+    // SAFETY: numbers and bytes, for which zero is a value.
+    let mut request: libc::ifreq = unsafe { std::mem::zeroed() };
+    // The last byte stays 0.
+    let room = request.ifr_name.len() - 1;
+    for (to, from) in request.ifr_name[..room].iter_mut().zip(name.bytes()) {
+        *to = from as libc::c_char;
+    }
+    request.ifr_ifru.ifru_flags = (libc::IFF_TUN | libc::IFF_NO_PI) as libc::c_short;
+    // SAFETY: reads and writes the request, which lives here, and is what TUNSETIFF takes.
+    check(unsafe { libc::ioctl(device.as_raw_fd(), libc::TUNSETIFF, &raw mut request) })?;
+    let name = request.ifr_name.iter().map(|byte| *byte as u8).take_while(|byte| *byte != 0);
+    Ok((device.into(), String::from_utf8_lossy(&name.collect::<Vec<_>>()).into_owned()))
 }
 
 fn check(result: i32) -> io::Result<()> {

@@ -12,12 +12,11 @@
 //! meanwhile stay in. Whoever is not root goes into a user namespace first ([`become_able`]).
 
 mod namespace;
-mod netlink;
 
 pub use namespace::{Inside, become_able};
 
+use crate::netlink::{Device, End};
 use namespace::Namespace;
-use netlink::{Device, End};
 use std::io;
 use std::net::IpAddr;
 use std::process::{Child, Command};
@@ -128,7 +127,7 @@ impl Lab {
             told(&format!("set the link of {at} up"), hub.set_up(node.port, true))?;
             let (mut inside, address) = (node.namespace.netlink()?, node.spec.address);
             told(&format!("set the loopback of {at} up"), inside.set_up(LOOPBACK, true))?;
-            told(&format!("give {at} the address {address}"), inside.add_address(LAN, address))?;
+            told(&format!("give {at} the address {address}"), inside.add_address(LAN, address, None))?;
             told(&format!("set the device of {at} up"), inside.set_up(LAN, true))?;
             told(&format!("give {at} its route"), inside.add_route_to_all(LAN, address))?;
         }

@@ -27,6 +27,7 @@ pub mod slots;
 mod socket;
 mod threads;
 mod transit;
+pub mod tunnel;
 mod ways;
 
 pub use ages::Ages;
@@ -105,6 +106,7 @@ pub struct Shell {
     socket: Arc<InSocket>,
     clock: Option<Arc<ClockState>>,
     slots: Option<Arc<slots::State>>,
+    tunnel: Option<Arc<tunnel::Passed>>,
     /// The clock's own thread.
     service: Option<ClockService>,
     threads: Vec<JoinHandle<()>>,
@@ -168,11 +170,13 @@ impl Shell {
             socket,
             clock: None,
             slots: None,
+            tunnel: None,
             service: None,
             threads: Vec::new(),
         };
         if shell.settings.tdma.is_some() {
             arrivals.refusals = Some(shell.send_in_slots(departures, clock.ok_or(ShellError::NoTime)?)?);
+            shell.open_tunnel(node, name)?;
         } else {
             shell.service = clock.map(ClockService::start).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
@@ -215,6 +219,25 @@ impl Shell {
         Ok(refusals)
     }
 
+    /// Where there are time slots, ordinary traffic may cross the network through them alone. Without the right to a device it is told, and all
+    /// else goes on.
+    fn open_tunnel(&mut self, node: &Arc<Node>, name: Name) -> Result<(), ShellError> {
+        let settings = self.settings.clone();
+        let Some(wanted) = settings.tdma.as_ref().and_then(|tdma| tdma.tunnel) else { return Ok(()) };
+        let participants = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
+        match tunnel::ends(&settings, &wanted, name, &self.stats, &self.shared, &participants) {
+            Ok((outgoing, incoming, passed)) => {
+                self.tunnel = Some(passed);
+                self.begin("tunnel-out", move || outgoing.run())?;
+                self.begin("tunnel-in", move || incoming.run())
+            }
+            Err(error) => {
+                tracing::warn!("there is no tunnel for ordinary traffic: {error}");
+                Ok(())
+            }
+        }
+    }
+
     fn begin(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), ShellError> {
         let begun = std::thread::Builder::new().name(name.into()).spawn(run);
         self.threads.push(begun.map_err(ShellError::Thread)?);
@@ -229,6 +252,11 @@ impl Shell {
     /// How it stands with time slots, where there are any.
     pub fn slots(&self) -> Option<&Arc<slots::State>> {
         self.slots.as_ref()
+    }
+
+    /// What went through the tunnel for ordinary traffic, where there is one.
+    pub fn tunnel(&self) -> Option<&Arc<tunnel::Passed>> {
+        self.tunnel.as_ref()
     }
 
     /// Who it is, who the others are.

@@ -7,7 +7,7 @@ use nix::sys::socket::{
     socket, sockopt,
 };
 use nix::sys::time::{TimeVal, TimeValLike};
-use rohrpost_config::{Network, Route, Tdma, TimeSlot};
+use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
 use rohrpost_mailbox::{
     Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type, monotonic_ns, realtime_ns,
 };
@@ -84,6 +84,10 @@ pub(crate) fn module(node: u8) -> Name {
     Name::new(1, 100, node, 0)
 }
 
+fn router(node: u8) -> Name {
+    Name::new(1, 250, node, 0)
+}
+
 struct Silence;
 
 impl Faults for Silence {
@@ -122,7 +126,7 @@ impl Station {
             skew: Some(self.skew),
             observer: None,
         };
-        let name = Name::new(1, 250, self.own, 0);
+        let name = router(self.own);
         let _inside = lab.enter(&format!("n{}", self.own)).unwrap();
         let parts =
             Parts { node: &self.node, name, settings, faults: Arc::new(Silence), impair: None, clock: Some(clock) };
@@ -177,6 +181,11 @@ pub(crate) struct Segment {
 impl Segment {
     /// Starts all; none where namespaces are not allowed.
     pub(crate) fn start() -> Option<Self> {
+        Self::with(None)
+    }
+
+    /// With a tunnel for ordinary traffic.
+    pub(crate) fn with(tunnel: Option<Tunnel>) -> Option<Self> {
         // Two networks at a time would be in each other's way.
         static TURN: Mutex<()> = Mutex::new(());
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -194,7 +203,7 @@ impl Segment {
         let station = |own: u8| Station {
             own,
             node: Node::create(&folder.path().join(format!("n{own}")), 0o700).unwrap(),
-            settings: settings(own),
+            settings: settings(own, tunnel),
             skew: Skew {
                 offset_ns: u64::from(own) * 1_234_000_000,
                 rate_ppb: i64::from(own) * 20_000,
@@ -227,8 +236,9 @@ impl Segment {
     }
 }
 
-fn settings(own: u8) -> Settings {
-    let route = |node| Route { first: module(node), last: module(node).with_local(255), node };
+fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
+    let others = || (0..NODES).filter(|node| *node != own);
+    let route = |name: Name| Route { first: name, last: name.with_local(255), node: name.instance() };
     Settings {
         system: 1,
         own,
@@ -243,8 +253,8 @@ fn settings(own: u8) -> Settings {
             quota_bytes: 1 << 20,
             bulk_below: 16,
         },
-        tdma: Some(table()),
-        routes: (0..NODES).filter(|node| *node != own).map(route).collect(),
+        tdma: Some(Tdma { tunnel, ..table() }),
+        routes: others().map(module).chain(others().map(router)).map(route).collect(),
         senders: vec![vec![module(own)]],
     }
 }

@@ -32,6 +32,7 @@ fn any_tdma() -> impl Strategy<Value = (Tdma, Vec<u8>)> {
                 guard: Duration::from_micros(guard_us),
                 link_bytes_s: 12_500_000,
                 slots,
+                tunnel: None,
                 line: 0,
             };
             (tdma, masters)

@@ -41,6 +41,7 @@ pub(super) fn tdma() -> Tdma {
             slot(2, 1_600, 500, 1, 0),
             slot(2, 3_000, 400, 3, 1),
         ],
+        tunnel: None,
         line: 0,
     }
 }
