@@ -43,7 +43,7 @@ fn tcp_goes_through_the_slots_and_packages_go_before_it() {
     let mut stream = TcpStream::connect_timeout(&there, PATIENCE).unwrap();
     drop(inside);
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    let said: Vec<u8> = (0..BYTES).map(|at| (at * 31 >> 3) as u8).collect();
+    let said: Vec<u8> = (0..BYTES).map(|at| ((at * 31) >> 3) as u8).collect();
     let talk = std::thread::spawn({
         let said = said.clone();
         move || {
