@@ -91,6 +91,11 @@ impl Network {
         if priority.0 < self.bulk_below { LEVEL_NOT_REAL_TIME } else { (15 - (priority.0 >> 4)) * 2 }
     }
 
+    /// What IP and UDP put before each datagram.
+    pub(crate) fn heads_bytes(is_v6: bool) -> usize {
+        if is_v6 { HEADS_V6 } else { HEADS_V4 }
+    }
+
     /// `tdma` are the time slots in which nodes send, if they do.
     pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) -> Self {
         if nodes.len() == 1 {
@@ -118,7 +123,7 @@ impl Network {
         let quota = section.get("quota").and_then(|item| item.size(QUOTAS, "256 KiB"));
         let bulk = section.get("bulk-below").and_then(|item| item.whole(0..=255, BULK_BELOW.into()));
         section.finish();
-        let heads = if is_v6 { HEADS_V6 } else { HEADS_V4 };
+        let heads = Self::heads_bytes(is_v6);
         Self {
             port: port.map_or(PORT, |port| port as u16),
             mtu: mtu as u16,

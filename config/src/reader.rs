@@ -36,6 +36,11 @@ impl<'d> Reader<'d> {
         self.problems.borrow_mut().push(Problem { line: Some(line), message: message.into() });
     }
 
+    /// Whether nothing is wrong so far.
+    pub(crate) fn is_content(&self) -> bool {
+        self.problems.borrow().is_empty()
+    }
+
     /// What the parser says of a text that is no TOML.
     pub(crate) fn report_syntax(&self, error: &toml::de::Error) {
         let span = error.span().unwrap_or(0..0);

@@ -4,11 +4,18 @@
 //! each master's synchronisation; behind them lie the slots of the nodes. Who sends ends the guard before its slot does, so that
 //! clocks that differ by less than the guard never have two nodes on the wire at once.
 
+mod judge;
+
+pub(crate) use judge::judge;
+
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
 use std::net::Ipv4Addr;
 use std::ops::RangeInclusive;
 use std::time::Duration;
+
+/// A slot is begun so late at most; later it is left unused.
+pub const LATE: Duration = Duration::from_micros(50);
 
 const CYCLE: Duration = Duration::from_millis(5);
 /// Below it a Linux computer wakes up too late too often; above it a package waits for longer than it may.
@@ -157,6 +164,11 @@ impl Tdma {
         })
     }
 
+    /// Cycles after which the table repeats itself.
+    pub fn cycles(&self) -> u64 {
+        cycles(self.slots.iter())
+    }
+
     /// Bytes that may leave in a slot or window of a length: those that the link carries before the guard begins, the heads of Ethernet,
     /// IP and UDP counted.
     pub fn budget_bytes(&self, length: Duration) -> u64 {
@@ -180,6 +192,16 @@ impl Tdma {
             self.slots.iter().map(slot).collect::<String>()
         )
     }
+}
+
+/// Cycles after which these slots repeat themselves.
+pub(crate) fn cycles<'s>(slots: impl Iterator<Item = &'s TimeSlot>) -> u64 {
+    slots.fold(1, |all, slot| all / common(all, slot.period.into()) * u64::from(slot.period))
+}
+
+/// Greatest common divisor.
+pub(crate) fn common(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { common(b, a % b) }
 }
 
 fn read_cycle(item: &Item<'_>) -> Option<Duration> {

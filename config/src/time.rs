@@ -32,6 +32,14 @@ pub enum TimeSource {
 }
 
 impl TimeSource {
+    /// Nodes that may be master, by their place in the file; the first that runs is. None if time is no node's.
+    pub fn masters(&self) -> &[u8] {
+        match self {
+            Self::Master { masters, .. } => masters,
+            _ => &[],
+        }
+    }
+
     /// `file` is asked for the line of what is missing; `cycle` is that of the time slots, if there are any.
     pub(crate) fn read(
         section: Option<Section<'_>>,

@@ -89,6 +89,22 @@ pub fn duration_text(duration: Duration) -> String {
     if nanos == 0 { "0 s".into() } else { whole(nanos, units) }
 }
 
+/// Writes a duration as people say it, with a fraction: "5.46 ms". [`parse_duration`] reads it back.
+///
+/// ```
+/// # use rohrpost_config::duration_decimal;
+/// # use std::time::Duration;
+/// assert_eq!(duration_decimal(Duration::from_micros(5460)), "5.46 ms");
+/// assert_eq!(duration_decimal(Duration::from_micros(460)), "460 us");
+/// ```
+pub fn duration_decimal(duration: Duration) -> String {
+    let nanos = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+    let Some((unit, one)) = TIME[2..].iter().find(|(_, one)| nanos >= *one) else { return "0 s".into() };
+    let fraction = format!("{:0width$}", nanos % one, width = one.ilog10() as usize);
+    let number = format!("{}.{}", nanos / one, if *one == 1 { "" } else { &fraction });
+    format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// Writes a size as [`parse_size`] reads it, in the largest unit that keeps it whole.
 pub fn size_text(bytes: u64) -> String {
     if bytes == 0 { "0 B".into() } else { whole(bytes, &SIZE) }
@@ -189,6 +205,7 @@ mod tests {
         fn what_is_written_reads_back(value: u64) {
             let duration = Duration::from_nanos(value);
             prop_assert_eq!(parse_duration(&duration_text(duration)), Ok(duration));
+            prop_assert_eq!(parse_duration(&duration_decimal(duration)), Ok(duration));
             prop_assert_eq!(parse_size(&size_text(value)), Ok(value));
             prop_assert_eq!(parse_rate(&rate_text(value)), Ok(value));
         }

@@ -1,6 +1,6 @@
 //! What a file of time slots means for routers.
 
-use rohrpost_config::{Installation, TimeSlot, TimeSource, Tunnel};
+use rohrpost_config::{Installation, TimeSlot, TimeSource, Tunnel, bounds, duration_text, parse_duration};
 use std::net::Ipv4Addr;
 use std::path::Path;
 use std::time::Duration;
@@ -74,4 +74,72 @@ fn nodes_of_other_tables_do_not_understand_each_other() {
     let (last, rest) = last.split_once("[time]").unwrap();
     let turned = format!("{head}[[slot]]{last}\n[[slot]]{brain}\n[[slot]]{base}\n[time]{rest}");
     assert_eq!(parse(&turned).digest().lan(), own, "their order in the file does not count");
+}
+
+/// A line of messages, without file and line.
+fn message(text: &str) -> String {
+    let errors = Installation::parse(text, Path::new("tdma.toml")).expect_err("something is wrong");
+    errors.problems().iter().map(|problem| problem.message.clone()).collect::<Vec<_>>().join("\n")
+}
+
+/// What stands in quotes behind a key in a message.
+fn quoted<'m>(message: &'m str, key: &str) -> &'m str {
+    let (_, behind) = message.rsplit_once(&format!("`{key} = \"")).expect("a remedy with this key");
+    behind.split('"').next().unwrap_or_default()
+}
+
+#[test]
+fn what_a_message_says_is_a_remedy_and_less_is_none() {
+    let short = SLOTS.replacen("length = \"1 ms\"", "length = \"420 us\"", 1);
+    let soon = short.replacen("deadline = \"20 ms\"", "deadline = \"6 ms\"", 1);
+    let said = message(&soon);
+    assert!(said.contains("lengthen that of `base` at 1 ms (line 34)"), "{said}");
+    let length = parse_duration(quoted(&said, "length")).unwrap();
+    let with = |length| soon.replacen("420 us", &duration_text(length), 1);
+    parse(&with(length));
+    message(&with(length - Duration::from_micros(10)));
+
+    let soon = SLOTS.replacen("deadline = \"20 ms\"", "deadline = \"4 ms\"", 1);
+    let said = message(&soon);
+    let (offset, length) = (quoted(&said, "offset"), quoted(&said, "length"));
+    let slot = |length| format!("[[slot]]\nnode = \"base\"\noffset = \"{offset}\"\nlength = \"{length}\"\n\n[time]");
+    parse(&soon.replacen("[time]", &slot(length), 1));
+    let less = duration_text(parse_duration(length).unwrap() - Duration::from_micros(10));
+    message(&soon.replacen("[time]", &slot(&less), 1));
+
+    let soon = SLOTS.replacen("deadline = \"20 ms\"", "deadline = \"1 ms\"", 1);
+    let said = message(&soon);
+    parse(&soon.replacen("deadline = \"1 ms\"", &format!("deadline = \"{}\"", quoted(&said, "deadline")), 1));
+}
+
+/// By hand.
+#[test]
+fn bounds_are_what_the_book_derives() {
+    let installation = parse(SLOTS);
+    let [scan, drive] = &bounds(&installation)[..] else { panic!() };
+    assert_eq!((scan.flow, drive.flow, scan.level, drive.level), (0, 1, 14, 14), "both at the pilot's class, 140");
+    let ns = |us: &[u64]| Duration::from_nanos(us.iter().sum());
+
+    // Published just after a slot took what it sends, 100 us before its beginning, the scan waits a cycle and these 100 us. Two frames of time,
+    // one "still there" and a refusal take 20 us each to hand over. Of its 2048 bytes 1404 go first, in a datagram of 1472, with heads 1538 B,
+    // 123.04 us; then 644 in one of 712, 778 B, 62.24 us. The slot may have begun 50 us late. A switch passes the last one on.
+    let bound = scan.latency.unwrap();
+    assert_eq!((bound.waits, bound.slots, bound.said), (ns(&[5_100_000]), 1, ns(&[80_000])));
+    assert_eq!((bound.datagrams, bound.own, bound.forward), (2, ns(&[123_040, 62_240]), ns(&[62_240])));
+    assert_eq!(bound.latency, ns(&[5_100_000, 50_000, 80_000, 123_040, 62_240, 62_240]));
+
+    // The command may catch the slot at 3 ms or, in each other cycle, that at 2 ms; just after the one at 3 ms of a cycle without the other it
+    // waits longest. Others may follow it in its datagram, to 1538 B.
+    let bound = drive.latency.unwrap();
+    assert_eq!(
+        (bound.waits, installation.tdma.as_ref().unwrap().slots[bound.slot].offset),
+        (ns(&[5_100_000]), Duration::from_millis(3))
+    );
+    assert_eq!(bound.latency, ns(&[5_100_000, 50_000, 80_000, 123_040, 123_040]));
+}
+
+#[test]
+fn without_slots_there_are_no_bounds() {
+    let free = include_str!("full.toml");
+    assert_eq!(bounds(&parse(free)), []);
 }

@@ -6,6 +6,8 @@
 //!  Clock ◀══ synchronisation, calibration ══▶ Clock of the master                        writes the node's page of system time
 //! ```
 //!
+//! In time slots (`tdma`) a node sends all of this in its own windows only.
+//!
 //! All protocol logic is without sockets, threads and clocks: time comes as an argument, datagrams as bytes. The same code runs under
 //! real sockets (`shell`) and in a simulation of whole networks (`sim`).
 

@@ -155,12 +155,10 @@ impl Discipline {
             self.counts.roles += 1;
         }
         let sure = self.reckon(now_ns, clock);
-        self.pass(now_ns, clock, sure.is_ok());
-        self.silent = match &sure {
-            Ok((_, Carries::All)) => None,
-            Ok((_, Carries::Time)) => Some(self.why_silent(now_ns, clock)),
-            Err(why) => Some(*why),
-        };
+        let basis = sure.as_ref().ok().map(|(reckoning, _)| *reckoning);
+        self.pass(now_ns, basis.or_else(|| clock.reckoning()).or_else(|| clock.coarse(now_ns)), sure.is_ok());
+        let asks_only = matches!(sure, Ok((_, Carries::Time)));
+        self.silent = asks_only.then(|| self.why_silent(now_ns, clock));
         let planned = sure.and_then(|(reckoning, carries)| {
             let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
             let window = self.next_window(from_ns, clock, carries);
@@ -168,7 +166,10 @@ impl Discipline {
         });
         match planned {
             Ok(planned) => Next::Window(planned),
-            Err(why) => Next::Silent { why, until_ns: now_ns.saturating_add(self.table.cycle_ns()) },
+            Err(why) => {
+                self.silent = Some(why);
+                Next::Silent { why, until_ns: now_ns.saturating_add(self.table.cycle_ns()) }
+            }
         }
     }
 
@@ -227,15 +228,20 @@ impl Discipline {
     }
 
     /// Counts the slots that went by since it was asked last.
-    fn pass(&mut self, now_ns: u64, clock: &Clock, sure: bool) {
-        let Some(reckoning) = clock.reckoning().or_else(|| clock.coarse(now_ns)) else {
+    fn pass(&mut self, now_ns: u64, basis: Option<Reckoning>, sure: bool) {
+        let Some(reckoning) = basis else {
             self.done = None;
             return;
         };
         let system_ns = reckoning.system_ns(now_ns);
         let reached_ns = system_ns.saturating_sub(LATE_NS);
         let done_ns = match self.done {
-            Some((epoch, done_ns)) if epoch == reckoning.epoch() => done_ns,
+            // Who has followed a master that was far off may have been far ahead.
+            Some((epoch, done_ns))
+                if epoch == reckoning.epoch() && done_ns <= system_ns.saturating_add(self.table.cycle_ns()) =>
+            {
+                done_ns
+            }
             // In another epoch the window of just now may be one that was used.
             _ => system_ns,
         };

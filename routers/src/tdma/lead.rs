@@ -9,6 +9,8 @@ const HISTORY: usize = 64;
 const LEAST_OF: u32 = 1024;
 /// What took longer was kept up by something else.
 const LEAD_NS_MAX: u64 = 1_000_000;
+/// A stamp that may be further off says too little.
+const DOUBT_NS_MAX: u32 = 2_000;
 
 /// From user call to kernel stamp, of the first datagrams of windows.
 #[derive(Clone, Debug)]
@@ -16,6 +18,7 @@ pub(super) struct Lead {
     latest: [u64; HISTORY],
     count: usize,
     next: usize,
+    median_ns: u64,
     /// The least of the present span of [`LEAST_OF`], and of the one before.
     least: [u64; 2],
     in_span: u32,
@@ -23,7 +26,7 @@ pub(super) struct Lead {
 
 impl Default for Lead {
     fn default() -> Self {
-        Self { latest: [0; HISTORY], count: 0, next: 0, least: [u64::MAX; 2], in_span: 0 }
+        Self { latest: [0; HISTORY], count: 0, next: 0, median_ns: 0, least: [u64::MAX; 2], in_span: 0 }
     }
 }
 
@@ -32,12 +35,16 @@ impl Lead {
     pub(super) fn add(&mut self, user_ns: u64, left: Stamp) {
         let earliest_ns = left.ns.saturating_sub(left.doubt_ns.into());
         let took_ns = earliest_ns.saturating_sub(user_ns);
-        if !left.by_kernel || took_ns > LEAD_NS_MAX {
+        if !left.by_kernel || left.doubt_ns > DOUBT_NS_MAX || took_ns > LEAD_NS_MAX {
             return;
         }
         self.latest[self.next] = took_ns;
         self.next = (self.next + 1) % HISTORY;
         self.count = (self.count + 1).min(HISTORY);
+        let mut latest = self.latest;
+        let latest = &mut latest[..self.count];
+        latest.sort_unstable();
+        self.median_ns = latest[self.count / 2];
         self.least[0] = self.least[0].min(took_ns);
         self.in_span += 1;
         if self.in_span == LEAST_OF {
@@ -47,10 +54,7 @@ impl Lead {
 
     /// Half of the latest took no longer, ns.
     pub(super) fn median_ns(&self) -> u64 {
-        let mut latest = self.latest;
-        let latest = &mut latest[..self.count];
-        latest.sort_unstable();
-        latest.get(latest.len() / 2).copied().unwrap_or(0)
+        self.median_ns
     }
 
     /// By how much a call may be earlier, ns, and yet no frame has been seen that would have left too early.
@@ -58,7 +62,6 @@ impl Lead {
         if self.count < HISTORY {
             return 0;
         }
-        let median_ns = self.median_ns();
-        if broken!(LeadTooLong) { 2 * median_ns } else { median_ns.min(self.least[0]).min(self.least[1]) }
+        if broken!(LeadTooLong) { 2 * self.median_ns } else { self.median_ns.min(self.least[0]).min(self.least[1]) }
     }
 }

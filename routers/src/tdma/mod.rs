@@ -16,6 +16,9 @@
 //! [`Tdma::link_bytes_s`](rohrpost_config::Tdma::link_bytes_s) is true of all links; and of coarse time that the quickest of
 //! the last eight Syncs took no longer than a quarter of the guard.
 //!
+//! A bound is about the time of the master that a node follows. For the few cycles in which a new master is measured, some nodes may still go
+//! by the time of the one before: two of them are then as far apart as their bounds and that of the new master together.
+//!
 //! # What who sends does
 //! 1. [`Discipline::next`]; sleep until [`Planned::wake_ns`], or until a datagram of time comes.
 //! 2. Hand all datagrams of time that came to the [`Clock`](crate::time::Clock), so that it knows whether the master was heard. Spin until [`Planned::call_ns`].

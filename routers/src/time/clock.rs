@@ -295,6 +295,7 @@ impl Clock {
 
     /// What the passing of time does.
     fn advance(&mut self, now_ns: u64) {
+        self.stood_still(now_ns);
         self.line.end_slew(now_ns);
         self.keep_bound(now_ns);
         if self.election.falls_silent(now_ns) {

@@ -60,6 +60,8 @@ pub(super) struct Election {
     highest_epoch: u64,
     /// When somebody that has time said that it hears no master.
     timed_heard_ns: Option<u64>,
+    /// This node stood still before.
+    awake_since_ns: u64,
 }
 
 impl Election {
@@ -75,6 +77,7 @@ impl Election {
             highest: Term::NONE,
             highest_epoch: 0,
             timed_heard_ns: None,
+            awake_since_ns: 0,
         }
     }
 
@@ -189,6 +192,11 @@ impl Election {
         }
     }
 
+    /// This node stood still until now: that it heard nobody says nothing of the others. What they sent is still to be read.
+    pub(super) fn awakes(&mut self, now_ns: u64) {
+        self.awake_since_ns = now_ns;
+    }
+
     /// Somebody that has time sent in the place of the master.
     pub(super) fn replaced(&mut self, received_ns: u64) {
         self.timed_heard_ns = Some(received_ns);
@@ -209,10 +217,11 @@ impl Election {
     /// Whether the master that this node follows fell silent.
     pub(super) fn falls_silent(&mut self, now_ns: u64) -> bool {
         let State::Slave(master) = self.state else { return false };
-        let silent = now_ns.saturating_sub(master.heard_ns) >= self.silence_ns();
+        let heard_ns = master.heard_ns.max(self.awake_since_ns);
+        let silent = now_ns.saturating_sub(heard_ns) >= self.silence_ns();
         if silent {
             self.state = State::Listening;
-            (self.quiet_since_ns, self.lost) = (master.heard_ns, Some(master.node));
+            (self.quiet_since_ns, self.lost) = (heard_ns, Some(master.node));
         }
         silent
     }
@@ -232,7 +241,8 @@ impl Election {
         let takeover_ns = self.takeover_ns(now_ns, timed);
         match self.state {
             State::Slave(master) => {
-                let silent_ns = master.heard_ns.saturating_add(self.silence_ns());
+                let heard_ns = master.heard_ns.max(self.awake_since_ns);
+                let silent_ns = heard_ns.saturating_add(self.silence_ns());
                 Some(takeover_ns.map_or(silent_ns, |takeover_ns| takeover_ns.min(silent_ns)))
             }
             State::Listening | State::Master(_) => takeover_ns,
@@ -253,7 +263,7 @@ impl Election {
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = before + if others_timed && !timed { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
-        Some(since_ns.saturating_add(patience_ns).saturating_add(staggered_ns))
+        Some(since_ns.max(self.awake_since_ns).saturating_add(patience_ns).saturating_add(staggered_ns))
     }
 }
 

@@ -29,6 +29,13 @@
 //! after a split is mended there is one master after at most two intervals, as long as some of its datagrams arrive. The nodes of the other part slew if they are off by
 //! at most [`STEP_MIN_NS`]; else they say so, and the master begins a new epoch, in which they step.
 //!
+//! # In time slots
+//! [`Clock::in_slots`] makes the interval the cycle, and takes from the clock when it sends: [`Clock::poll_in`] is asked window by window,
+//! and a Sync leaves in the master's own alone (see [`tdma`](crate::tdma)). Questions wait for a slot, so between t2 and t3 may lie a cycle or more; what
+//! clocks drift meanwhile is in the sample. Whoever starts, yields to another master, or turns to one whose time is another goes by
+//! nothing until it has measured: by [`Clock::coarse`] it may ask. [`Clock::reckoning`] is what slots are found by; its bound leaves
+//! out what the master may be off an earlier term, as all nodes are off alike.
+//!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
 #[cfg_attr(

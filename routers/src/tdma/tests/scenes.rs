@@ -89,8 +89,8 @@ pub(super) fn two_masters_become_one() {
         for other in [0, 2] {
             (world.cut[1][other], world.cut[other][1]) = (true, true);
         }
-        // 0.2 ms apart in the end.
-        world.warms(1, 10_000);
+        // 0.4 ms apart in the end.
+        world.warms(1, 20_000);
         world.run(20 * SECOND);
         let masters = |world: &World| (0..2).filter(|node| world.clock(*node).role() == Role::Master).count();
         assert_eq!(masters(&world), 2, "seed {seed}: both sides have one");

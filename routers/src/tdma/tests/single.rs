@@ -184,6 +184,9 @@ pub(super) fn no_frame_starts_before_its_slot() {
     assert!(matches!(verdict, Verdict::Send(_)), "{verdict:?}");
     assert_eq!(planned.begin_ns - planned.call_ns, 12 * US, "as much as can be compensated");
     assert_eq!(one.discipline.lead_ns().0, 17 * US, "the median");
+    let doubtful = Stamp { ns: one.now_ns + 12 * US, doubt_ns: 10_000, by_kernel: true };
+    [doubtful, Stamp::by_us(one.now_ns)].into_iter().for_each(|stamp| one.discipline.left(one.now_ns, stamp));
+    assert_eq!(one.discipline.lead_ns().1, 12 * US, "what may be far off says nothing");
     let last = Stamp { ns: one.now_ns + 3 * US, doubt_ns: 500, by_kernel: true };
     one.discipline.left(one.now_ns, last);
     assert_eq!(one.discipline.lead_ns().1, 2_500, "the quickest of all, by the least that its stamp says");
@@ -220,15 +223,17 @@ fn slots_that_went_by_are_counted() {
     assert_eq!((counts.skipped - before.skipped, counts.silent), (4, before.silent));
 }
 
-#[test]
-fn a_replacement_is_a_sign_of_life_and_nothing_else() {
+pub(super) fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     let mut one = Lonely::joined();
     one.cycle += 1;
     one.now_ns += CYCLE;
     let (heard_ns, counts) = (one.clock.heard_ns(one.now_ns), one.clock.sync_counts());
-    let replacement = Sync { id: 77, replacement: true, followed: false, ..one.sync(one.cycle * CYCLE) };
+    let coarse = one.clock.coarse(one.now_ns);
+    // Its time is ahead by as much as its sender may be off.
+    let replacement = Sync { id: 77, replacement: true, followed: false, ..one.sync(one.cycle * CYCLE + 50 * US) };
     one.hears(1, one.now_ns, &Message::Sync(replacement));
     assert_eq!(one.clock.heard_ns(one.now_ns), heard_ns, "the master is as silent as before");
+    assert_eq!(one.clock.coarse(one.now_ns), coarse, "nobody goes by it");
     assert_eq!(one.clock.sync_counts().replacements_heard, counts.replacements_heard + 1);
     let asks = one.clock.poll_in(one.now_ns, Allowed::Slot { free_ns: 0 }, &mut [0; TIME_BYTES]);
     assert!(matches!(asks, Step::Wait { .. }), "nobody asks after it: {asks:?}");
@@ -236,4 +241,16 @@ fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     one.now_ns += 2 * CYCLE;
     one.hears_sync();
     assert_eq!(one.clock.sync_counts().missed, counts.missed + 3, "three cycles without the master's");
+}
+
+pub(super) fn who_turns_while_the_first_master_lives_is_not_sure() {
+    for (silence, is_sure) in [(0, false), (4 * CYCLE, true)] {
+        let mut one = Lonely::joined();
+        (one.cycle, one.now_ns) = (one.cycle + silence / CYCLE, one.now_ns + silence);
+        let term = Term::new(2, 1);
+        let sync = Sync { id: 1, term, began: term, ..one.sync(one.now_ns + OFFSET) };
+        one.hears(1, one.now_ns, &Message::Sync(sync));
+        assert_eq!(one.clock.master(), Some(1));
+        assert_eq!(one.clock.reckoning().is_some(), is_sure, "after {silence} ns of silence");
+    }
 }

@@ -137,7 +137,7 @@ impl World {
             collisions,
             unsure: 0,
             stalls: 0,
-            spaced: seed % 2 == 0,
+            spaced: seed.is_multiple_of(2),
             random,
         }
     }

@@ -60,6 +60,8 @@ pub(super) struct Slots {
     synced_cycle: u64,
     next: usize,
     is_warm: bool,
+    /// When this node was awake last, local ns.
+    advanced_ns: u64,
 }
 
 impl Slots {
@@ -86,6 +88,7 @@ impl Clock {
             synced_cycle: 0,
             next: 0,
             is_warm: false,
+            advanced_ns: 0,
         }));
         self.forget();
         self
@@ -110,6 +113,15 @@ impl Clock {
             }
         }
         Step::Wait { until_ns: self.deadline_ns(now_ns) }
+    }
+
+    /// In time slots this node is awake at least once in a cycle.
+    pub(super) fn stood_still(&mut self, now_ns: u64) {
+        let Some(slots) = &mut self.slots else { return };
+        let before_ns = std::mem::replace(&mut slots.advanced_ns, now_ns);
+        if before_ns != 0 && now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
+            self.election.awakes(now_ns);
+        }
     }
 
     fn next_in(&mut self, now_ns: u64, allowed: Allowed) -> Option<(NodeIndex, Draft)> {
@@ -203,7 +215,7 @@ impl Clock {
         match self.election.state() {
             State::Listening => false,
             State::Slave(master) => received_ns.saturating_sub(master.heard_ns) < 3 * self.interval_ns,
-            State::Master(_) => !broken!(KeepsOwnTime),
+            State::Master(_) => true,
         }
     }
 
@@ -217,7 +229,7 @@ impl Clock {
         // A master that had no time begins another: to go on by the old one is to send in the slots of those who follow it.
         let off_ns = sync.sent_ns.abs_diff(self.line.at(received.ns).ns);
         let is_other = sync.epoch != self.line.record().epoch || off_ns > 2 * slots.settings.delay_max_ns;
-        slots.unsure |= contested || (turned && is_other);
+        slots.unsure |= (contested || (turned && is_other)) && !broken!(KeepsOwnTime);
         slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
         if slots.heard_cycle != 0 {
             slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
