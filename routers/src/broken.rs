@@ -111,7 +111,7 @@ mod variants {
 
     impl Broken {
         /// All mistakes of carrying packages.
-        pub const ALL: [Self; 25] = [
+        pub const ALL: [Self; 22] = [
             Self::SkipsCheck,
             Self::IgnoresLevels,
             Self::TakesNewest,
@@ -121,9 +121,6 @@ mod variants {
             Self::Unpaced,
             Self::Hurries,
             Self::SendsStale,
-            Self::OvertakesInSlot,
-            Self::OverrunsSlot,
-            Self::AnyCompany,
             Self::NeverSilent,
             Self::NeverUnheard,
             Self::TakesCopies,
@@ -138,6 +135,9 @@ mod variants {
             Self::KeepsParts,
             Self::Unbounded,
         ];
+
+        /// All mistakes of what leaves in a slot. Where packages leave as they come they do not show.
+        pub const IN_SLOT: [Self; 3] = [Self::OvertakesInSlot, Self::OverrunsSlot, Self::AnyCompany];
 
         /// All mistakes of time slots.
         pub const SLOTS: [Self; 9] = [
