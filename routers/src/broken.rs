@@ -113,7 +113,7 @@ mod variants {
 
     impl Broken {
         /// All mistakes of carrying packages.
-        pub const ALL: [Self; 26] = [
+        pub const ALL: [Self; 23] = [
             Self::SkipsCheck,
             Self::IgnoresLevels,
             Self::TakesNewest,
@@ -124,9 +124,6 @@ mod variants {
             Self::NeverInAdvance,
             Self::Hurries,
             Self::SendsStale,
-            Self::OvertakesInSlot,
-            Self::OverrunsSlot,
-            Self::AnyCompany,
             Self::NeverSilent,
             Self::NeverUnheard,
             Self::TakesCopies,
@@ -141,6 +138,9 @@ mod variants {
             Self::KeepsParts,
             Self::Unbounded,
         ];
+
+        /// All mistakes of what leaves in a slot. Where packages leave as they come they do not show.
+        pub const IN_SLOT: [Self; 3] = [Self::OvertakesInSlot, Self::OverrunsSlot, Self::AnyCompany];
 
         /// All mistakes of time slots.
         pub const SLOTS: [Self; 9] = [

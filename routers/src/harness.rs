@@ -222,7 +222,7 @@ impl End {
 fn every_mistake_is_noticed() {
     let checks = || [crate::queue::CHECKS, crate::outbound::CHECKS, crate::inbound::CHECKS, crate::fragment::CHECKS];
     let mut missed = Vec::new();
-    for broken in Broken::ALL {
+    for broken in Broken::ALL.into_iter().chain(Broken::IN_SLOT) {
         let notices = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
         if !checks().into_iter().flatten().any(notices) {
             missed.push(broken);

@@ -22,6 +22,7 @@ pub mod impair;
 pub mod inbound;
 pub mod lab;
 pub mod link;
+mod netlink;
 pub mod outbound;
 pub mod queue;
 pub mod report;

@@ -3,6 +3,7 @@
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
+use crate::tdma::{LATE_NS, Wire};
 use rohrpost_config::{Installation, Network, Route, Tdma};
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name};
 use std::net::IpAddr;
@@ -103,30 +104,15 @@ impl Settings {
         if is_v6 { 40 + 8 } else { 20 + 8 }
     }
 
-    /// Bytes that Ethernet puts around each packet: preamble 8, head 14, check 4, and the gap behind it 12.
-    pub const ETHERNET_BYTES: usize = 38;
-    /// Least that a frame takes of the wire: a shorter one is filled up to 64 bytes.
-    pub const FRAME_BYTES_MIN: usize = 84;
-
-    /// Bytes that a datagram takes of the wire.
-    pub fn wire_bytes(&self, datagram_bytes: usize) -> usize {
-        (datagram_bytes + self.overhead_bytes() + Self::ETHERNET_BYTES).max(Self::FRAME_BYTES_MIN)
-    }
-
-    /// The longest datagram that so many bytes of the wire are enough for; none if there is none at all.
-    pub fn datagram_bytes_within(&self, wire_bytes: usize) -> Option<usize> {
-        let least = (self.overhead_bytes() + Self::ETHERNET_BYTES).max(Self::FRAME_BYTES_MIN);
-        (wire_bytes >= least).then(|| wire_bytes - self.overhead_bytes() - Self::ETHERNET_BYTES)
-    }
-
-    /// The longest datagram that this node sends. Where it has time slots, it fits into each of them, so that each of them serves
-    /// whatever is most important.
+    /// The longest datagram that this node sends. Where it has time slots, it fits into each of them, also if the thread comes as late
+    /// as it may: so each of them serves whatever is most important.
     pub fn datagram_bytes(&self) -> usize {
         let Some(tdma) = &self.tdma else { return self.network.datagram_bytes_max };
+        let wire = Wire::new(tdma, self.overhead_bytes());
         let own = tdma.slots.iter().filter(|slot| slot.node == self.own);
         let rooms = own.map(|slot| {
-            let budget_bytes = usize::try_from(tdma.budget_bytes(slot.length)).unwrap_or(usize::MAX);
-            self.datagram_bytes_within(budget_bytes).unwrap_or(0)
+            let length_ns = slot.length.saturating_sub(tdma.guard).as_nanos().saturating_sub(LATE_NS.into());
+            wire.datagram_bytes_in(u64::try_from(length_ns).unwrap_or(u64::MAX)).unwrap_or(0)
         });
         let smallest = rooms.min().unwrap_or(usize::MAX).max(DATAGRAM_BYTES_MIN);
         smallest.min(self.network.datagram_bytes_max)

@@ -2,7 +2,7 @@
 
 use super::{ids, to};
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
-use crate::harness::{End, MS, S, START};
+use crate::harness::{End, MS, START};
 use crate::link::ALIVE_EVERY_NS;
 use crate::outbound::{DIRECT_HEAD_BYTES, WAIT_MAX_NS};
 use crate::settings::Settings;
@@ -126,14 +126,14 @@ fn parts_go_on_in_the_next_slot_and_the_urgent_goes_between_them() {
 
 #[test]
 fn datagrams_are_as_long_as_each_own_slot_holds() {
-    // 12.5 B a µs behind the guard of 100 µs; 66 B for the heads of Ethernet, IP and UDP.
+    // 12.5 B a µs but for the guard of 100 µs, and 50 µs that it may begin late; 66 B for the heads of Ethernet, IP and UDP.
     for (lengths_us, bytes) in
-        [(&[1000][..], 1472), (&[200], 1250 - 66), (&[1000, 150], 625 - 66), (&[110], 528), (&[], 1472)]
+        [(&[1000][..], 1472), (&[250], 1250 - 66), (&[1000, 200], 625 - 66), (&[110], 528), (&[], 1472)]
     {
         let settings = Settings { tdma: Some(table(lengths_us)), ..crate::harness::settings(0, 2) };
         assert_eq!(settings.datagram_bytes(), bytes, "{lengths_us:?}");
     }
-    let mut end = in_slots(&[1000, 200]);
+    let mut end = in_slots(&[1000, 250]);
     end.queue(START, to(1, 90), &[1; 5000]);
     let all = end.slot(START, 20_000);
     let lengths: Vec<_> = all.iter().map(|(_, datagram)| datagram.len()).collect();
@@ -176,5 +176,4 @@ fn what_waits_too_long_for_a_slot_is_lost_between_slots_and_in_them() {
         end.assert_balanced();
         assert_eq!(end.stats.waiting_in_all(), 0);
     }
-    const { assert!(WAIT_MAX_NS > S) };
 }
