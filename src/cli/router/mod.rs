@@ -3,6 +3,7 @@
 mod clock;
 mod faults;
 mod links;
+mod slots;
 
 use super::Failure;
 use rohrpost::config::Network;
@@ -73,6 +74,9 @@ impl Module for RouterModule {
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
         if let Some(clock) = self.shell.clock() {
             context.publish_now(RouterInterface::CLOCK, &clock::of(&self.shell, clock))?;
+        }
+        if let Some(slots) = self.shell.slots() {
+            context.publish_now(RouterInterface::SLOTS, &slots::of(&self.shell, slots))?;
         }
         Ok(())
     }
