@@ -5,7 +5,11 @@ use crate::frame::NodeIndex;
 use crate::tdma::Silent;
 use crate::time::Role;
 
-const SEEDS: std::ops::Range<u64> = 0..3;
+/// How many seeds each scene is run with: `ROHRPOST_TIME_SEEDS`, else a few.
+fn seeds() -> std::ops::Range<u64> {
+    let asked = std::env::var("ROHRPOST_TIME_SEEDS").ok().and_then(|seeds| seeds.parse().ok());
+    0..asked.unwrap_or(3)
+}
 
 /// Three nodes that agree.
 fn agreed(seed: u64) -> World {
@@ -35,7 +39,7 @@ fn holds(world: &World, seed: u64) {
 }
 
 pub(super) fn nodes_join_one_by_one_and_never_meet() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let mut world = World::new(seed);
         world.stalls = 50;
         for node in [0, 2, 1] {
@@ -54,7 +58,7 @@ pub(super) fn nodes_join_one_by_one_and_never_meet() {
 }
 
 pub(super) fn a_master_dies_and_no_slot_is_lost() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let mut world = agreed(seed);
         assert_eq!(world.counts(1).syncs.replacements_sent, 0, "seed {seed}: the master was heard each time");
         let before = [world.counts(1), world.counts(2)];
@@ -84,7 +88,7 @@ pub(super) fn a_master_dies_and_no_slot_is_lost() {
 }
 
 pub(super) fn two_masters_become_one() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let mut world = agreed(seed);
         for other in [0, 2] {
             (world.cut[1][other], world.cut[other][1]) = (true, true);
@@ -107,7 +111,7 @@ pub(super) fn two_masters_become_one() {
 
 #[test]
 fn a_node_that_hears_nobody_holds_over_then_falls_silent() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let mut world = agreed(seed);
         // The longer it has measured, the surer it is of the rate.
         world.run(10 * SECOND);
@@ -126,7 +130,7 @@ fn a_node_that_hears_nobody_holds_over_then_falls_silent() {
 
 #[test]
 fn a_master_that_stands_still_is_replaced_and_follows() {
-    for seed in SEEDS {
+    for seed in seeds() {
         let mut world = agreed(seed);
         world.nodes[0].frozen_until = world.now + 100 * MS;
         world.run(2 * SECOND);
