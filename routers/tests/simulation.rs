@@ -50,16 +50,29 @@ const SEEN_IN_A_HUNDRED: [(&str, u64); 22] = [
     ("time: taken", 300_000),
 ];
 /// The same with time slots.
-const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 2] = [("delivered", 100_000), ("time: taken", 300_000)];
-/// Mistakes that cannot show here. Two have something else before them, and the tests of `fragment` see them: heads in this simulation
-/// are never the same twice, and copies of a part are dropped as datagrams. The third breaks no promise but that of speed.
-const UNSEEN: [Mistake; 3] = [
+const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 6] = [
+    ("delivered", 20_000),
+    ("time: taken", 500_000),
+    ("window used", 200_000),
+    ("router killed", 20),
+    ("frozen", 20),
+    ("split", 8),
+];
+/// Mistakes that cannot show here, since each has something else before it; the tests of `fragment` and `tdma` see them. Heads in this
+/// simulation are never the same twice, copies of a part are dropped as datagrams, and who sends in a master's place is hardly off its time
+/// and harms nobody. The simulated thread asks anew when it wakes late, so that the late gate has nothing to do. Who waits
+/// for the pace though it is urgent breaks no promise but that of speed.
+const UNSEEN: [Mistake; 6] = [
     Mistake::Packages(Broken::MixesPackages),
     Mistake::Packages(Broken::CountsPartsTwice),
     Mistake::Packages(Broken::NeverInAdvance),
+    Mistake::Packages(Broken::ReplacementCalibrates),
+    Mistake::Packages(Broken::ReplacesHeard),
+    Mistake::Packages(Broken::NoLateGate),
 ];
 /// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them.
-const SELDOM: [Mistake; 3] = [
+const SELDOM: [Mistake; 4] = [
+    Mistake::Packages(Broken::KeepsOwnTime),
     Mistake::Packages(Broken::NeverUnheard),
     Mistake::Packages(Broken::ForgetsFloor),
     Mistake::Time(time::Broken::OldSamples),
@@ -213,17 +226,20 @@ fn all_are_noticed(mistakes: &[Mistake], plan: fn(u64) -> Plan) {
     assert!(missed.is_empty(), "went unnoticed in {MISTAKE_SEEDS} networks: {missed:?}");
 }
 
+fn looked_for(mistake: &Mistake) -> bool {
+    !UNSEEN.contains(mistake) && !SELDOM.contains(mistake)
+}
+
 #[test]
 fn every_mistake_of_a_core_is_noticed() {
     let packages = Broken::ALL.into_iter().map(Mistake::Packages);
     let time = time::Broken::ALL.into_iter().map(Mistake::Time);
-    let mistakes: Vec<Mistake> =
-        packages.chain(time).filter(|mistake| !UNSEEN.contains(mistake) && !SELDOM.contains(mistake)).collect();
+    let mistakes: Vec<Mistake> = packages.chain(time).filter(looked_for).collect();
     all_are_noticed(&mistakes, Plan::rough);
 }
 
 #[test]
 fn every_mistake_in_time_slots_is_noticed() {
-    let mistakes = Broken::SLOTS.into_iter().chain(Broken::IN_SLOT).map(Mistake::Packages);
+    let mistakes = Broken::SLOTS.into_iter().chain(Broken::IN_SLOT).map(Mistake::Packages).filter(looked_for);
     all_are_noticed(&mistakes.collect::<Vec<_>>(), Plan::slotted);
 }
