@@ -3,6 +3,7 @@
 mod account;
 mod copy;
 mod nodes;
+mod slots;
 
 use super::launch::{View, end};
 use super::speech::Speech;
