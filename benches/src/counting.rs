@@ -1,4 +1,5 @@
-//! Counts how often a thread asks the heap for something or gives it back.
+//! Counts how often a thread asks the heap for something or gives it back. Tests of hot paths in other crates are compiled with this
+//! very file.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Most slots of one mailbox.
 pub const SLOTS_MAX: u16 = rohrpost_mailbox::SLOTS_MAX as u16;
-/// Most unfinished claims of one participant.
+/// Most unfinished claims of one participant, in a mailbox of the file.
 pub const CLAIMS_MAX: u8 = 16;
 
 /// One mailbox of a module.
@@ -20,7 +20,7 @@ pub struct MailboxSpec {
     pub full: Full,
     /// Older packages are dropped when the module receives.
     pub max_age: Option<Duration>,
-    /// Unfinished claims that one participant may hold, 1..=[`CLAIMS_MAX`].
+    /// Unfinished claims that one participant may hold; in the file 1..=[`CLAIMS_MAX`].
     pub claims: u8,
 }
 

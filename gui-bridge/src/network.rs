@@ -54,6 +54,8 @@ pub(crate) struct Network {
     last: BTreeMap<String, (Links, Instant)>,
     /// Packages a second, by the node that sends and the one that receives.
     rates: HashMap<(String, String), f64>,
+    /// System time of the graph that was drawn last, ns.
+    drawn_ns: u64,
 }
 
 impl View for Network {
@@ -82,6 +84,8 @@ impl View for Network {
             scene.curve(&["network", "latency", &name], age.p99_ns as f64 / 1e3);
         }
         self.last.insert(links.node.clone(), (links, Instant::now()));
+        self.drawn_ns = onward(self.drawn_ns, scene.time_ns);
+        scene.set_time(self.drawn_ns);
         scene.log(entity(&["network", "graph"]), &self.graph(datum.installation));
         Ok(())
     }
@@ -89,6 +93,13 @@ impl View for Network {
     fn tabs(&self) -> Vec<Tab> {
         vec![tab()]
     }
+}
+
+/// When the graph is drawn that this word of a router changes. Several routers tell of it, and what one tells is overtaken by what another
+/// told later; an entity's rows go on in time, unless time itself went back.
+fn onward(drawn_ns: u64, told_ns: u64) -> u64 {
+    let went_back = u128::from(drawn_ns.saturating_sub(told_ns)) > OLD.as_nanos();
+    if went_back { told_ns } else { told_ns.max(drawn_ns) }
 }
 
 /// None when the router began anew in between.
@@ -280,6 +291,18 @@ mod tests {
         let anew = links("base", "arm", 200, 4);
         assert_eq!(sent_per_s(&now, &anew, &anew.peers[0]), None);
         assert_eq!(words(&now.peers[0], 100.0), "100/s, 4 lost", "as the receiver says");
+    }
+
+    #[test]
+    fn what_is_overtaken_is_drawn_when_the_other_was_and_a_new_time_is_followed() {
+        const SECOND: u64 = 1_000_000_000;
+        for (drawn_s, told_s, at_s, why) in [
+            (10, 11, 11, "it goes on"),
+            (10, 9, 10, "overtaken"),
+            (10, 6, 6, "nothing is overtaken for so long: time was set back"),
+        ] {
+            assert_eq!(onward(drawn_s * SECOND, told_s * SECOND), at_s * SECOND, "{why}");
+        }
     }
 
     #[test]

@@ -94,6 +94,8 @@ pub struct Scene {
     /// None in tests.
     drawing: Option<(Arc<Store>, Pen)>,
     start_ns: u64,
+    /// When what is drawn happens, and the same for Rerun.
+    pub(crate) time_ns: u64,
     time: TimePoint,
     pub(crate) world: World,
     pub(crate) states: States,
@@ -137,6 +139,7 @@ impl Scene {
             paper,
             drawing: None,
             start_ns: system_time_ns,
+            time_ns: 0,
             time: TimePoint::default(),
             world: World::default(),
             states: States::default(),
@@ -151,6 +154,7 @@ impl Scene {
 
     /// What is drawn from now on happens at this system time.
     pub fn set_time(&mut self, system_time_ns: u64) {
+        self.time_ns = system_time_ns;
         let since_start = i128::from(system_time_ns) - i128::from(self.start_ns);
         // i64::MIN is Rerun's "no time"; 292 years are enough on either side.
         let bounded = |ns: i128| ns.clamp(-i128::from(i64::MAX), i128::from(i64::MAX)) as i64;

@@ -122,5 +122,5 @@ pub use routes::ROUTES_MAX;
 pub use sender::{Label, Loan, SendError, Sender};
 pub use slots::{Full, SLOTS_MAX};
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource};
-pub use waiting::{Waiting, wait_any};
+pub use waiting::{Waiting, wait_above, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};

@@ -44,7 +44,12 @@ impl Queue {
 
     /// Whether something may wait that has not been looked at.
     pub(crate) fn may_have_more(&self, slots: &Slots<'_>) -> bool {
-        !self.heap.is_empty() || self.deferred.iter().any(|bits| *bits != 0) || slots.any_hint()
+        !self.heap.is_empty() || self.has_unseen(slots)
+    }
+
+    /// Whether the next look may find something.
+    pub(crate) fn has_unseen(&self, slots: &Slots<'_>) -> bool {
+        self.deferred.iter().any(|bits| *bits != 0) || slots.any_hint()
     }
 
     /// Takes the most important, then earliest, package.
@@ -103,7 +108,8 @@ impl Queue {
         }
     }
 
-    fn first(&self) -> Option<Priority> {
+    /// Priority of the first that is known.
+    pub(crate) fn first(&self) -> Option<Priority> {
         self.heap.first().map(|(word, _)| word.priority())
     }
 

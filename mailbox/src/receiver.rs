@@ -4,7 +4,7 @@ use crate::clock::monotonic_ns;
 use crate::counters::Loss;
 use crate::layout::{Shape, stored_ns};
 use crate::lock::Held;
-use crate::name::Name;
+use crate::name::{Name, Priority};
 use crate::package::{Head, Options};
 use crate::participant::Participant;
 use crate::queue::Queue;
@@ -155,7 +155,7 @@ impl Receiver {
             }
             None => false,
         };
-        if due || self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen {
+        if due || self.deaths_changed() {
             self.search();
         }
     }
@@ -180,7 +180,7 @@ impl Receiver {
         self.search_in = filling.then_some(SEARCH_AGAIN);
         if freed > 0 {
             // The dead had not said yet how important their packages were.
-            counters.lost(crate::name::Priority(0), Loss::Unfinished, freed as u64);
+            counters.lost(Priority(0), Loss::Unfinished, freed as u64);
         }
         self.queue.rescan(&slots);
         self.queue.doubt();
@@ -205,9 +205,22 @@ impl Receiver {
         self.segment.slots().expect_hints();
     }
 
+    /// Whether a package above this priority is known to wait.
+    pub(crate) fn has_above(&self, priority: Priority) -> bool {
+        self.queue.first().is_some_and(|first| first.0 > priority.0)
+    }
+
+    /// Whether something may have come since [`Receiver::settle`].
+    pub(crate) fn has_unseen(&self) -> bool {
+        self.queue.has_unseen(&self.segment.slots()) || self.deaths_changed()
+    }
+
+    fn deaths_changed(&self) -> bool {
+        self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen
+    }
+
     pub(crate) fn may_have(&self) -> bool {
-        self.queue.may_have_more(&self.segment.slots())
-            || self.participant.node().page().deaths.load(Ordering::Relaxed) != self.deaths_seen
+        self.queue.may_have_more(&self.segment.slots()) || self.deaths_changed()
     }
 }
 

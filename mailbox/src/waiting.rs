@@ -1,6 +1,7 @@
 //! Waiting for mailboxes: how long, and whether awake for a moment before asleep.
 
 use crate::doorbell::Slept;
+use crate::name::Priority;
 use crate::receiver::Receiver;
 use crate::step::step;
 use crate::watch::Watches;
@@ -87,6 +88,29 @@ pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, ot
     let mut slept = Duration::ZERO;
     wait(receivers, None, waiting.into(), other, |sleep| slept = timed(sleep));
     slept
+}
+
+/// Waits until this mailbox has a package that is more important than `priority`, `other` says that there is something else to do, or the
+/// deadline has passed. Others may wait there all the while: for who cannot use them yet. May return early for no reason.
+///
+/// Each package that comes meanwhile rings, whatever its priority: so this is for who is ready for the next one soon.
+pub fn wait_above(receiver: &mut Receiver, priority: Priority, waiting: impl Into<Waiting>, other: impl Fn() -> bool) {
+    let waiting = waiting.into();
+    let participant = receiver.participant().clone();
+    let entry = participant.entry();
+    loop {
+        // In this order, as in `settled`: whatever is published after the look rings, and so changes what was seen.
+        let seen = entry.bell().seen();
+        receiver.drowsy();
+        receiver.settle();
+        if other() || receiver.has_above(priority) || waiting.is_over() {
+            break;
+        }
+        if !receiver.has_unseen() {
+            crate::doorbell::sleep(&entry.bell, seen, waiting.left());
+        }
+    }
+    receiver.awake();
 }
 
 /// How long this takes.

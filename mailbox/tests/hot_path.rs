@@ -3,48 +3,28 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod common;
+#[path = "../../benches/src/counting.rs"]
+pub mod counting;
 
 use common::crew::{Actor, alone, master};
 use common::hands::{OPERATIONS, do_all};
 use common::{Ground, HIGH, LOW, MAILBOX, label, shape, tell};
+use counting::{CountingHeap, heap_uses};
 use rohrpost_mailbox::{Full, Interest, Shape, Waiting, Watches};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::time::Duration;
 
-thread_local! {
-    static USES: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
 #[global_allocator]
-static HEAP: Counting = Counting;
-
-// SAFETY: hands all on to the system's; a constant thread-local without destructor neither allocates nor ends.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        USES.with(|uses| uses.set(uses.get() + 1));
-        // SAFETY: as promised by our caller.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        USES.with(|uses| uses.set(uses.get() + 1));
-        // SAFETY: as promised by our caller.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+static HEAP: CountingHeap = CountingHeap;
 
 #[test]
 fn role() {
     let Some((_, ground)) = common::role() else { return };
     let around = |at: usize, operate: &mut dyn FnMut()| {
-        let before = USES.with(Cell::get);
+        let before = heap_uses();
         operate();
-        assert_eq!(USES.with(Cell::get), before, "{}: used the heap", OPERATIONS[at].name);
+        assert_eq!(heap_uses(), before, "{}: used the heap", OPERATIONS[at].name);
     };
-    let start = || assert!(USES.with(Cell::get) > 0, "counts");
+    let start = || assert!(heap_uses() > 0, "counts");
     master(|| do_all(&ground, start, around, Actor::finish));
     tell("done");
 }
@@ -96,8 +76,8 @@ fn a_round_again_and_again(full: Full) {
         let _ = clock.now();
     };
     round(0, &mut sender, &mut receiver);
-    let before = USES.with(Cell::get);
+    let before = heap_uses();
     assert!(before > 0, "counts");
     (1..1000).for_each(|id| round(id, &mut sender, &mut receiver));
-    assert_eq!(USES.with(Cell::get), before);
+    assert_eq!(heap_uses(), before);
 }

@@ -6,6 +6,10 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+#[path = "../../benches/src/counting.rs"]
+pub mod counting;
+
+use counting::{CountingHeap, heap_uses};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Interest, Name, Node, Ready, node_directory};
 use rohrpost_modules::call::CallError;
@@ -13,17 +17,13 @@ use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy
 use rohrpost_modules::runtime::{Context, Rate, Received, Start, Subscription, ToolLink, run_started};
 use rohrpost_modules::types::Twist;
 use rohrpost_modules::{Module, ModuleError};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-thread_local! {
-    static COUNTED: Cell<bool> = const { Cell::new(false) };
-}
+/// Uses of the heap by the module's thread, as it knew at its last tick.
 static USES: AtomicU64 = AtomicU64::new(0);
 static RECEIVED: AtomicU64 = AtomicU64::new(0);
 static TICKS: AtomicU64 = AtomicU64::new(0);
@@ -32,31 +32,8 @@ static WRITTEN: AtomicU64 = AtomicU64::new(0);
 static READ: AtomicU64 = AtomicU64::new(0);
 static FAR: Mutex<Option<UnixStream>> = Mutex::new(None);
 
-struct Counting;
-
 #[global_allocator]
-static HEAP: Counting = Counting;
-
-fn count() {
-    if COUNTED.with(Cell::get) {
-        USES.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
-// SAFETY: hands all on to the system's; a constant thread-local without destructor neither allocates nor ends.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: as promised by our caller.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: as promised by our caller.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+static HEAP: CountingHeap = CountingHeap;
 
 /// Publishes what it is told, and follows itself: so it is publisher, subscriber and server at once.
 struct Wheels {
@@ -81,7 +58,7 @@ impl Module for Wheels {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        COUNTED.with(|counted| counted.set(true));
+        USES.store(heap_uses(), Ordering::Relaxed);
         TICKS.fetch_add(1, Ordering::Relaxed);
         Ok(context.publish_now(MotorInterface::MOTION, &self.told)?)
     }

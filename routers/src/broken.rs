@@ -53,6 +53,8 @@ mod variants {
         ForgetsDisplaced,
         /// Outbound: no limit to the bytes a second.
         Unpaced,
+        /// Outbound: what is more important than what left last waits for the pace as well.
+        NeverInAdvance,
         /// Outbound: a command may hurry more than its sender.
         Hurries,
         /// Outbound: what waited too long leaves nevertheless.
@@ -111,7 +113,7 @@ mod variants {
 
     impl Broken {
         /// All mistakes of carrying packages.
-        pub const ALL: [Self; 22] = [
+        pub const ALL: [Self; 23] = [
             Self::SkipsCheck,
             Self::IgnoresLevels,
             Self::TakesNewest,
@@ -119,6 +121,7 @@ mod variants {
             Self::DisplacesOldest,
             Self::ForgetsDisplaced,
             Self::Unpaced,
+            Self::NeverInAdvance,
             Self::Hurries,
             Self::SendsStale,
             Self::NeverSilent,

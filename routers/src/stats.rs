@@ -254,6 +254,13 @@ pub struct Stats {
     pub started_ns: u64,
 }
 
+/// After so long the wire holds no copy any more of what a router's life before took.
+///
+/// Whether there was such a life nobody can tell: a launch that ends takes the node's directory along, transit mailbox and all, and the
+/// next may begin at once, with no restart counted. So the first life of a router is held to be young as well; what that costs is the
+/// wait for a caller's next try.
+pub(crate) const YOUNG_NS: u64 = 500_000_000;
+
 impl Stats {
     /// Of a router that begins now.
     pub fn new(settings: &Settings, now_ns: u64) -> Arc<Self> {
@@ -279,6 +286,11 @@ impl Stats {
     /// Whether a peer is there.
     pub fn state(&self, peer: NodeIndex, now_ns: u64) -> crate::link::State {
         self.peer(peer).link.state(self.started_ns, now_ns)
+    }
+
+    /// Whether the router has just begun: what comes may be a copy of what its life before took, so nothing is said of its fate.
+    pub fn is_young(&self, now_ns: u64) -> bool {
+        now_ns.saturating_sub(self.started_ns) < YOUNG_NS
     }
 
     /// Packages that wait, on all levels.

@@ -79,6 +79,7 @@ impl Node {
             nodes: (0..NODES).map(|node| SocketAddr::new(address(node), PORT)).collect(),
             node: None,
             impair: None,
+            kernel_stamps: true,
             skew: Some(skew),
             observer: Some(observer),
         });

@@ -3,6 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+#[path = "../../benches/src/counting.rs"]
+pub mod counting;
+
+use counting::{CountingHeap, heap_uses};
 use rohrpost_config::{Network, Route};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
@@ -12,34 +16,11 @@ use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::stats::{Cause, Stats};
 use rohrpost_routers::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 
-thread_local! {
-    static USES: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
 #[global_allocator]
-static HEAP: Counting = Counting;
-
-// SAFETY: hands all on to the system's; a constant thread-local without destructor neither allocates nor ends.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        USES.with(|uses| uses.set(uses.get() + 1));
-        // SAFETY: as promised by our caller.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        USES.with(|uses| uses.set(uses.get() + 1));
-        // SAFETY: as promised by our caller.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+static HEAP: CountingHeap = CountingHeap;
 
 const MS: u64 = 1_000_000;
 
@@ -215,10 +196,10 @@ fn no_package_touches_the_heap() {
         }
     };
     rounds(&mut pair, 0, 100);
-    let before = USES.with(Cell::get);
+    let before = heap_uses();
     assert!(before > 0, "counts");
     rounds(&mut pair, 100, 1000);
-    assert_eq!(USES.with(Cell::get), before, "used the heap");
+    assert_eq!(heap_uses(), before, "used the heap");
     let happened = |cause: Cause| pair.counts.lost[cause as usize];
     for cause in [Cause::Quota, Cause::Socket, Cause::Late, Cause::Incomplete, Cause::MailboxFull] {
         assert!(happened(cause) > 10, "{cause:?}: {} times", happened(cause));
@@ -276,16 +257,16 @@ fn a_clock_takes_nothing_from_the_heap() {
         assert!(clocks.now_ns < 10_000 * MS, "{:?}", clocks.clocks[1].reading(clocks.now_ns));
         clocks.step();
     }
-    let before = USES.get();
+    let before = heap_uses();
     clocks.frames = 0;
     while clocks.frames < 10_000 {
         clocks.step();
     }
-    assert_eq!(USES.get() - before, 0);
+    assert_eq!(heap_uses() - before, 0);
     // Without a master, too.
     for _ in 0..1_000 {
         clocks.now_ns += 10 * MS;
         let _ = clocks.clocks[1].poll(clocks.now_ns, &mut [0; TIME_BYTES]);
     }
-    assert_eq!(USES.get() - before, 0);
+    assert_eq!(heap_uses() - before, 0);
 }

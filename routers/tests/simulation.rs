@@ -46,9 +46,13 @@ const SEEN_IN_A_HUNDRED: [(&str, u64); 22] = [
     ("split", 15),
     ("time: taken", 300_000),
 ];
-/// Mistakes that cannot show here, since each has something else before it; the tests of `fragment` see them. Heads in this simulation
-/// are never the same twice, and copies of a part are dropped as datagrams.
-const UNSEEN: [Mistake; 2] = [Mistake::Packages(Broken::MixesPackages), Mistake::Packages(Broken::CountsPartsTwice)];
+/// Mistakes that cannot show here. Two have something else before them, and the tests of `fragment` see them: heads in this simulation
+/// are never the same twice, and copies of a part are dropped as datagrams. The third breaks no promise but that of speed.
+const UNSEEN: [Mistake; 3] = [
+    Mistake::Packages(Broken::MixesPackages),
+    Mistake::Packages(Broken::CountsPartsTwice),
+    Mistake::Packages(Broken::NeverInAdvance),
+];
 /// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them.
 const SELDOM: [Mistake; 3] = [
     Mistake::Packages(Broken::NeverUnheard),

@@ -24,6 +24,7 @@ mod new;
 mod param;
 mod ping;
 mod published;
+mod round;
 mod router;
 mod run;
 mod send;

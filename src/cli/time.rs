@@ -1,20 +1,13 @@
 //! `rohrpost time`: which node is the master of time, and how well each of the others knows it.
 
+use super::round::{Round, Rounds};
 use super::table::{table, time};
-use super::target::{Running, Target};
-use super::units::{Stop, seconds};
 use super::{Failure, say};
-use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{ClockRole, ClockState, RouterInterface};
-use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::mailbox::SystemClock;
-use rohrpost::{CallError, Fault, ToolLink};
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
-
-/// A router that does not answer for so long is silent.
-const PATIENCE: Duration = Duration::from_secs(1);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -26,16 +19,7 @@ of the same term and epoch differ by at most the sum of their bounds. The exit c
 time, or if there are two masters.")]
 pub(super) struct Arguments {
     #[command(flatten)]
-    target: Target,
-    /// Show it again and again.
-    #[arg(long)]
-    watch: bool,
-    /// From one to the next, seconds.
-    #[arg(long, default_value_t = 1.0, value_name = "SECONDS", requires = "watch")]
-    interval: f64,
-    /// One JSON object a line.
-    #[arg(long)]
-    json: bool,
+    rounds: Rounds,
 }
 
 /// What a node says of its time.
@@ -57,43 +41,28 @@ struct Nodes {
     nodes: Vec<Told>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let running = arguments.target.find()?;
-    if running.installation.network.is_none() {
-        return Err("this installation has one node, whose time is its own; `rohrpost top` shows it".into());
-    }
-    let interval = seconds(arguments.interval)?;
-    let stop = Stop::new()?;
-    let mut tool = running.join(PATIENCE)?;
-    let clock = SystemClock::open(&running.node);
+pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
+    let mut round = rounds.begin("this installation has one node, whose time is its own; `rohrpost top` shows it")?;
+    let clock = SystemClock::open(&round.running.node);
     let agree = loop {
-        let told = running.shown().into_iter().map(|node| ask(&running, &mut tool, &clock, node)).collect();
+        let told = round.nodes().into_iter().map(|node| ask(&mut round, &clock, node)).collect();
         let nodes = Nodes::new(told);
-        let text = if arguments.json { serde_json::to_string(&nodes)? } else { nodes.text() };
-        if !say(text.trim_end()) || !arguments.watch || stop.within(interval) {
+        let text = if rounds.json { serde_json::to_string(&nodes)? } else { nodes.text() };
+        if !say(text.trim_end()) || !rounds.watch || round.stop.within(round.interval) {
             break nodes.agree;
         }
     };
-    tool.close();
-    Ok(if agree || arguments.watch { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    round.close();
+    Ok(if agree || rounds.watch { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn ask(running: &Running, tool: &mut ToolLink, clock: &SystemClock, node: &str) -> Told {
-    let none = Told { node: node.into(), clock: None, ago_ns: None, failure: None };
-    let Some(router) = running.installation.router_of(node) else { return none };
-    let port = RouterInterface::CLOCK;
-    let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-    let told: Result<(u64, ClockState), _> =
-        tool.call(router, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
-    match told {
+fn ask(round: &mut Round, clock: &SystemClock, node: String) -> Told {
+    match round.newest(&node, RouterInterface::CLOCK) {
         Ok((_, told)) => {
             let ago_ns = clock.now().ns.wrapping_sub(told.now_ns).cast_signed();
-            Told { clock: Some(told), ago_ns: Some(ago_ns), ..none }
+            Told { node, clock: Some(told), ago_ns: Some(ago_ns), failure: None }
         }
-        Err(CallError::Fault(_, Fault::NothingYet)) => {
-            Told { failure: Some("it has just begun; ask again".into()), ..none }
-        }
-        Err(error) => Told { failure: Some(running.told(router, &error).to_string()), ..none },
+        Err(failure) => Told { node, clock: None, ago_ns: None, failure: Some(failure) },
     }
 }
 

@@ -1,7 +1,7 @@
 //! `launch --all`: all nodes of a configuration on this computer, in network namespaces.
 
-use crate::harness::{NETWORK, OUTPUT, Place, probe, runs, skipped, wait};
-use crate::process::{Running, Said};
+use crate::harness::{NETWORK, OUTPUT, Place, lacks_namespaces, probe, runs, skipped, wait};
+use crate::process::Running;
 use nix::sys::signal::Signal;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -29,11 +29,7 @@ fn is_allowed() -> bool {
     let place = Place::new();
     let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
     let told = all(&place, &config, &[]).said().err;
-    if told.contains("network namespaces cannot be made here") {
-        skipped(&told);
-        return false;
-    }
-    true
+    !lacks_namespaces(&told)
 }
 
 /// Waits until all modules of both nodes are on.
@@ -41,12 +37,6 @@ fn wait_until_both_run(launch: &mut Running) {
     for node in ["base", "arm"] {
         launch.wait_for(&format!("│ node {node} of test runs: 2 modules"));
     }
-}
-
-/// A command of a person on a node.
-fn say(place: &Place, config: &Path, node: &str, arguments: &[&str]) -> Said {
-    let (command, rest) = arguments.split_first().unwrap();
-    place.say(&[&[*command, "--config", config.to_str().unwrap(), "--node", node], rest].concat())
 }
 
 /// Processes that a process has started, and those that they have.
@@ -70,8 +60,8 @@ fn nodes_start_talk_and_are_stopped() {
     let mut launch = all(&place, &config, &[]);
     wait_until_both_run(&mut launch);
     assert!(launch.out().starts_with("security = \"none\": packages between nodes are neither sealed nor signed"));
-    assert_eq!(say(&place, &config, "base", &["call", "probe.1", "count", "1"]).ok(), "1\n");
-    assert_eq!(say(&place, &config, "arm", &["call", "probe.0", "count", "2"]).ok(), "1\n");
+    assert_eq!(place.say_at(&config, "base", &["call", "probe.1", "count", "1"]).ok(), "1\n");
+    assert_eq!(place.say_at(&config, "arm", &["call", "probe.0", "count", "2"]).ok(), "1\n");
     assert_eq!(devices(), before, "the lab's devices are in the lab");
     let processes = below(launch.pid());
     assert_eq!(processes.len(), 6, "two launches, two routers, two probes");
@@ -127,7 +117,7 @@ fn a_node_that_ends_leaves_the_others_alone() {
     let arm = place.robot_at(&config, "arm").node.launcher().unwrap();
     crate::harness::signal(arm, Signal::SIGKILL);
     wait("its end is told", || launch.err().contains("node arm ended: signal: 9").then_some(()));
-    assert_eq!(say(&place, &config, "base", &["call", "probe.0", "count", "1"]).ok(), "1\n");
+    assert_eq!(place.say_at(&config, "base", &["call", "probe.0", "count", "1"]).ok(), "1\n");
     launch.signal(Signal::SIGINT);
     assert_eq!(launch.end().code(), Some(1), "a node failed");
     // Its modules go when their launch has gone; what that had no time to remove is for `clean`.
@@ -149,7 +139,7 @@ fn calls_are_counted_once_over_a_bad_network() {
     wait_until_both_run(&mut launch);
     let mut expected = Vec::new();
     for number in 1..=12 {
-        let said = say(&place, &config, "base", &["call", "probe.1", "count", &number.to_string()]);
+        let said = place.say_at(&config, "base", &["call", "probe.1", "count", &number.to_string()]);
         // One that fails says so, and may have been run; none is run twice.
         if said.code == Some(0) {
             expected.push(number);
@@ -209,8 +199,8 @@ fn a_user_without_rights_launches_all_nodes() {
         let runs = ["base of test runs: 1 module", "arm of test runs: 2 modules"];
         (launch.ended().is_some() || runs.iter().all(|runs| launch.out().contains(runs))).then_some(())
     });
-    if launch.err().contains("network namespaces cannot be made here") {
-        return skipped(&launch.err());
+    if lacks_namespaces(&launch.err()) {
+        return;
     }
     launch.stop();
     place.assert_empty();

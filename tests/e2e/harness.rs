@@ -53,6 +53,15 @@ pub(crate) fn skipped(why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: {why}");
 }
 
+/// Whether this was said for want of network namespaces; then what needs them was not tested.
+pub(crate) fn lacks_namespaces(said: &str) -> bool {
+    let lacks = said.contains("network namespaces cannot be made here");
+    if lacks {
+        skipped(said);
+    }
+    lacks
+}
+
 /// A table's line in a configuration: a probe with these settings and other keys.
 pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
     let program = super::probe::program();
@@ -157,6 +166,12 @@ impl Place {
     /// Runs a command to its end.
     pub(crate) fn say(&self, arguments: &[&str]) -> Said {
         Running::start(self.command(arguments)).said()
+    }
+
+    /// The same, from a node of this configuration.
+    pub(crate) fn say_at(&self, config: &Path, node: &str, arguments: &[&str]) -> Said {
+        let (command, rest) = arguments.split_first().unwrap();
+        self.say(&[&[*command, "--config", config.to_str().unwrap(), "--node", node], rest].concat())
     }
 
     /// Starts `rohrpost launch`.

@@ -5,9 +5,12 @@ use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait}
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use rohrpost::config::Installation;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::monotonic_ns;
+use rohrpost::mailbox::{Head, monotonic_ns};
 use rohrpost::{CallError, Fault};
+use rohrpost_routers::frame::{FrameHead, Kind};
+use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
@@ -82,9 +85,7 @@ impl Lan {
 
     /// A command of a person at `base`.
     fn say(&self, arguments: &[&str]) -> crate::process::Said {
-        let at = ["--config", self.config.to_str().unwrap(), "--node", "base"];
-        let (command, rest) = arguments.split_first().unwrap();
-        self.place.say(&[&[*command], &at[..], rest].concat())
+        self.place.say_at(&self.config, "base", arguments)
     }
 
     /// What counting at `arm` brings, called from `base`.
@@ -289,6 +290,48 @@ fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
     let silent = wait("arm is silent", || Some(all(&lan, &[])).filter(|said| said.out.contains("silent")));
     assert_eq!(silent.code, Some(1), "{silent:?}");
     assert!(silent.out.contains("node arm: "), "{silent:?}");
+    lan.stop();
+}
+
+#[test]
+fn net_shows_what_was_refused_and_what_to_do() {
+    let lan = Lan::launched();
+    let installation = Installation::load(&lan.config).unwrap();
+    let [base, arm] = [0, 1].map(|node| installation.nodes[node].address.unwrap());
+    let port = installation.network.unwrap().port;
+    let router_of_arm = UdpSocket::bind((arm, 0)).unwrap();
+    let head = FrameHead {
+        kind: Kind::Packages,
+        system: installation.system.id,
+        from: 1,
+        to: 0,
+        digest: !installation.digest().lan(),
+        incarnation: 1,
+        sequence: 0,
+    };
+    let package =
+        Head { to: lan.base().name("probe.0"), from: lan.base().name("probe.1"), ..Head::default() }.to_bytes();
+    for _ in 0..3 {
+        router_of_arm.send_to(&[&head.to_bytes(&[&package])[..], &package].concat(), (base, port)).unwrap();
+    }
+    let IpAddr::V4(base_v4) = base else { panic!("{base}") };
+    let [a, b, c, d] = base_v4.octets();
+    let stranger = UdpSocket::bind((Ipv4Addr::new(a, b, c, d + 7), 0)).unwrap();
+    stranger.send_to(b"who is there?", (base, port)).unwrap();
+    let text = wait("all are counted", || {
+        let text = lan.say(&["net"]).out;
+        (text.contains("3 datagrams refused") && text.contains("1 datagram dropped")).then_some(text)
+    });
+    for words in [
+        format!("node base: 3 datagrams refused that came from {arm}, the address of node arm: they were of another"),
+        "launch all nodes from the same file; `rohrpost version`".into(),
+        "came from addresses of no node, or are nothing of Rohrpost's".into(),
+        "another `port` in [network]".into(),
+    ] {
+        assert!(text.contains(&words), "no `{words}` in:\n{text}");
+    }
+    let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
+    assert_eq!((&told[0]["links"]["peers"][0]["refused"], &told[0]["links"]["foreign"]), (&3.into(), &1.into()));
     lan.stop();
 }
 

@@ -197,6 +197,50 @@ fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
 }
 
 #[test]
+fn time_tells_of_all_nodes_and_how_far_off_each_may_be() {
+    let two = Two::launched();
+    let told = wait("all nodes follow one master", || {
+        let said = two.say(&["time", "--json"]);
+        (said.code == Some(0)).then(|| said.json())
+    });
+    assert_eq!(told["agree"], true, "{told}");
+    let nodes = told["nodes"].as_array().unwrap();
+    let of = |field: &str| nodes.iter().map(|node| node["clock"][field].clone()).collect::<Vec<Value>>();
+    assert_eq!((nodes.len(), of("node")), (2, vec!["base".into(), "arm".into()]), "{told}");
+    let mut roles = of("role");
+    roles.sort_by_key(Value::to_string);
+    assert_eq!(roles, ["master", "slave"], "{told}");
+    for node in nodes {
+        let clock = &node["clock"];
+        // Two processes of one computer, which may be busy.
+        let (bound_ns, off_ns) = (clock["error_ns"].as_u64().unwrap(), clock["offset_ns"].as_i64().unwrap());
+        assert!(bound_ns < 1_000_000_000, "{node}");
+        if clock["role"] == "master" {
+            assert_eq!(
+                (&clock["master"], bound_ns, off_ns),
+                (&clock["node"], 0, 0),
+                "it is right by definition: {node}"
+            );
+        } else {
+            assert!(
+                bound_ns > 0 && clock["round_trip_ns"].as_u64() > Some(0),
+                "the way there and back takes time: {node}"
+            );
+        }
+        assert!(node["ago_ns"].is_i64() && node["failure"].is_null(), "{node}");
+    }
+    assert_eq!((of("master")[0].clone(), of("term")[0].clone()), (of("master")[1].clone(), of("term")[1].clone()));
+
+    let text = two.say(&["time"]).ok();
+    for words in ["node", "bound", "base", "arm", "master", "slave", "µs"] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+    let only = two.say_at("arm", &["time", "--json"]).json();
+    assert_eq!((only["nodes"].as_array().unwrap().len(), &only["nodes"][0]["node"]), (1, &"arm".into()));
+    two.stop();
+}
+
+#[test]
 fn a_silent_node_is_told_and_nobody_waits_for_it() {
     let two = Two::launched();
     let launch = two.arm.0.pid();

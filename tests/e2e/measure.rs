@@ -377,11 +377,14 @@ fn send_repeats_a_command_and_counts_what_came_of_it() {
     assert_eq!((&counts["sent"], &counts["answered"], &counts["timeouts"]), (&12.into(), &12.into(), &0.into()));
     assert_eq!(place.counted(), [7; 12]);
     let said = place.say(&["send", "probe.0", "refuse", "no", "--rate", "100", "--count", "3"]);
-    assert_eq!((said.code, said.out.as_str()), (Some(1), "3 sent, 0 answered, 3 refused\n"), "{said:#?}");
+    // What a busy computer keeps from being sent in time is left out, and counted too.
+    assert!(said.out.starts_with("3 sent, 0 answered, ") && said.out.ends_with("3 refused\n"), "{said:#?}");
+    assert_eq!(said.code, Some(1), "{said:#?}");
     assert_eq!(said.err.matches("refuse: ").count(), 1, "told once: {said:#?}");
     place.say(&["call", "probe.0", "off"]).ok();
     let said = place.say(&["send", "probe.0", "count", "8", "--rate", "100", "--count", "3"]);
-    assert_eq!((said.code, said.out.as_str()), (Some(1), "3 sent, 0 answered, 3 faults\n"), "{said:#?}");
+    assert!(said.out.starts_with("3 sent, 0 answered, ") && said.out.ends_with("3 faults\n"), "{said:#?}");
+    assert_eq!(said.code, Some(1), "{said:#?}");
     assert_eq!(said.err, "probe.0: the module is off; switch it on first\n");
     place.say(&["call", "probe.0", "on"]).ok();
     let mut send = Running::start(place.command(&["send", "probe.0", "count", "9", "--rate", "200"]));

@@ -41,7 +41,8 @@ pub(super) struct Window {
 
 impl Window {
     /// Of a life that may have begun long before us: what it sent before this sequence is not missed. Near its beginning both have just
-    /// begun, and what is missing is lost.
+    /// begun, and what is missing is lost, also if nobody listened yet: a router sends to a peer of which it knows nothing, so packages
+    /// may have been in it, and no account may forget them.
     pub(super) fn joining(sequence: u64) -> Self {
         let start = if sequence < REORDER_MAX { 0 } else { sequence };
         Self { next: start, settled: start, start, ticks: [start; 2], ..Self::default() }

@@ -21,7 +21,8 @@ impl Outbound {
         bytes[..frame::HEAD_BYTES].copy_from_slice(&frame);
         bytes[frame::HEAD_BYTES..].copy_from_slice(&package_head);
         self.passed(peer, head);
-        self.left(now_ns, peer, DIRECT_HEAD_BYTES + body.len());
+        let level = self.levels[usize::from(head.priority.0)];
+        self.left(now_ns, peer, DIRECT_HEAD_BYTES + body.len(), Some(level));
         bytes
     }
 
@@ -64,7 +65,7 @@ impl Outbound {
             self.left_queue(waiting.level);
             self.passed(peer, &waiting.head);
         }
-        self.finish(now_ns, Kind::Packages, peer, &mut datagram[..end])
+        self.finish(now_ns, (Kind::Packages, Some(from)), peer, &mut datagram[..end])
     }
 
     /// The next part of a package that does not fit in a datagram; how long its datagram is.
@@ -87,7 +88,7 @@ impl Outbound {
             self.left_queue(waiting.level);
             self.passed(peer, &waiting.head);
         }
-        self.finish(now_ns, Kind::Fragment, peer, &mut datagram[..start + size])
+        self.finish(now_ns, (Kind::Fragment, Some(waiting.level)), peer, &mut datagram[..start + size])
     }
 
     /// "Still there", for a peer; how long the datagram is.
@@ -97,14 +98,14 @@ impl Outbound {
         let end = frame::HEAD_BYTES + told.len();
         datagram[frame::HEAD_BYTES..end].copy_from_slice(&told);
         self.peers[usize::from(peer)].tell_ns = now_ns + TELL_EVERY_NS;
-        self.finish(now_ns, Kind::Alive, peer, &mut datagram[..end])
+        self.finish(now_ns, (Kind::Alive, None), peer, &mut datagram[..end])
     }
 
-    /// Writes the head before what lies in the datagram already; how long it is.
-    fn finish(&mut self, now_ns: u64, kind: Kind, to: NodeIndex, datagram: &mut [u8]) -> usize {
+    /// Writes the head before what lies in the datagram already: of this kind, with packages of this level first. How long it is.
+    fn finish(&mut self, now_ns: u64, (kind, level): (Kind, Option<u8>), to: NodeIndex, datagram: &mut [u8]) -> usize {
         let (head, rest) = datagram.split_at_mut(frame::HEAD_BYTES);
         head.copy_from_slice(&self.head(kind, to).to_bytes(&[rest]));
-        self.left(now_ns, to, datagram.len());
+        self.left(now_ns, to, datagram.len(), level);
         datagram.len()
     }
 
@@ -114,12 +115,12 @@ impl Outbound {
         FrameHead { kind, system, from: own, to, digest, incarnation, sequence }
     }
 
-    fn left(&mut self, now_ns: u64, to: NodeIndex, bytes: usize) {
+    fn left(&mut self, now_ns: u64, to: NodeIndex, bytes: usize, level: Option<u8>) {
         let sent = &self.stats.peer(to).sent;
         sent.datagrams.add(1);
         sent.bytes.add(bytes as u64);
         self.peers[usize::from(to)].quiet_until_ns = now_ns + ALIVE_EVERY_NS;
-        self.pace.left(now_ns, bytes);
+        self.pace.left(now_ns, bytes, level);
     }
 
     /// A peer that is to be told that we are still there. If none is, notes when one will be.

@@ -148,10 +148,10 @@ impl Outbound {
             }
         };
         let needs_no_company = alone || self.fills_a_datagram(package.body.len());
-        if needs_no_company && self.may_leave_at_once(now_ns, package.body.len()) {
+        let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
+        if needs_no_company && self.may_leave_at_once(now_ns, level, package.body.len()) {
             return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package.body) };
         }
-        let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
         let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
         let stats = &self.stats;
         let taken = self.queue.push(waiting, package.body, |gone, body| {
@@ -172,6 +172,13 @@ impl Outbound {
         self.queue.used_bytes() >= 2 * self.datagram_bytes as u64
     }
 
+    /// What waits has at most this priority: only what is above it may leave before what waits.
+    pub fn waits_up_to(&self) -> Priority {
+        let level = self.queue.first().map(|place| self.queue.at(place).level);
+        let highest = (0..=u8::MAX).rev().find(|priority| Some(self.levels[usize::from(*priority)]) == level);
+        Priority(highest.unwrap_or_default())
+    }
+
     /// What leaves next, or when to ask again. `datagram` has room for the largest. Where there are time slots, see [`Self::poll_slot`].
     ///
     /// # Panics
@@ -188,10 +195,10 @@ impl Outbound {
         }
         let quiet_until_ns = if self.queue.is_empty() { self.alive_ns } else { self.alive_ns.min(self.sweep_ns) };
         while let Some(place) = self.queue.first() {
-            if let Err(until_ns) = self.pace.may_leave(now_ns) {
+            let waiting = *self.queue.at(place);
+            if let Err(until_ns) = self.pace.may_leave(now_ns, waiting.level) {
                 return Output::Wait { until_ns: until_ns.min(quiet_until_ns) };
             }
-            let waiting = *self.queue.at(place);
             if let Some(cause) = self.why_not(now_ns, waiting.peer, waiting.published_ns) {
                 self.drop_out(place, cause, report);
                 continue;
@@ -270,9 +277,12 @@ impl Outbound {
         self.senders.binary_search_by_key(&raw, |(name, _)| *name).map_or(self.others, |at| self.senders[at].1)
     }
 
-    fn may_leave_at_once(&self, now_ns: u64, body_bytes: usize) -> bool {
+    fn may_leave_at_once(&self, now_ns: u64, level: u8, body_bytes: usize) -> bool {
         let bytes = DIRECT_HEAD_BYTES + body_bytes;
-        self.queue.is_empty() && bytes <= self.datagram_bytes && !self.in_slots && self.pace.may_leave(now_ns).is_ok()
+        self.queue.is_empty()
+            && bytes <= self.datagram_bytes
+            && !self.in_slots
+            && self.pace.may_leave(now_ns, level).is_ok()
     }
 
     /// Two of this size are more than a datagram holds. Copied into the queue and out of it, it would leave no sooner.

@@ -1,4 +1,7 @@
 //! Bytes a second: a bucket of tokens, kept as the time at which it will be full.
+//!
+//! A flood keeps the bucket empty. What is more important than that which left last goes all the same, by one datagram in advance:
+//! so it is behind the one that is on the wire, and not behind the pace as well.
 
 use crate::broken::broken;
 use crate::settings::Settings;
@@ -17,23 +20,33 @@ pub(super) struct Pace {
     through_ns: u64,
     /// How far that may lie ahead.
     ahead_ns: u64,
+    /// How much farther for what is more important than what left last: a largest datagram.
+    advance_ns: u64,
+    /// Level of what left last.
+    level: u8,
 }
 
 impl Pace {
     pub(super) fn new(settings: &Settings) -> Self {
         let byte = (1_000_000_000 << FRACTION) / u128::from(settings.network.rate_bytes_s.max(1));
-        let mut pace = Self { byte, overhead_bytes: settings.overhead_bytes(), through_ns: 0, ahead_ns: 0 };
-        pace.ahead_ns = BURST_NS.saturating_sub(pace.takes_ns(settings.network.datagram_bytes_max));
+        let overhead_bytes = settings.overhead_bytes();
+        let mut pace = Self { byte, overhead_bytes, through_ns: 0, ahead_ns: 0, advance_ns: 0, level: 0 };
+        pace.advance_ns = pace.takes_ns(settings.network.datagram_bytes_max);
+        pace.ahead_ns = BURST_NS.saturating_sub(pace.advance_ns);
         pace
     }
 
-    /// Whether a datagram may leave now; else when.
-    pub(super) fn may_leave(&self, now_ns: u64) -> Result<(), u64> {
-        let from_ns = self.through_ns.saturating_sub(self.ahead_ns);
+    /// Whether a datagram whose most important package is of this level may leave now; else when.
+    pub(super) fn may_leave(&self, now_ns: u64, level: u8) -> Result<(), u64> {
+        let hurries = level < self.level && !broken!(NeverInAdvance);
+        let ahead_ns = self.ahead_ns + if hurries { self.advance_ns } else { 0 };
+        let from_ns = self.through_ns.saturating_sub(ahead_ns);
         if from_ns <= now_ns || broken!(Unpaced) { Ok(()) } else { Err(from_ns) }
     }
 
-    pub(super) fn left(&mut self, now_ns: u64, bytes: usize) {
+    /// A datagram has left; none: without packages.
+    pub(super) fn left(&mut self, now_ns: u64, bytes: usize, level: Option<u8>) {
+        self.level = level.unwrap_or(self.level);
         self.through_ns = self.through_ns.max(now_ns).saturating_add(self.takes_ns(bytes));
     }
 

@@ -11,8 +11,6 @@ use std::sync::Arc;
 
 /// Longest answer.
 const ANSWER_BYTES_MAX: usize = 1024;
-/// After so long the wire holds no copy any more of what the router's life before took.
-const YOUNG_NS: u64 = 500_000_000;
 
 /// Why a command goes no further.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -71,7 +69,7 @@ impl Answers {
         cause: Cause,
         takes_bytes: Option<usize>,
     ) {
-        if monotonic_ns().saturating_sub(self.stats.started_ns) >= YOUNG_NS {
+        if !self.stats.is_young(monotonic_ns()) {
             self.answer(peer, head, body, cause, takes_bytes);
         }
     }
@@ -118,6 +116,7 @@ impl Answers {
 mod tests {
     use super::*;
     use crate::harness::{module, settings};
+    use crate::stats::YOUNG_NS;
     use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
 
     /// Says the cause's word.

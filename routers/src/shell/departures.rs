@@ -16,7 +16,7 @@ use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
 use crate::report::Report;
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
-use rohrpost_mailbox::{Head, Receiver, monotonic_ns, wait_any};
+use rohrpost_mailbox::{Head, Receiver, monotonic_ns, wait_above, wait_any};
 use std::io::IoSlice;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -24,9 +24,6 @@ use std::time::{Duration, Instant};
 
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
 const BURST: usize = 64;
-/// While more waits in the mailbox than may leave, it rests for at most so long: whoever shares its processor goes on, and what is
-/// more important than all that waits is taken soon.
-const REST: Duration = Duration::from_micros(200);
 
 /// What the sending thread has.
 pub(super) struct Departures {
@@ -97,10 +94,11 @@ impl Departures {
         }
     }
 
-    /// The pace holds the wire, and the mailbox holds more: to sleep on its bell would not be to sleep.
+    /// The pace holds the wire, and the mailbox holds more. Only what may leave before all that waits is worth waking up for.
     fn rest(&mut self, now_ns: u64, until_ns: u64) {
         let until_ns = until_ns.min(self.wire.deliver(now_ns));
-        std::thread::sleep(Duration::from_nanos(until_ns.saturating_sub(now_ns)).min(REST));
+        let deadline = Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns));
+        wait_above(&mut self.transit, self.outbound.waits_up_to(), Some(deadline), || self.shared.ends());
     }
 
     /// Sleeps until a package comes, or until then. If something `waits` to leave, that is exact, and costs a timer of the kernel; else

@@ -10,9 +10,10 @@ use std::time::Duration;
 pub(super) const DEPARTURES_FIFO: u8 = FIFO_MAX + 9;
 /// Of the thread that receives: a flood of what leaves must not keep answers from coming in; it sleeps whenever the socket is empty.
 pub(super) const ARRIVALS_FIFO: u8 = DEPARTURES_FIFO + 1;
-/// A thread that has not slept for so long is made to, for this short time: the kernel ends a real-time process that works without
-/// pause (RLIMIT_RTTIME), and a flood is no reason to be ended.
-const AWAKE_MAX_NS: u64 = 250_000_000;
+/// A thread that has not slept for so long is made to, for this short time. A flood that a processor cannot carry would keep a router
+/// awake for good, and it stands above all modules: so those on its processor get a little of each of these spans, and the kernel,
+/// which ends real-time processes that work without pause (RLIMIT_RTTIME), has no reason to.
+const AWAKE_MAX_NS: u64 = 2_000_000;
 const PAUSE_NS: u64 = 50_000;
 
 /// What both threads see.

@@ -3,9 +3,6 @@
 use rohrpost_config::{Route, TRANSIT};
 use rohrpost_mailbox::{Name, Shape, local};
 
-/// Slots of the router's mailbox that one participant may be filling: as many mailboxes of other nodes as it may send to.
-const CLAIMS: u8 = u8::MAX;
-
 /// The ranges of names that lie on other nodes, as the mailboxes of a node want them; neighbours become one.
 pub(super) fn ranges(routes: &[Route]) -> Vec<(Name, Name)> {
     let mut ranges: Vec<(Name, Name)> = Vec::new();
@@ -30,7 +27,7 @@ pub(super) fn shape() -> Shape {
         body_bytes_max: TRANSIT.size.min(u16::MAX.into()) as u16,
         full: TRANSIT.full,
         max_age: TRANSIT.max_age,
-        claims: CLAIMS,
+        claims: TRANSIT.claims,
     }
 }
 

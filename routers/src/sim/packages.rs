@@ -25,8 +25,6 @@ pub const PORT: Port = 0;
 pub(super) const DIGEST: u64 = 0x1234_5678;
 /// A router that did nothing for so long stood still: threads do not wake that late.
 const STILL_NS: u64 = 400_000_000;
-/// After so long the wire holds nothing any more of what a router's last life took.
-const YOUNG_NS: u64 = 500_000_000;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
@@ -109,10 +107,6 @@ impl Packages {
             settings: settings.clone(),
             stats,
         }
-    }
-
-    fn is_young(&self, now: Now) -> bool {
-        now.monotonic_ns < self.stats.started_ns + YOUNG_NS
     }
 
     /// Takes all that waits in the transit mailbox.
@@ -281,7 +275,7 @@ impl Layer for Packages {
         };
         let incarnation = FrameHead::parse(&arrived.bytes).map_or(0, |(head, _)| head.incarnation);
         let came = Some(Came { at_ns: datagram.arrived_ns, incarnation });
-        let is_young = self.is_young(io.now);
+        let is_young = self.stats.is_young(io.now.monotonic_ns);
         let mut watch = Watch { io, came, is_out: false, is_young, undelivered: &mut self.undelivered };
         self.inbound.handle(watch.io.now.monotonic_ns, &datagram, &mut watch);
         let after = self.counted(source);
@@ -313,7 +307,7 @@ impl Layer for Packages {
         self.polled_ns = io.now.monotonic_ns;
         self.take_in(io);
         let mut until_ns = u64::MAX;
-        let is_young = self.is_young(io.now);
+        let is_young = self.stats.is_young(io.now.monotonic_ns);
         loop {
             let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {

@@ -78,7 +78,8 @@ impl Side {
         let (masters, count) = (vec![0], nodes.len() as u8);
         let settings = TimeSettings { system, own, nodes: count, masters, interval, digest, incarnation };
         let nodes = nodes.iter().map(|node| SocketAddr::new(node.address, network.time_port())).collect();
-        Some(ClockParts { settings, nodes, node: Some(self.node.clone()), impair: None, skew: None, observer: None })
+        let (node, kernel_stamps) = (Some(self.node.clone()), true);
+        Some(ClockParts { settings, nodes, node, impair: None, kernel_stamps, skew: None, observer: None })
     }
 
     pub(crate) fn join(&self) -> Arc<Participant> {

@@ -122,6 +122,7 @@ impl Station {
             nodes: (0..NODES).map(|node| SocketAddr::new(address(node), PORT + 1)).collect(),
             node: Some(self.node.clone()),
             impair: None,
+            kernel_stamps: true,
             // One computer has one clock: without this, all would be in step from the first moment on.
             skew: Some(self.skew),
             observer: None,

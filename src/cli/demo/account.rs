@@ -55,7 +55,7 @@ impl Balance {
                 let missing = sent - came;
                 balance
                     .wrong
-                    .push(format!("{missing} packages of class {class} did not come, and no datagram was lost"));
+                    .push(format!("of class {class}, packages that did not come: {missing}; no datagram was lost"));
             }
         }
         balance
@@ -71,8 +71,8 @@ impl fmt::Display for Balance {
         let Self { taken, delivered, lost, on_wire, datagrams, wrong } = self;
         writeln!(
             f,
-            "{taken} packages went to other nodes, {delivered} were delivered; {lost} were lost in routers, for the causes above, and \
-             {on_wire} on the wire, in {datagrams} datagrams"
+            "packages to other nodes: {taken}; delivered: {delivered}; lost in routers, for the causes above: {lost}\n\
+             lost on the wire: {on_wire}; datagrams that did not come whole: {datagrams}"
         )?;
         if wrong.is_empty() {
             return writeln!(f, "the accounts balance");
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(wrong(sent(), class(150, [0, 0, 8, 8], 0), 1), [""; 0], "one was in a datagram that is missing");
         assert_eq!(
             wrong(sent(), class(150, [0, 0, 8, 8], 0), 0),
-            ["1 packages of class 150 did not come, and no datagram was lost"]
+            ["of class 150, packages that did not come: 1; no datagram was lost"]
         );
         assert_eq!(wrong(sent(), class(150, [0, 0, 10, 10], 0), 0), ["of class 150, 9 packages were sent and 10 came"]);
         assert_eq!(

@@ -150,7 +150,7 @@ fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
             (true, false) => {
                 holds &= off_ns.unsigned_abs() <= stated_ns;
                 let (off_us, stated_us) = (off_ns as f64 / 1e3, stated_ns as f64 / 1e3);
-                format!("clock of {name}: {off_us:+.1} µs off the master's, at most {stated_us:.1} µs as it says\n")
+                format!("clock of {name}: {off_us:+.2} µs off the master's, at most {stated_us:.1} µs as it says\n")
             }
         };
     }

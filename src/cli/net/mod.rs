@@ -2,20 +2,13 @@
 
 mod show;
 
-use super::target::{Running, Target};
-use super::units::{Stop, seconds};
+use super::round::{Round, Rounds};
 use super::{Failure, say};
-use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{ClockState, Links, RouterInterface};
-use rohrpost::macro_support::{DataPort, append, from_bytes};
-use rohrpost::serde::de::DeserializeOwned;
-use rohrpost::{CallError, Fault, Name, ToolLink};
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// A router that does not answer for so long is silent.
-const PATIENCE: Duration = Duration::from_secs(1);
 /// Between the two looks that a rate is made of: routers tell how they are twice a second.
 const LOOK_AGAIN: Duration = Duration::from_millis(600);
 
@@ -24,20 +17,12 @@ const LOOK_AGAIN: Duration = Duration::from_millis(600);
   rohrpost net                all nodes, once
   rohrpost net --watch        again and again; Ctrl-C ends it
   rohrpost net --node arm --json
-`lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. Packages lost in \
-routers stand below, by class and cause. The exit code is 1 if a router does not answer or a peer is not alive.")]
+`lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. `refused` are \
+those that came from the peer's address and were not taken. Packages lost in routers stand below, by class and cause. The \
+exit code is 1 if a router does not answer or a peer is not alive.")]
 pub(super) struct Arguments {
     #[command(flatten)]
-    target: Target,
-    /// Show it again and again.
-    #[arg(long)]
-    watch: bool,
-    /// From one to the next, seconds.
-    #[arg(long, default_value_t = 1.0, value_name = "SECONDS", requires = "watch")]
-    interval: f64,
-    /// One JSON object a line.
-    #[arg(long)]
-    json: bool,
+    rounds: Rounds,
 }
 
 /// What a node's router says.
@@ -64,61 +49,45 @@ struct Rates {
     received_bytes_s: f64,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let running = arguments.target.find()?;
-    if running.installation.network.is_none() {
-        return Err("this installation has one node, and so no routers; `rohrpost list` shows what runs".into());
-    }
-    let interval = seconds(arguments.interval)?;
-    let stop = Stop::new()?;
-    let mut tool = running.join(PATIENCE)?;
-    let mut before = look(&running, &mut tool);
+pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
+    let mut round =
+        rounds.begin("this installation has one node, and so no routers; `rohrpost list` shows what runs")?;
+    let mut before = look(&mut round);
     let mut wait = LOOK_AGAIN;
-    let mut stopped = stop.within(wait);
+    let mut stopped = round.stop.within(wait);
     let mut well = false;
     while !stopped {
-        let mut now = look(&running, &mut tool);
+        let mut now = look(&mut round);
         for (told, before) in now.iter_mut().zip(&before) {
             told.rates = rates(before, told);
         }
         well = now.iter().all(Told::is_well);
-        let text = if arguments.json { serde_json::to_string(&now)? } else { show::text(&running, &now) };
-        if !say(text.trim_end()) || !arguments.watch {
+        let text = if rounds.json { serde_json::to_string(&now)? } else { show::text(&round.running, &now) };
+        if !say(text.trim_end()) || !rounds.watch {
             break;
         }
         before = now;
-        wait = interval;
-        stopped = stop.within(wait);
+        wait = round.interval;
+        stopped = round.stop.within(wait);
     }
-    tool.close();
+    round.close();
     Ok(if well || stopped { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Asks the routers of all nodes that are meant.
-fn look(running: &Running, tool: &mut ToolLink) -> Vec<Told> {
-    running.shown().into_iter().map(|node| ask(running, tool, node)).collect()
+fn look(round: &mut Round) -> Vec<Told> {
+    round.nodes().into_iter().map(|node| ask(round, node)).collect()
 }
 
-fn ask(running: &Running, tool: &mut ToolLink, node: &str) -> Told {
-    let mut told = Told { node: node.into(), time_ns: 0, links: None, clock: None, rates: Vec::new(), failure: None };
-    let Some(router) = running.installation.router_of(node) else { return told };
-    match newest(tool, router, RouterInterface::LINKS) {
-        Ok((time_ns, links)) => {
-            told.links = Some(links);
-            told.time_ns = time_ns;
-            // A router that has no clock publishes none.
-            told.clock = newest(tool, router, RouterInterface::CLOCK).ok().map(|(_, clock)| clock);
-        }
-        Err(CallError::Fault(_, Fault::NothingYet)) => told.failure = Some("it has just begun; ask again".into()),
-        Err(error) => told.failure = Some(running.told(router, &error).to_string()),
-    }
-    told
-}
-
-/// The newest value that a router has published, and of when it is.
-fn newest<T: DeserializeOwned>(tool: &mut ToolLink, router: Name, port: DataPort<T>) -> Result<(u64, T), CallError> {
-    let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-    tool.call(router, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes))
+fn ask(round: &mut Round, node: String) -> Told {
+    let links = round.newest(&node, RouterInterface::LINKS);
+    // A router that has no clock publishes none.
+    let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
+    let (time_ns, links, failure) = match links {
+        Ok((time_ns, links)) => (time_ns, Some(links), None),
+        Err(failure) => (0, None, Some(failure)),
+    };
+    Told { node, time_ns, links, clock: clock.map(|(_, clock)| clock), rates: Vec::new(), failure }
 }
 
 /// What went by between two looks; nothing if the router was started anew in between, or has not told anything new.

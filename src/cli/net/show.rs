@@ -22,7 +22,7 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
             parts.push(format!("node {} and node {} refuse each other: {}\n", told.node, peer.node, peer.why));
         }
     }
-    parts.extend([failures(all), waiting(all), losses(running, all), clocks(all)]);
+    parts.extend([strangers(all), failures(all), waiting(all), losses(running, all), clocks(all)]);
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
 }
@@ -47,6 +47,7 @@ fn links(all: &[Told]) -> String {
                 peer.missed.to_string(),
                 peer.copies.to_string(),
                 peer.damaged.to_string(),
+                peer.refused.to_string(),
                 peer.unsent.to_string(),
             ]);
         }
@@ -56,7 +57,7 @@ fn links(all: &[Told]) -> String {
     }
     let heads = [
         "node", "peer", "state", ">heard", ">out/s", ">B/s", ">in/s", ">B/s", ">lost", ">missed", ">copies",
-        ">damaged", ">unsent",
+        ">damaged", ">refused", ">unsent",
     ];
     table(heads, rows)
 }
@@ -71,12 +72,42 @@ fn state(state: LinkState) -> &'static str {
     }
 }
 
+/// Datagrams that were not taken since they came from nobody, or from a peer that is another than it should be, and what to do.
+fn strangers(all: &[Told]) -> String {
+    let mut text = String::new();
+    for links in all.iter().filter_map(|told| told.links.as_ref()) {
+        for peer in links.peers.iter().filter(|peer| peer.refused > 0) {
+            text += &format!(
+                "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or version (launch all \
+                 nodes from the same file; `rohrpost version`), or of a router of it that is over\n",
+                links.node,
+                datagrams(peer.refused),
+                peer.address,
+                peer.node
+            );
+        }
+        if links.foreign > 0 {
+            text += &format!(
+                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's: if another installation uses this \
+                 network, give one of them another `port` in [network]\n",
+                links.node,
+                datagrams(links.foreign)
+            );
+        }
+    }
+    text
+}
+
+fn datagrams(count: u64) -> String {
+    if count == 1 { "1 datagram".into() } else { format!("{count} datagrams") }
+}
+
 /// What was refused by computers themselves. That nobody listened is no news: that one is silent.
 fn failures(all: &[Told]) -> String {
     let links = all.iter().filter_map(|told| told.links.as_ref());
     let all = links.flat_map(|links| links.failures.iter().map(|failure| (&links.node, failure)));
     let told = all.filter(|(_, failure)| failure.cause != "nobody-there");
-    told.map(|(node, failure)| format!("node {node}: {} datagrams not sent: {}\n", failure.times, failure.cause))
+    told.map(|(node, failure)| format!("node {node}: {} not sent: {}\n", datagrams(failure.times), failure.cause))
         .collect()
 }
 

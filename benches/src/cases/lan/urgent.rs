@@ -6,7 +6,10 @@
 //!                            ├▶ router ═▶ router┤
 //!  flooder (processor 1) ────┘      ◀═          └─▶ swamp (processor 0): takes what comes of the flood
 //! ```
-//! The routers send as fast as they do by default. The flooder gives more: the router's mailbox is full of its packages, and so is
+//! `urgent`: the routers send as fast as an Ethernet of 100 Mbit/s, which two processors carry. `urgent-saturated`: as fast as they do
+//! by default, which they do not: then it is told what the urgent ones wait for where routers have no processor left.
+//!
+//! The flooder gives more than may leave: the router's mailbox is full of its packages, and so is
 //! its quota of the queue; what is too much is refused, or lost there. Of the urgent ones none may be. Flooder and swamp have
 //! FIFO 10, before other programs and after all that is timed, and each is where the router of its node is not. The flooder pauses
 //! for 2 ms in 20, so that the kernel's fair server stays out; what waits in the queue lasts longer.
@@ -39,23 +42,28 @@ const CAP: Duration = Duration::from_secs(3);
 /// What an urgent package takes at most; one that takes longer is lost.
 const LOST_AFTER: Duration = Duration::from_secs(1);
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
-/// As a user gets it.
-const USUAL: Network = Network { mtu: 1_500, rate: "100 MiB", quota: "256 KiB" };
+const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB" };
+/// As a user gets it who says nothing.
+const USUAL: Network = Network { rate: "100 MiB", ..CARRIED };
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Urgent)]
+    let urgent = |name, network| Box::new(Urgent { name, network }) as Box<dyn Case>;
+    vec![urgent("urgent", CARRIED), urgent("urgent-saturated", USUAL)]
 }
 
-struct Urgent;
+struct Urgent {
+    name: &'static str,
+    network: Network,
+}
 
 impl Case for Urgent {
     fn name(&self) -> String {
-        "urgent".into()
+        self.name.into()
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = Ground::new(settings, &USUAL);
+        let ground = Ground::new(settings, &self.network);
         let messages = settings.count(MESSAGES);
         let cell = Cell {
             bytes: BYTES,

@@ -2,6 +2,7 @@
 
 use super::*;
 use proptest::prelude::*;
+use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, FlowSecond, Latency, Type};
 
 /// A look with something in each of its parts.
 fn seen() -> Seen {

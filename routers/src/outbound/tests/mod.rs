@@ -12,6 +12,7 @@ mod slot;
 pub(crate) const CHECKS: &[fn()] = &[
     check_what_does_not_go,
     check_pace,
+    check_advance,
     check_commands_do_not_hurry,
     check_order_on_the_wire,
     check_waiting_too_long,
@@ -251,6 +252,40 @@ fn check_pace() {
 #[test]
 fn the_rate_is_kept() {
     check_pace();
+}
+
+/// While a flood keeps the wire busy, each of these may leave before its time: those that are more important than what left last.
+fn check_advance() {
+    let mut end = End::new(0, |settings| settings.network.rate_bytes_s = 1_000_000);
+    end.hears(1, START);
+    let flood = |end: &mut End, now_ns| {
+        while end.stats.waiting_in_all() < 20 {
+            end.queue(now_ns, to(1, 90), &[0; 1000]);
+        }
+    };
+    flood(&mut end, START);
+    let mut now_ns = START + 10 * MS;
+    for _ in 0..20 {
+        flood(&mut end, now_ns);
+        let through_ns = loop {
+            if let Err(until_ns) = end.poll(now_ns) {
+                break until_ns;
+            }
+            flood(&mut end, now_ns);
+        };
+        end.queue(now_ns, to(1, 150), b"urgent");
+        assert_eq!(end.poll(now_ns).map(|(to, _)| to), Ok(1), "at once, although the pace holds until {through_ns}");
+        end.queue(now_ns, to(1, 150), b"one more of its level");
+        now_ns = end.poll(now_ns).expect_err("nothing else goes in advance");
+        assert!(now_ns > through_ns, "what went in advance is paid for");
+        assert!(end.poll(now_ns).is_ok(), "the other one");
+        now_ns = end.poll(now_ns).expect_err("the flood's turn comes");
+    }
+}
+
+#[test]
+fn what_is_more_important_than_a_flood_does_not_wait_for_the_pace() {
+    check_advance();
 }
 
 #[test]

@@ -63,6 +63,8 @@ pub struct ClockParts {
     pub node: Option<Arc<Node>>,
     /// A bad network before its socket.
     pub impair: Option<impair::Settings>,
+    /// Whether the kernel stamps datagrams, if it can; else the clock does, as where it cannot.
+    pub kernel_stamps: bool,
     /// For tests: see [`Skew`].
     pub skew: Option<Skew>,
     /// For measurements: each exchange, as long as there is room.
@@ -84,7 +86,8 @@ impl ClockParts {
             incarnation: router.incarnation,
         };
         let nodes = router.nodes.iter().map(|node| SocketAddr::new(node.address, port)).collect();
-        Some(Self { settings, nodes, node: Some(node.clone()), impair: None, skew: None, observer: None })
+        let node = Some(node.clone());
+        Some(Self { settings, nodes, node, impair: None, kernel_stamps: true, skew: None, observer: None })
     }
 }
 

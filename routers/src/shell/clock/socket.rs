@@ -41,7 +41,7 @@ pub(super) struct Came {
 
 impl TimeSocket {
     /// Binds `own`; peers are reached at the port given with them.
-    pub(super) fn open(own: SocketAddr, peers: &[SocketAddr]) -> io::Result<Self> {
+    pub(super) fn open(own: SocketAddr, peers: &[SocketAddr], kernel_stamps: bool) -> io::Result<Self> {
         let socket = Socket::new(Domain::for_address(own), Type::DGRAM, Some(Protocol::UDP))?;
         if own.is_ipv6() {
             socket.set_only_v6(true)?;
@@ -52,8 +52,10 @@ impl TimeSocket {
         let wanted = TimestampingFlag::SOF_TIMESTAMPING_TX_SOFTWARE
             | TimestampingFlag::SOF_TIMESTAMPING_RX_SOFTWARE
             | TimestampingFlag::SOF_TIMESTAMPING_SOFTWARE;
-        // Without them the clock stamps by itself, and says so.
-        let _ = setsockopt(&socket, sockopt::Timestamping, &wanted);
+        if kernel_stamps {
+            // Without them the clock stamps by itself, and says so.
+            let _ = setsockopt(&socket, sockopt::Timestamping, &wanted);
+        }
         socket.set_nonblocking(true)?;
         socket.bind(&own.into())?;
         Ok(Self {

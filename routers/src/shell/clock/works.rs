@@ -43,10 +43,10 @@ pub(in crate::shell) struct Works {
 impl Works {
     /// Binds the socket. What an earlier life of this router wrote in the node's page goes on.
     pub(in crate::shell) fn new(parts: ClockParts) -> Result<Self, ClockError> {
-        let ClockParts { settings, nodes, node, impair, skew, observer } = parts;
+        let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
         let own = settings.own;
         let at = nodes.get(usize::from(own)).copied().unwrap_or(SocketAddr::new(IpAddr::from([0; 16]), 0));
-        let socket = TimeSocket::open(at, &nodes).map_err(|error| ClockError::Socket(at, error))?;
+        let socket = TimeSocket::open(at, &nodes, kernel_stamps).map_err(|error| ClockError::Socket(at, error))?;
         let keeper = node.as_ref().map(TimeKeeper::resume).transpose()?;
         let page = keeper.as_ref().and_then(TimeKeeper::record);
         let local = LocalClock::new(skew);

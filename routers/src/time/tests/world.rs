@@ -10,61 +10,16 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::time::Duration;
 
+mod check;
+mod hardware;
+
+use check::TermTime;
+use hardware::Oscillator;
+pub(super) use hardware::Ways;
+
 pub(super) const MS: u64 = 1_000_000;
 pub(super) const SECOND: u64 = 1_000 * MS;
 const WALL_NS: u64 = 1_790_000_000 * SECOND;
-
-/// An oscillator: local time as a function of true time.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Oscillator {
-    pub(super) offset_ns: u64,
-    pub(super) rate_ppb: i64,
-    /// The rate swings by so much, with this period.
-    pub(super) wander_ppb: f64,
-    pub(super) period_ns: f64,
-    pub(super) phase: f64,
-}
-
-impl Oscillator {
-    fn local_ns(&self, true_ns: u64) -> u64 {
-        let swing = |t: f64| {
-            let turn = std::f64::consts::TAU / self.period_ns;
-            -(turn * t + self.phase).cos() * self.wander_ppb * 1e-9 / turn
-        };
-        let even = i128::from(true_ns) + i128::from(true_ns) * i128::from(self.rate_ppb) / 1_000_000_000;
-        let local = i128::from(self.offset_ns) + even + (swing(true_ns as f64) - swing(0.0)) as i128;
-        u64::try_from(local).unwrap()
-    }
-}
-
-/// What the network and the computers do.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ways {
-    pub(super) delay_ns: u64,
-    /// Of the way to nodes of a higher index: so much more.
-    pub(super) asymmetry_ns: u64,
-    pub(super) jitter_ns: u64,
-    /// Of a thousand.
-    pub(super) loss: u32,
-    pub(super) twice: u32,
-    pub(super) kernel_stamps: bool,
-    /// A thread that wants to run waits so long, now and then ten times as long.
-    pub(super) wakeup_ns: u64,
-}
-
-impl Ways {
-    pub(super) const LAN: Self = Self {
-        delay_ns: 15_000,
-        asymmetry_ns: 3_000,
-        jitter_ns: 20_000,
-        loss: 0,
-        twice: 0,
-        kernel_stamps: true,
-        wakeup_ns: 40_000,
-    };
-    pub(super) const BAD: Self =
-        Self { delay_ns: 2 * MS, asymmetry_ns: 200_000, jitter_ns: MS, loss: 50, twice: 10, ..Self::LAN };
-}
 
 struct Node {
     clock: Option<Clock>,
@@ -77,21 +32,6 @@ struct Node {
     last: Option<(u64, u64)>,
     wakes_at: u64,
     frozen_until: u64,
-}
-
-/// The time of a term: the line of its master, as the master had it at the beginning, shifted to where the time before went on.
-#[derive(Clone, Copy)]
-struct TermTime {
-    node: NodeIndex,
-    oscillator: Oscillator,
-    record: TimeRecord,
-    shift_ns: i128,
-}
-
-impl TermTime {
-    fn at(&self, true_ns: u64) -> i128 {
-        i128::from(self.record.at(self.oscillator.local_ns(true_ns)).ns) + self.shift_ns
-    }
 }
 
 enum Event {
@@ -401,62 +341,5 @@ impl World {
         let wrong = self.random.random_range(-100..=100);
         let ns = self.nodes[usize::from(node)].oscillator.local_ns(true_ns).saturating_add_signed(wrong);
         Stamp { ns, doubt_ns: 100, by_kernel: true }
-    }
-
-    /// Everything that must hold of a node at any moment.
-    fn check(&mut self, node: NodeIndex) {
-        let (now, local_ns) = (self.now, self.local_ns(node));
-        self.check_reign(node);
-        let one = &mut self.nodes[usize::from(node)];
-        let is_slave = one.clock.as_ref().is_some_and(|clock| clock.role() == Role::Slave);
-        if let Some(clock) = &one.clock {
-            let term = clock.reading(local_ns).term;
-            one.page = Some(*clock.record());
-            one.page_term = if term.is_none() { one.page_term } else { term };
-        }
-        let Some(page) = one.page else { return };
-        let (time, term) = (page.at(local_ns), one.page_term);
-        let last = one.last.replace((time.epoch, time.ns));
-        if let Some((epoch, ns)) = last
-            && (time.epoch < epoch || (time.epoch == epoch && time.ns < ns))
-        {
-            self.fail(&format!(
-                "node {node} goes back: epoch {epoch} to {}, by {} ns",
-                time.epoch,
-                ns.wrapping_sub(time.ns)
-            ));
-        }
-        let truth = self.terms.get(&term.0).filter(|_| page.error_ns < rohrpost_mailbox::ERROR_UNKNOWN_NS);
-        let Some(truth) = truth else { return };
-        let off_ns = (i128::from(time.ns) - truth.at(now)).unsigned_abs();
-        if off_ns > time.error.as_nanos() {
-            let tell = format!("node {node} is off by {off_ns} ns, and says {:?}\n{}", time.error, self.tell());
-            self.fail(&tell);
-        }
-        if is_slave {
-            self.errors.push((off_ns as u64, time.error.as_nanos() as u64));
-        }
-    }
-
-    /// A master that was none before begins a term, which goes on from the time before unless an epoch began.
-    fn check_reign(&mut self, node: NodeIndex) {
-        let one = &self.nodes[usize::from(node)];
-        let Some(clock) = one.clock.as_ref().filter(|clock| clock.role() == Role::Master) else { return };
-        let (term, record, oscillator) = (clock.term(), *clock.record(), one.oscillator);
-        if let Some(known) = self.terms.get(&term.0) {
-            if known.node != node {
-                self.fail(&format!("nodes {node} and {} are masters of {term:?}", known.node));
-            }
-            return;
-        }
-        let mut begun = TermTime { node, oscillator, record, shift_ns: 0 };
-        let before = self.terms.get(&one.page_term.0);
-        if let (Some(before), Some(page)) = (before, one.page)
-            && page.epoch == record.epoch
-        {
-            begun.shift_ns = before.at(self.now) - begun.at(self.now);
-        }
-        self.terms.insert(term.0, begun);
-        self.reigns.push((self.now, node));
     }
 }

@@ -1,0 +1,55 @@
+//! Oscillators, and what the network and the computers do.
+
+use super::MS;
+
+/// An oscillator: local time as a function of true time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Oscillator {
+    pub(super) offset_ns: u64,
+    pub(super) rate_ppb: i64,
+    /// The rate swings by so much, with this period.
+    pub(super) wander_ppb: f64,
+    pub(super) period_ns: f64,
+    pub(super) phase: f64,
+}
+
+impl Oscillator {
+    pub(super) fn local_ns(&self, true_ns: u64) -> u64 {
+        let swing = |t: f64| {
+            let turn = std::f64::consts::TAU / self.period_ns;
+            -(turn * t + self.phase).cos() * self.wander_ppb * 1e-9 / turn
+        };
+        let even = i128::from(true_ns) + i128::from(true_ns) * i128::from(self.rate_ppb) / 1_000_000_000;
+        let local = i128::from(self.offset_ns) + even + (swing(true_ns as f64) - swing(0.0)) as i128;
+        u64::try_from(local).unwrap()
+    }
+}
+
+/// What the network and the computers do.
+#[derive(Clone, Copy, Debug)]
+pub(in super::super) struct Ways {
+    pub(in super::super) delay_ns: u64,
+    /// Of the way to nodes of a higher index: so much more.
+    pub(in super::super) asymmetry_ns: u64,
+    pub(in super::super) jitter_ns: u64,
+    /// Of a thousand.
+    pub(in super::super) loss: u32,
+    pub(in super::super) twice: u32,
+    pub(in super::super) kernel_stamps: bool,
+    /// A thread that wants to run waits so long, now and then ten times as long.
+    pub(in super::super) wakeup_ns: u64,
+}
+
+impl Ways {
+    pub(in super::super) const LAN: Self = Self {
+        delay_ns: 15_000,
+        asymmetry_ns: 3_000,
+        jitter_ns: 20_000,
+        loss: 0,
+        twice: 0,
+        kernel_stamps: true,
+        wakeup_ns: 40_000,
+    };
+    pub(in super::super) const BAD: Self =
+        Self { delay_ns: 2 * MS, asymmetry_ns: 200_000, jitter_ns: MS, loss: 50, twice: 10, ..Self::LAN };
+}

@@ -1,0 +1,73 @@
+//! The routers of all nodes, asked one after the other, once or again and again: what `net` and `time` have in common.
+
+use super::Failure;
+use super::target::{Running, Target};
+use super::units::{Stop, seconds};
+use rohrpost::common::GET_DATA;
+use rohrpost::macro_support::{DataPort, append, from_bytes};
+use rohrpost::serde::de::DeserializeOwned;
+use rohrpost::{CallError, Fault, ToolLink};
+use std::time::Duration;
+
+/// A router that does not answer for so long is silent.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Whom to ask, and how often.
+#[derive(clap::Args)]
+pub(super) struct Rounds {
+    #[command(flatten)]
+    target: Target,
+    /// Show it again and again.
+    #[arg(long)]
+    pub(super) watch: bool,
+    /// From one to the next, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS", requires = "watch")]
+    interval: f64,
+    /// One JSON object a line.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Who asks.
+pub(super) struct Round {
+    pub(super) running: Running,
+    pub(super) interval: Duration,
+    pub(super) stop: Stop,
+    tool: ToolLink,
+}
+
+impl Rounds {
+    /// Finds the installation; of one without routers, `alone` says what to look at instead.
+    pub(super) fn begin(&self, alone: &str) -> Result<Round, Failure> {
+        let running = self.target.find()?;
+        if running.installation.network.is_none() {
+            return Err(alone.into());
+        }
+        let (interval, stop) = (seconds(self.interval)?, Stop::new()?);
+        let tool = running.join(PATIENCE)?;
+        Ok(Round { running, interval, stop, tool })
+    }
+}
+
+impl Round {
+    /// Names of the nodes that are meant.
+    pub(super) fn nodes(&self) -> Vec<String> {
+        self.running.shown().into_iter().map(str::to_owned).collect()
+    }
+
+    /// The newest value that a node's router has published and of when it is, or why there is none.
+    pub(super) fn newest<T: DeserializeOwned>(&mut self, node: &str, port: DataPort<T>) -> Result<(u64, T), String> {
+        let router = self.running.installation.router_of(node).ok_or("it has no router")?;
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let newest = self.tool.call(router, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
+        newest.map_err(|error| match error {
+            CallError::Fault(_, Fault::NothingYet) => "it has just begun; ask again".into(),
+            error => self.running.told(router, &error).to_string(),
+        })
+    }
+
+    /// Nobody is asked any more.
+    pub(super) fn close(self) {
+        self.tool.close();
+    }
+}
