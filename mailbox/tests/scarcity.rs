@@ -6,7 +6,7 @@ mod common;
 
 use common::{Ground, LOW, MAILBOX, OTHER, label, shape, stay, tell};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
-use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, SendError, Shape, sys::room};
+use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, Receiver, SendError, Shape, sys::room};
 use std::ffi::CString;
 use std::fs;
 use std::io::{self, Write};
@@ -16,6 +16,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
+use std::time::Instant;
 
 #[test]
 fn role() {
@@ -26,12 +27,23 @@ fn role() {
         ("intrude", _) => intrude(&ground),
         ("own", number) => {
             let me = ground.join();
-            let made = names(number.parse().unwrap()).map(|name| me.receiver(name, SMALL).unwrap());
-            let _all: Vec<_> = made.collect();
+            let _all: Vec<_> = names(number.parse().unwrap()).map(|name| made(&me, name)).collect();
             tell("there");
             stay();
         }
         (other, _) => panic!("no role {other}"),
+    }
+}
+
+/// A mailbox, made as soon as it is this process's turn: on a busy computer another one may change the registry for longer than anybody
+/// waits, and is said to.
+fn made(me: &Arc<Participant>, name: Name) -> Receiver {
+    let give_up = Instant::now() + common::PATIENCE;
+    loop {
+        match me.receiver(name, SMALL) {
+            Err(CreateError::Node(NodeError::Busy(_))) if Instant::now() < give_up => {}
+            made => return made.unwrap(),
+        }
     }
 }
 
