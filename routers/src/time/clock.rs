@@ -80,6 +80,8 @@ pub struct Clock {
     /// The term that the line follows, and in which this node's own began.
     term: Term,
     began: Term,
+    /// In which term the timeline began that the line goes by; a master that is heard need not be on it yet.
+    timeline: Term,
     /// Until when the stated growth of the bound holds; and the span that it was stated for.
     stated: (u64, u64),
     /// It needs a new epoch.
@@ -126,6 +128,7 @@ impl Clock {
             history: History::new(exchange_ns.saturating_mul(4).max(BUCKET_NS_MIN)),
             term: Term::NONE,
             began: Term::NONE,
+            timeline: Term::NONE,
             stated: (now_ns, interval_ns.saturating_mul(4)),
             far: false,
             epoch_began_ns: 0,

@@ -81,10 +81,6 @@ impl History {
         self.samples
     }
 
-    pub(super) fn is_new(&self) -> bool {
-        self.samples == 0
-    }
-
     /// Delay of both ways together in the best exchange that is kept, ns.
     pub(super) fn delay_ns(&self) -> Option<u64> {
         self.buckets.iter().map(|sample| sample.width_ns().unsigned_abs()).min()

@@ -57,7 +57,7 @@ impl Clock {
         }
         self.forget();
         self.drafts.clear();
-        (self.term, self.began) = (term, term);
+        (self.term, self.began, self.timeline) = (term, term, term);
         (self.offset_ns, self.far, self.epoch_began_ns) = (0, false, 0);
         self.slaves.iter_mut().for_each(|slave| *slave = Slave { next_ns: now_ns, ..Slave::default() });
         let error_ns = self.line.record().error_ns;

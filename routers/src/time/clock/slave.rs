@@ -44,7 +44,8 @@ impl Clock {
                     self.drafts.clear();
                 }
             }
-            Heard::Followed if self.term.rank() == sync.term.rank() && !self.history.is_new() => self.term = sync.term,
+            // Its reign goes on under a later term, and with it the timeline.
+            Heard::Followed if self.timeline == sync.began => self.term = sync.term,
             Heard::Followed => {}
         }
         self.heard_in_slots(received, sync, heard == Heard::Turned && is_contested, heard == Heard::Turned);
@@ -127,7 +128,7 @@ impl Clock {
             let within_ns = self.exchange_ns.saturating_mul(4).max(SERVO_NS_MIN);
             self.line.bend(now_ns, by_ns, within_ns, pace_ppb, error_ns, drift_ns_s);
         }
-        (self.term, self.far, self.offset_ns) = (master.term, false, by_ns);
+        (self.term, self.timeline, self.far, self.offset_ns) = (master.term, master.began, false, by_ns);
         self.stated = (now_ns.saturating_add(self.horizon_ns()), self.horizon_ns());
         self.slots.iter_mut().for_each(|slots| slots.goes_by(master.error_ns));
     }
