@@ -4,6 +4,7 @@ use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::module::{Lines, Module};
 use crate::reader::Reader;
+use crate::tdma;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
 
@@ -23,6 +24,10 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], reader: &Read
     }
     for flow in &installation.flows {
         self::flow(installation, flow, lines, reader);
+    }
+    // What follows from other mistakes is not worth judging.
+    if reader.is_content() {
+        tdma::judge(installation, reader);
     }
 }
 

@@ -14,7 +14,7 @@ pub struct Digest {
     /// Equal wherever packages are exchanged: the classes, by id and name.
     pub common: u64,
     /// Equal inside a system: its nodes, their tool instances, which module is where, and what routers agree on: port, MTU, masters
-    /// of time and how often they synchronise.
+    /// of time and how often they synchronise, the time slots and their tunnel.
     pub system: u64,
 }
 
@@ -60,6 +60,9 @@ impl Installation {
         // The order of the nodes is their index on the wire.
         if let Some(network) = &self.network {
             let order: Vec<&str> = self.nodes.iter().map(|node| node.name.as_str()).collect();
+            if let Some(tdma) = &self.tdma {
+                lines.push(tdma.lan_text());
+            }
             lines.push(format!(
                 "network {} order {} time {}",
                 network.lan_text(),

@@ -1,5 +1,8 @@
 //! Says in words what an installation means: the page that `rohrpost check` prints, readable at 100 columns.
 
+mod slots;
+mod timeline;
+
 use crate::Full;
 use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
@@ -32,9 +35,11 @@ pub fn explain(installation: &Installation, node: Option<&str>) -> String {
         page.line("");
         page.line(format!("There is no node `{name}`; the nodes are {}.", nodes.join(", ")));
     }
+    page.slots();
     page.output();
     page.gui();
     page.flows();
+    page.at_worst();
     page.text
 }
 
@@ -112,16 +117,20 @@ impl Page<'_> {
 
     fn network(&mut self) {
         let Some(network) = self.installation.network else { return };
+        let sends = match &self.installation.tdma {
+            None => format!("at most {} a second", size_text(network.rate_bytes_s)),
+            Some(_) => "in its time slots only".into(),
+        };
         self.entry(
             "network",
             &format!(
-                "UDP ports {} (packages) and {} (time); IP packets of at most {} B, so datagrams of {} B; each router sends at most {} a \
-                 second, and keeps {} of each sender waiting",
+                "UDP ports {} (packages) and {} (time); IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps {} \
+                 of each sender waiting",
                 network.port,
                 network.time_port(),
                 network.mtu,
                 network.datagram_bytes_max,
-                size_text(network.rate_bytes_s),
+                sends,
                 size_text(network.quota_bytes as u64)
             ),
         );

@@ -13,6 +13,7 @@ use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
+use crate::tdma::Tdma;
 use crate::time::TimeSource;
 use rohrpost_mailbox::{Class, Name};
 use std::path::{Path, PathBuf};
@@ -41,6 +42,8 @@ pub struct Installation {
     pub modules: Vec<Module>,
     /// How nodes reach each other; none if there is one only.
     pub network: Option<Network>,
+    /// When each node sends; none if each sends as packages come.
+    pub tdma: Option<Tdma>,
     /// Where system time comes from.
     pub time: TimeSource,
     /// What the output service keeps.
@@ -142,11 +145,13 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     );
     let scheduling = SchedulingRule::read(file.section("scheduling", "[scheduling]"));
     let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
-    let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes));
-    let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes);
+    let tdma = Tdma::read(&file, sections(&file, "slot"), &nodes);
+    let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes, tdma.as_ref()));
+    let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
+    let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
     network::judge(&file, &nodes, &classes);
 
-    let sections = sections(&file, "module");
+    let sections = self::sections(&file, "module");
     if sections.is_empty() {
         file.report("no module; add one: `[[module]]` with `name` and `builtin` or `program`");
     }
@@ -176,6 +181,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         nodes,
         modules,
         network,
+        tdma,
         time,
         output,
         gui,

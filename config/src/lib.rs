@@ -31,6 +31,7 @@
 //! Every key of the file is described in [`manual`].
 #![forbid(unsafe_code)]
 
+mod bounds;
 mod calls;
 mod check;
 mod classes;
@@ -51,9 +52,12 @@ mod reader;
 mod saved;
 mod scheduling;
 mod settings;
+mod tdma;
 mod time;
 mod units;
+pub mod wire;
 
+pub use bounds::{Bound, FlowBound, TAKEN_BEFORE, Unbounded, bounds};
 pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TOOL, is_word as is_class_name};
 pub use digest::Digest;
 pub use errors::{Errors, Problem};
@@ -72,8 +76,11 @@ pub use rohrpost_mailbox::Full;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
+pub use tdma::{LATE, Tdma, TimeSlot, Tunnel};
 pub use time::TimeSource;
-pub use units::{UnitError, duration_text, parse_duration, parse_size, size_text};
+pub use units::{
+    UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,
+};
 
 #[doc = include_str!("../../docs/src/configuration.md")]
 pub mod manual {}

@@ -9,6 +9,8 @@ use crate::mailbox::{MailboxSpec, Mailboxes, lines_at};
 use crate::module::{Lines, Module, Program, Restart, RestartPolicy, Start};
 use crate::node::Node;
 use crate::reader::Section;
+use crate::tdma::Tdma;
+use crate::units::rate_text;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Full, Name, Priority};
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -56,7 +58,7 @@ pub struct Network {
     pub mtu: u16,
     /// Largest datagram, in bytes behind the heads of IP and UDP.
     pub datagram_bytes_max: usize,
-    /// Bytes a second that a router sends at most, the heads of IP and UDP counted.
+    /// Bytes a second that a router sends at most, the heads of IP and UDP counted; with time slots those that the link carries.
     pub rate_bytes_s: u64,
     /// Bytes of one sender's packages that its node's router keeps waiting.
     pub quota_bytes: usize,
@@ -91,7 +93,13 @@ impl Network {
         if priority.0 < self.bulk_below { LEVEL_NOT_REAL_TIME } else { (15 - (priority.0 >> 4)) * 2 }
     }
 
-    pub(crate) fn read(section: Section<'_>, nodes: &[Node]) -> Self {
+    /// What IP and UDP put before each datagram.
+    pub(crate) fn heads_bytes(is_v6: bool) -> usize {
+        if is_v6 { HEADS_V6 } else { HEADS_V4 }
+    }
+
+    /// `tdma` are the time slots in which nodes send, if they do.
+    pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) -> Self {
         if nodes.len() == 1 {
             section
                 .report("there is one node, so nothing goes over a network; drop this section, or add the other nodes");
@@ -102,16 +110,27 @@ impl Network {
         let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
         let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
         let mtu = section.get("mtu").and_then(|item| item.whole(least..=*MTUS.end(), MTU)).unwrap_or(MTU) as usize;
-        let rate = section.get("rate").and_then(|item| item.size(RATES, "100 MiB"));
+        // Whoever reads the slots has judged it.
+        let _ = section.get("mode");
+        let rate = section.get("rate").and_then(|item| match tdma {
+            None => item.size(RATES, "100 MiB"),
+            Some(tdma) => {
+                let link = rate_text(tdma.link_bytes_s * 8);
+                item.report(format!(
+                    "`rate`: with time slots a node sends what its slots hold at the `link` of [tdma], {link}; drop `rate`"
+                ));
+                None
+            }
+        });
         let quota = section.get("quota").and_then(|item| item.size(QUOTAS, "256 KiB"));
         let bulk = section.get("bulk-below").and_then(|item| item.whole(0..=255, BULK_BELOW.into()));
         section.finish();
-        let heads = if is_v6 { HEADS_V6 } else { HEADS_V4 };
+        let heads = Self::heads_bytes(is_v6);
         Self {
             port: port.map_or(PORT, |port| port as u16),
             mtu: mtu as u16,
             datagram_bytes_max: (mtu - heads).min(PAYLOAD_MAX),
-            rate_bytes_s: rate.unwrap_or(RATE),
+            rate_bytes_s: tdma.map_or(rate.unwrap_or(RATE), |tdma| tdma.link_bytes_s),
             quota_bytes: quota.unwrap_or(QUOTA) as usize,
             bulk_below: bulk.map_or(BULK_BELOW, |bulk| bulk as u8),
         }

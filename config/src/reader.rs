@@ -36,6 +36,11 @@ impl<'d> Reader<'d> {
         self.problems.borrow_mut().push(Problem { line: Some(line), message: message.into() });
     }
 
+    /// Whether nothing is wrong so far.
+    pub(crate) fn is_content(&self) -> bool {
+        self.problems.borrow().is_empty()
+    }
+
     /// What the parser says of a text that is no TOML.
     pub(crate) fn report_syntax(&self, error: &toml::de::Error) {
         let span = error.span().unwrap_or(0..0);
@@ -239,6 +244,25 @@ impl<'d> Item<'d> {
         match units::parse_size(text) {
             Ok(size) if range.contains(&size) => Some(size),
             Ok(_) => self.wrong(&format!("{} to {} B, such as \"{example}\"", range.start(), range.end())),
+            Err(error) => {
+                self.report(format!("`{}`: {error}", self.key));
+                None
+            }
+        }
+    }
+
+    /// The rate of a link, in bits a second.
+    pub(crate) fn rate(&self, range: RangeInclusive<u64>, example: &str) -> Option<u64> {
+        let Some(text) = self.value.get_ref().as_str() else {
+            return self.wrong(&format!("a rate with its unit, such as `{} = \"{example}\"`", self.key));
+        };
+        match units::parse_rate(text) {
+            Ok(rate) if range.contains(&rate) => Some(rate),
+            Ok(_) => self.wrong(&format!(
+                "{} to {}, such as \"{example}\"",
+                units::rate_text(*range.start()),
+                units::rate_text(*range.end())
+            )),
             Err(error) => {
                 self.report(format!("`{}`: {error}", self.key));
                 None

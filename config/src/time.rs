@@ -2,6 +2,7 @@
 
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
+use crate::units::duration_text;
 use std::time::Duration;
 
 const INTERVAL: Duration = Duration::from_secs(1);
@@ -18,7 +19,7 @@ pub enum TimeSource {
     Master {
         /// Nodes that may be master, by their place in the file; the first that runs is. At least one.
         masters: Vec<u8>,
-        /// Time from one synchronisation to the next.
+        /// Time from one synchronisation to the next; where nodes send in time slots, the cycle.
         interval: Duration,
     },
     /// The simulation; `speed` 2.0 lets time pass twice as fast.
@@ -31,8 +32,21 @@ pub enum TimeSource {
 }
 
 impl TimeSource {
-    /// `file` is asked for the line of what is missing.
-    pub(crate) fn read(section: Option<Section<'_>>, file: &Section<'_>, nodes: &[Node]) -> Self {
+    /// Nodes that may be master, by their place in the file; the first that runs is. None if time is no node's.
+    pub fn masters(&self) -> &[u8] {
+        match self {
+            Self::Master { masters, .. } => masters,
+            _ => &[],
+        }
+    }
+
+    /// `file` is asked for the line of what is missing; `cycle` is that of the time slots, if there are any.
+    pub(crate) fn read(
+        section: Option<Section<'_>>,
+        file: &Section<'_>,
+        nodes: &[Node],
+        cycle: Option<Duration>,
+    ) -> Self {
         let several = nodes.len() > 1;
         let Some(section) = section else {
             if several {
@@ -73,7 +87,17 @@ impl TimeSource {
         let (own_masters, own_interval) = (section.get("masters"), section.get("interval"));
         if let Self::Master { masters, interval } = &mut source {
             *masters = own_masters.map_or(masters.clone(), |item| read_masters(&item, nodes));
-            *interval = own_interval.and_then(|item| read_interval(&item)).unwrap_or(INTERVAL);
+            *interval = match (cycle, own_interval) {
+                (None, own) => own.and_then(|item| read_interval(&item)).unwrap_or(INTERVAL),
+                (Some(cycle), None) => cycle,
+                (Some(cycle), Some(own)) => {
+                    own.report(format!(
+                        "`interval`: with time slots the master synchronises once a cycle, {}, as `cycle` of [tdma] says; drop `interval`",
+                        duration_text(cycle)
+                    ));
+                    cycle
+                }
+            };
         } else {
             for item in own_masters.into_iter().chain(own_interval) {
                 item.report(format!(

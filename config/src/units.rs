@@ -1,4 +1,4 @@
-//! Durations and sizes as a file writes them: a number and its unit, `"200 ms"`, `"1 KiB"`.
+//! Durations, sizes and rates of links as a file writes them: a number and its unit, `"200 ms"`, `"1 KiB"`, `"100 Mbit/s"`.
 //!
 //! A bare number is refused: whether 200 means milliseconds or seconds is a mistake that moves robots.
 
@@ -17,7 +17,10 @@ const TIME: [(&str, u64); 6] = [
 /// Units of size and what one is in bytes, largest first.
 const SIZE: [(&str, u64); 4] = [("GiB", 1 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10), ("B", 1)];
 
-/// Why a text is not a duration or a size.
+/// Units of a link's rate and what one is in bits a second, largest first; thousands, as on the box.
+const RATE: [(&str, u64); 4] = [("Gbit/s", 1_000_000_000), ("Mbit/s", 1_000_000), ("kbit/s", 1_000), ("bit/s", 1)];
+
+/// Why a text is not a duration, a size or a rate.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnitError {
     /// It does not begin with a number.
@@ -67,6 +70,17 @@ pub fn parse_size(text: &str) -> Result<u64, UnitError> {
     parse(text, text, &SIZE, "B", "a size with its unit (B, KiB, MiB), such as \"1 KiB\"")
 }
 
+/// Reads the rate of a link in bits a second: a number, then bit/s, kbit/s, Mbit/s or Gbit/s.
+///
+/// ```
+/// # use rohrpost_config::parse_rate;
+/// assert_eq!(parse_rate("2.5 Gbit/s"), Ok(2_500_000_000));
+/// assert!(parse_rate("100 MB/s").is_err());
+/// ```
+pub fn parse_rate(text: &str) -> Result<u64, UnitError> {
+    parse(text, text, &RATE, "bit/s", "a rate with its unit (kbit/s, Mbit/s, Gbit/s), such as \"100 Mbit/s\"")
+}
+
 /// Writes a duration as [`parse_duration`] reads it, in the largest unit that keeps it whole.
 pub fn duration_text(duration: Duration) -> String {
     let nanos = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
@@ -75,9 +89,30 @@ pub fn duration_text(duration: Duration) -> String {
     if nanos == 0 { "0 s".into() } else { whole(nanos, units) }
 }
 
+/// Writes a duration as people say it, with a fraction: "5.46 ms". [`parse_duration`] reads it back.
+///
+/// ```
+/// # use rohrpost_config::duration_decimal;
+/// # use std::time::Duration;
+/// assert_eq!(duration_decimal(Duration::from_micros(5460)), "5.46 ms");
+/// assert_eq!(duration_decimal(Duration::from_micros(460)), "460 us");
+/// ```
+pub fn duration_decimal(duration: Duration) -> String {
+    let nanos = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+    let Some((unit, one)) = TIME[2..].iter().find(|(_, one)| nanos >= *one) else { return "0 s".into() };
+    let fraction = format!("{:0width$}", nanos % one, width = one.ilog10() as usize);
+    let number = format!("{}.{}", nanos / one, if *one == 1 { "" } else { &fraction });
+    format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// Writes a size as [`parse_size`] reads it, in the largest unit that keeps it whole.
 pub fn size_text(bytes: u64) -> String {
     if bytes == 0 { "0 B".into() } else { whole(bytes, &SIZE) }
+}
+
+/// Writes a rate as [`parse_rate`] reads it, in the largest unit that keeps it whole.
+pub fn rate_text(bits_s: u64) -> String {
+    if bits_s == 0 { "0 bit/s".into() } else { whole(bits_s, &RATE) }
 }
 
 fn whole(value: u64, units: &[(&str, u64)]) -> String {
@@ -170,12 +205,14 @@ mod tests {
         fn what_is_written_reads_back(value: u64) {
             let duration = Duration::from_nanos(value);
             prop_assert_eq!(parse_duration(&duration_text(duration)), Ok(duration));
+            prop_assert_eq!(parse_duration(&duration_decimal(duration)), Ok(duration));
             prop_assert_eq!(parse_size(&size_text(value)), Ok(value));
+            prop_assert_eq!(parse_rate(&rate_text(value)), Ok(value));
         }
 
         #[test]
         fn no_text_brings_it_down(text: String) {
-            let _ = (parse_duration(&text), parse_size(&text));
+            let _ = (parse_duration(&text), parse_size(&text), parse_rate(&text));
         }
     }
 }

@@ -40,7 +40,9 @@ fn every_mistake_gets_its_message() {
 
 #[test]
 fn files_that_ship_load_and_explain_themselves() {
-    for file in ["demo.toml", "demo-log.toml", "demo-nodes.toml", "tests/full.toml"] {
+    for file in
+        ["demo.toml", "demo-log.toml", "demo-nodes.toml", "demo-tdma.toml", "tests/tdma.toml", "tests/full.toml"]
+    {
         let text = fs::read_to_string(folder().join(file)).unwrap();
         let installation = Installation::parse(&text, Path::new(file)).unwrap_or_else(|errors| panic!("{errors}"));
         let page = explain(&installation, None);

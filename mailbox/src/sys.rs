@@ -1,9 +1,11 @@
-//! What the kernel is asked for a process: its scheduling and its memory. A refusal is told, not fatal.
+//! What the kernel is asked for a process: its scheduling, its memory, a device for IP packets. A refusal is told, not fatal.
 
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use nix::sys::statvfs::statvfs;
+use std::fs::File;
 use std::io;
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::path::Path;
 
 /// How a process is scheduled.
@@ -13,6 +15,33 @@ pub enum Scheduling {
     Fifo(u8),
     /// The normal scheduler with this niceness, -20 (most) to 19.
     Normal(i8),
+}
+
+/// Time of a processor that a thread needs again and again, for SCHED_DEADLINE.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reservation {
+    /// So much of it in each period, ns. Who uses it up stands still until the next period. From 1024 on.
+    pub runtime_ns: u64,
+    /// It has got it so long after it has become ready to run, at the latest, ns; at least the runtime, at most the period.
+    pub deadline_ns: u64,
+    /// The period, ns; at most four seconds.
+    pub period_ns: u64,
+}
+
+/// Why the system grants no reservation.
+#[derive(Debug, thiserror::Error)]
+pub enum ReservationError {
+    /// The user has no right to.
+    #[error(
+        "SCHED_DEADLINE needs CAP_SYS_NICE, which no limit of users brings: `setcap cap_sys_nice+ep` on the program,          `AmbientCapabilities=CAP_SYS_NICE` in its unit, or `--cap-add=SYS_NICE` for its container; nor is it given to who is bound to          some of the processors"
+    )]
+    NotAllowed,
+    /// Others have reserved too much.
+    #[error("processors have too little time left that is not reserved; let others reserve less")]
+    TooMuch,
+    /// It is no reservation, or the kernel cannot.
+    #[error("the kernel does not take {0:?}: {1}")]
+    NotTaken(Reservation, io::Error),
 }
 
 /// A FIFO process that runs for so long without sleeping is ended by the kernel (RLIMIT_RTTIME), µs.
@@ -37,6 +66,44 @@ pub fn schedule(how: Scheduling) -> io::Result<()> {
             check(unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, i32::from(nice)) })
         }
     }
+}
+
+/// What `sched_setattr` reads, as the kernel has known it from the first on (SCHED_ATTR_SIZE_VER0).
+const _: () = {
+    assert!(size_of::<libc::sched_attr>() == 48);
+    assert!(std::mem::offset_of!(libc::sched_attr, sched_flags) == 8);
+    assert!(std::mem::offset_of!(libc::sched_attr, sched_runtime) == 24);
+    assert!(std::mem::offset_of!(libc::sched_attr, sched_period) == 40);
+};
+
+/// Reserves time of a processor for the calling thread: it goes before all others, and on whichever processor is free. The threads
+/// that it starts run as ordinary ones.
+///
+/// # Errors
+/// [`ReservationError`]
+pub fn reserve(reservation: Reservation) -> Result<(), ReservationError> {
+    let attributes = libc::sched_attr {
+        size: size_of::<libc::sched_attr>() as u32,
+        sched_policy: libc::SCHED_DEADLINE as u32,
+        sched_flags: libc::SCHED_FLAG_RESET_ON_FORK as u64,
+        sched_nice: 0,
+        sched_priority: 0,
+        sched_runtime: reservation.runtime_ns,
+        sched_deadline: reservation.deadline_ns,
+        sched_period: reservation.period_ns,
+    };
+    // SAFETY: reads as many bytes of the attributes, which live here, as these say of themselves; 0 is the calling thread, and there
+    // are no flags.
+    let result = unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) };
+    if result == 0 {
+        return Ok(());
+    }
+    let error = io::Error::last_os_error();
+    Err(match error.raw_os_error() {
+        Some(libc::EPERM) => ReservationError::NotAllowed,
+        Some(libc::EBUSY) => ReservationError::TooMuch,
+        _ => ReservationError::NotTaken(reservation, error),
+    })
 }
 
 /// How the calling thread is scheduled.
@@ -98,6 +165,66 @@ pub fn room(path: &Path) -> io::Result<Room> {
     Ok(Room { bytes: told.blocks() * told.fragment_size(), free: told.blocks_available() * told.fragment_size() })
 }
 
+/// Makes a TUN device in the network of the calling thread; `%d` in its name becomes a number that is free. Each read brings one IP packet
+/// that the kernel sends by it, each write hands the kernel one that has come. It vanishes with the last descriptor.
+///
+/// # Errors
+/// Mostly EPERM: it needs CAP_NET_ADMIN; ENOENT: the kernel has no `tun`, or a container no `/dev/net/tun`.
+pub fn tun(name: &str) -> io::Result<(OwnedFd, String)> {
+    let device = File::options().read(true).write(true).open("/dev/net/tun")?;
+    // SAFETY: numbers and bytes, for which zero is a value.
+    let mut request: libc::ifreq = unsafe { std::mem::zeroed() };
+    // The last byte stays 0.
+    let room = request.ifr_name.len() - 1;
+    for (to, from) in request.ifr_name[..room].iter_mut().zip(name.bytes()) {
+        *to = from as libc::c_char;
+    }
+    request.ifr_ifru.ifru_flags = (libc::IFF_TUN | libc::IFF_NO_PI) as libc::c_short;
+    // SAFETY: reads and writes the request, which lives here, and is what TUNSETIFF takes.
+    check(unsafe { libc::ioctl(device.as_raw_fd(), libc::TUNSETIFF, &raw mut request) })?;
+    let name = request.ifr_name.iter().map(|byte| *byte as u8).take_while(|byte| *byte != 0);
+    Ok((device.into(), String::from_utf8_lossy(&name.collect::<Vec<_>>()).into_owned()))
+}
+
 fn check(result: i32) -> io::Result<()> {
     if result < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn reserved(runtime_ns: u64, period_ns: u64) -> Result<i32, ReservationError> {
+        let reserve = move || {
+            reserve(Reservation { runtime_ns, deadline_ns: period_ns, period_ns })?;
+            // SAFETY: takes a number only.
+            Ok(unsafe { libc::sched_getscheduler(0) })
+        };
+        // Of a thread of its own, with which it ends.
+        std::thread::spawn(reserve).join().unwrap()
+    }
+
+    #[test]
+    fn a_reservation_is_granted_or_refused_with_a_reason() {
+        match reserved(MS / 10, 10 * MS) {
+            Ok(policy) => assert_eq!(policy & !libc::SCHED_RESET_ON_FORK, libc::SCHED_DEADLINE),
+            Err(ReservationError::NotAllowed | ReservationError::TooMuch) => {}
+            Err(error) => panic!("{error}"),
+        }
+        // More than there is, and nothing: whoever asks, it is refused.
+        let error = reserved(2 * MS, MS).unwrap_err();
+        assert!(matches!(error, ReservationError::NotTaken(..) | ReservationError::NotAllowed), "{error}");
+    }
+
+    #[test]
+    fn what_a_thread_with_a_reservation_starts_is_ordinary() {
+        let of_child = std::thread::spawn(|| {
+            // Without the right to it, the child is as ordinary as this one.
+            let _ = reserve(Reservation { runtime_ns: MS / 10, deadline_ns: 10 * MS, period_ns: 10 * MS });
+            std::thread::spawn(scheduling).join().unwrap().unwrap()
+        });
+        assert!(matches!(of_child.join().unwrap(), Scheduling::Normal(_)));
+    }
 }

@@ -5,7 +5,7 @@ mod router;
 
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
-    RouterInterface, RouterProxy, SocketFailure,
+    RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure,
 };
 
 use crate::interface;

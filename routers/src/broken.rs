@@ -59,6 +59,12 @@ mod variants {
         Hurries,
         /// Outbound: what waited too long leaves nevertheless.
         SendsStale,
+        /// Outbound: in a slot what fits goes before what is more important and does not.
+        OvertakesInSlot,
+        /// Outbound: more leaves than the slot has room for.
+        OverrunsSlot,
+        /// Outbound: in a slot a datagram has company that is less important than what waits for others.
+        AnyCompany,
         /// Link: nobody is ever silent.
         NeverSilent,
         /// Link: nobody is ever unheard.
@@ -85,10 +91,28 @@ mod variants {
         KeepsParts,
         /// Fragment: as many packages are put together at a time as have begun.
         Unbounded,
+        /// Time slots: a wake-up that comes too late is none too late.
+        NoLateGate,
+        /// Time slots: a node sends however far off its clock may be.
+        SendsWhenUnsure,
+        /// Time slots: a window ends where its guard does.
+        IgnoresGuard,
+        /// Time slots: calls are made earlier than frames need to reach the wire.
+        LeadTooLong,
+        /// Time slots: what was handed over does not count for what still fits.
+        ForgetsHandedOver,
+        /// Time slots: a Sync of another in the master's place is taken for the master's.
+        ReplacementCalibrates,
+        /// Time slots: a backup master sends also when the master's Sync came.
+        ReplacesHeard,
+        /// Time slots: a master sends Syncs in its slots.
+        SyncInForeignWindow,
+        /// Time slots: whoever yields to another master goes on by its own time.
+        KeepsOwnTime,
     }
 
     impl Broken {
-        /// All mistakes.
+        /// All mistakes of carrying packages.
         pub const ALL: [Self; 23] = [
             Self::SkipsCheck,
             Self::IgnoresLevels,
@@ -113,6 +137,22 @@ mod variants {
             Self::CountsPartsTwice,
             Self::KeepsParts,
             Self::Unbounded,
+        ];
+
+        /// All mistakes of what leaves in a slot. Where packages leave as they come they do not show.
+        pub const IN_SLOT: [Self; 3] = [Self::OvertakesInSlot, Self::OverrunsSlot, Self::AnyCompany];
+
+        /// All mistakes of time slots.
+        pub const SLOTS: [Self; 9] = [
+            Self::NoLateGate,
+            Self::SendsWhenUnsure,
+            Self::IgnoresGuard,
+            Self::LeadTooLong,
+            Self::ForgetsHandedOver,
+            Self::ReplacementCalibrates,
+            Self::ReplacesHeard,
+            Self::SyncInForeignWindow,
+            Self::KeepsOwnTime,
         ];
     }
 

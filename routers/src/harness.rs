@@ -46,6 +46,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
             quota_bytes: 128 << 10,
             bulk_below: 16,
         },
+        tdma: None,
         routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
         senders: vec![vec![module(200, own)], vec![module(100, own)]],
     }
@@ -221,7 +222,7 @@ impl End {
 fn every_mistake_is_noticed() {
     let checks = || [crate::queue::CHECKS, crate::outbound::CHECKS, crate::inbound::CHECKS, crate::fragment::CHECKS];
     let mut missed = Vec::new();
-    for broken in Broken::ALL {
+    for broken in Broken::ALL.into_iter().chain(Broken::IN_SLOT) {
         let notices = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
         if !checks().into_iter().flatten().any(notices) {
             missed.push(broken);

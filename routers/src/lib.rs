@@ -6,6 +6,8 @@
 //!  Clock ◀══ synchronisation, calibration ══▶ Clock of the master                        writes the node's page of system time
 //! ```
 //!
+//! In time slots (`tdma`) a node sends all of this in its own windows only.
+//!
 //! All protocol logic is without sockets, threads and clocks: time comes as an argument, datagrams as bytes. The same code runs under
 //! real sockets (`shell`) and in a simulation of whole networks (`sim`).
 
@@ -20,6 +22,7 @@ pub mod impair;
 pub mod inbound;
 pub mod lab;
 pub mod link;
+mod netlink;
 pub mod outbound;
 pub mod queue;
 pub mod report;
@@ -27,4 +30,5 @@ pub mod settings;
 pub mod shell;
 pub mod sim;
 pub mod stats;
+pub mod tdma;
 pub mod time;

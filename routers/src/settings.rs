@@ -3,7 +3,8 @@
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
-use rohrpost_config::{Installation, Network, Route};
+use crate::tdma::{LATE_NS, Wire};
+use rohrpost_config::{Installation, Network, Route, Tdma};
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name};
 use std::net::IpAddr;
 
@@ -42,6 +43,8 @@ pub struct Settings {
     pub incarnation: u64,
     /// How it sends.
     pub network: Network,
+    /// When it sends; none: as packages come.
+    pub tdma: Option<Tdma>,
     /// Where names are that are not on this node; sorted, without overlap.
     pub routes: Vec<Route>,
     /// The modules of this node: the names of a group have a quota together, and so have all other names.
@@ -89,6 +92,7 @@ impl Settings {
             digest: installation.digest().lan(),
             incarnation,
             network,
+            tdma: installation.tdma.clone(),
             routes: installation.routes_from(node),
             senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
         })
@@ -98,6 +102,20 @@ impl Settings {
     pub fn overhead_bytes(&self) -> usize {
         let is_v6 = self.nodes.iter().any(|node| node.address.is_ipv6());
         if is_v6 { 40 + 8 } else { 20 + 8 }
+    }
+
+    /// The longest datagram that this node sends. Where it has time slots, it fits into each of them, also if the thread comes as late
+    /// as it may: so each of them serves whatever is most important.
+    pub fn datagram_bytes(&self) -> usize {
+        let Some(tdma) = &self.tdma else { return self.network.datagram_bytes_max };
+        let wire = Wire::new(tdma, self.overhead_bytes());
+        let own = tdma.slots.iter().filter(|slot| slot.node == self.own);
+        let rooms = own.map(|slot| {
+            let length_ns = slot.length.saturating_sub(tdma.guard).as_nanos().saturating_sub(LATE_NS.into());
+            wire.datagram_bytes_in(u64::try_from(length_ns).unwrap_or(u64::MAX)).unwrap_or(0)
+        });
+        let smallest = rooms.min().unwrap_or(usize::MAX).max(DATAGRAM_BYTES_MIN);
+        smallest.min(self.network.datagram_bytes_max)
     }
 
     /// The node that a name is on; none for names of this node and for those that nobody has.

@@ -94,6 +94,7 @@ fn time_has_the_documented_bytes() {
         term,
         began: term,
         followed: true,
+        replacement: false,
     });
     let request =
         Message::Request(Request { id: 99, error_ns: 20_000, epoch, term, eager: false, far: false, timed: true });
@@ -110,9 +111,23 @@ fn time_has_the_documented_bytes() {
         sync_by_kernel: true,
         request_by_kernel: true,
     });
-    for (name, from, sequence, message) in [("sync", 0, 3, sync), ("request", 1, 4, request), ("reply", 0, 4, reply)] {
+    let replacement = Message::Sync(Sync {
+        id: 99,
+        cycle: 340_000_000_000,
+        nominal_ns: NOMINAL_NS + 300_000,
+        sent_ns: NOMINAL_NS + 301_500,
+        error_ns: 20_000,
+        epoch,
+        term,
+        began: term,
+        followed: false,
+        replacement: true,
+    });
+    for (name, from, sequence, message) in
+        [("sync", 0, 3, sync), ("request", 1, 4, request), ("reply", 0, 4, reply), ("replacement", 2, 5, replacement)]
+    {
         let kind = message.kind();
-        let head = FrameHead { kind, from, to: 1 - from, sequence, ..HEAD };
+        let head = FrameHead { kind, from, to: if from == 1 { 0 } else { 1 }, sequence, ..HEAD };
         check(name, head, &message.to_bytes(), |frame| {
             let Frame::Time(rest) = frame else { panic!("{frame:?}") };
             assert_eq!(Message::parse(kind, rest), Ok(message), "{name}");

@@ -49,6 +49,7 @@ fn settings(own: NodeIndex) -> Settings {
             quota_bytes: 128 << 10,
             bulk_below: 16,
         },
+        tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(255), node: other }],
         senders: vec![vec![module(own)]],
     }

@@ -155,6 +155,7 @@ fn without_the_right_to_the_address_a_router_does_not_start_and_leaves_the_node_
         settings: side.settings.clone(),
         faults: std::sync::Arc::new(common::Words),
         impair: None,
+        clock: None,
     };
     let error = Shell::start(parts).err().unwrap().to_string();
     assert!(error.contains("is in use"), "{error}");

@@ -1,11 +1,12 @@
-//! A package on its way through two routers takes nothing from the heap: neither alone, nor in a crowd, nor in parts.
+//! A package on its way through two routers takes nothing from the heap: neither alone, nor in a crowd, nor in parts,
+//! nor in time slots.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 #[path = "shell_common/mod.rs"]
 mod common;
 
-use common::{PATIENCE, Pair, label, module};
+use common::{PATIENCE, Pair, label, module, turns};
 use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -58,12 +59,22 @@ fn round(sender: &mut Sender, receiver: &mut Receiver, large: &[u8]) {
     assert_eq!(bytes, large.len() + 40 * 11);
 }
 
+/// Both ways of sending in one test, one after the other: all threads of the process are counted.
 #[test]
 fn no_package_takes_from_the_heap() {
-    let pair = Pair::new();
+    as_packages_come();
+    in_time_slots();
+}
+
+fn mailboxes(pair: &Pair) -> (Sender, Receiver) {
     let shape = Shape { slots: 128, body_bytes_max: BODY_BYTES_MAX as u16, ..Shape::default() };
-    let mut receiver = pair.sides[1].receiver(module(1), shape);
-    let mut sender = pair.sides[0].sender(module(1));
+    let receiver = pair.sides[1].receiver(module(1), shape);
+    (pair.sides[0].sender(module(1)), receiver)
+}
+
+fn as_packages_come() {
+    let pair = Pair::new();
+    let (mut sender, mut receiver) = mailboxes(&pair);
     let large = vec![7; 40_000];
     // Ways are opened, and room for parts is taken, once.
     (0..50).for_each(|_| round(&mut sender, &mut receiver, &large));
@@ -75,4 +86,21 @@ fn no_package_takes_from_the_heap() {
     let sent = &stats.peer(1).sent;
     assert!(sent.fragments.get() > 500, "in parts");
     assert!(sent.datagrams.get() - sent.fragments.get() < 550 * 41, "some shared a datagram");
+}
+
+/// The thread that sends in time slots: synchronisation, questions and answers, packages alone, in company and in parts, and tools that look.
+fn in_time_slots() {
+    let pair = Pair::with(Some(turns()));
+    let (mut sender, mut receiver) = mailboxes(&pair);
+    let large = vec![7; 40_000];
+    (0..50).for_each(|_| round(&mut sender, &mut receiver, &large));
+    let seen = || pair.sides.each_ref().map(|side| side.shell.as_ref().unwrap().slots().unwrap().snapshot());
+    let (before, uses) = (seen(), USES.load(Ordering::SeqCst));
+    (0..100).for_each(|_| round(&mut sender, &mut receiver, &large));
+    assert_eq!(USES.load(Ordering::SeqCst), uses);
+    let after = seen();
+    assert!(after[0].counts.syncs.sent > before[0].counts.syncs.sent + 50, "{after:?}");
+    assert!(after.iter().zip(&before).all(|(after, before)| after.counts.used > before.counts.used + 50), "{after:?}");
+    let sent = &pair.sides[0].shell.as_ref().unwrap().stats().peer(1).sent;
+    assert!(sent.fragments.get() > 100, "in parts");
 }

@@ -3,6 +3,7 @@
 mod account;
 mod copy;
 mod nodes;
+mod slots;
 
 use super::launch::{View, end};
 use super::speech::Speech;
@@ -33,7 +34,8 @@ const FIRST_FUNCTION: u16 = 16;
   rohrpost demo --seconds 20
   rohrpost demo --log run.log.gz --speed 10
   rohrpost demo --nodes 3 --seconds 30 --impair loss=5%,delay=2ms,reorder=5%
-Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml) of the present folder if there is one, else its own copy.")]
+  rohrpost demo --nodes 3 --tdma --seconds 30
+Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml) of the present folder if there is one, else its own copy.")]
 pub(super) struct Arguments {
     /// End by itself after so many seconds.
     #[arg(long, value_name = "SECONDS")]
@@ -47,6 +49,9 @@ pub(super) struct Arguments {
     /// Over so many computers, each a network namespace of this one.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..), conflicts_with = "log")]
     nodes: Option<u8>,
+    /// The nodes send in time slots, each in its own.
+    #[arg(long, requires = "nodes", conflicts_with = "config")]
+    tdma: bool,
     /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed.
     #[arg(long, value_name = "TEXT", requires = "nodes")]
     impair: Option<impair::Settings>,

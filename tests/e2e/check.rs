@@ -139,3 +139,43 @@ fn a_call_to_a_less_important_module_needs_a_reason() {
     let remedy = told.split('`').find(|part| part.starts_with("{ to")).unwrap().to_owned();
     place.say(&["check", &config(&remedy)]).ok();
 }
+
+#[test]
+fn time_slots_are_drawn_and_the_worst_of_each_flow_is_said() {
+    let place = Place::new();
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo-tdma.toml");
+    let page = place.say(&["check", demo]).ok();
+    let drawn: Vec<&str> = page.lines().filter(|line| line.contains('█')).collect();
+    assert!(drawn.iter().all(|line| line.chars().count() <= 80), "{drawn:#?}");
+    let owners: Vec<_> = drawn.iter().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(owners, ["sync", "base", "brain", "desk", "█"], "a row each, and what the signs mean");
+
+    let json = place.say(&["check", demo, "--json"]).json();
+    let tdma = &json["installation"]["tdma"];
+    assert_eq!((&tdma["cycle_ms"], &tdma["slots"][1]["node"]), (&5.0.into(), &"brain".into()));
+    let flows = json["installation"]["flows"].as_array().unwrap();
+    for flow in flows {
+        let worst = flow["at_worst"]["latency_ms"].as_f64().unwrap();
+        assert!(worst > 5.0 && worst < flow["deadline_ms"].as_f64().unwrap(), "a cycle at least: {flow}");
+        let (from, to) = (flow["from"].as_str().unwrap(), flow["to"].as_str().unwrap());
+        assert!(page.contains(&format!("  {from} → {to} ")), "{page}");
+    }
+    let nodes = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo-nodes.toml");
+    let json = place.say(&["check", nodes, "--json"]).json();
+    assert!(json["installation"]["tdma"].is_null(), "it sends as packages come");
+}
+
+#[test]
+fn a_deadline_that_slots_cannot_keep_is_refused_with_what_would() {
+    let place = Place::new();
+    let demo = |length: &str| include_str!("../../config/demo-tdma.toml").replacen("\"1.2 ms\"", length, 1);
+    std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/config/building.map"), place.path("building.map")).unwrap();
+    std::fs::write(place.path("short.toml"), demo("\"450 us\"")).unwrap();
+    let told = place.say(&["check", "short.toml"]).fails();
+    // Each flow asks for what it needs; the last one waits for all the others.
+    let remedies: Vec<&str> = told.lines().filter_map(|line| line.split_once("`length = ")).map(|(_, to)| to).collect();
+    assert!(told.contains("lengthen that of `base` at 1 ms (line 47) by") && remedies.len() > 1, "{told}");
+    let longest = remedies.iter().map(|remedy| remedy.trim_end_matches('`')).max().unwrap();
+    std::fs::write(place.path("short.toml"), demo(longest)).unwrap();
+    place.say(&["check", "short.toml"]).ok();
+}

@@ -191,6 +191,64 @@ pub struct ClockState {
     pub by_kernel: bool,
 }
 
+/// How a node keeps its time slots. Counts are since its router began, and only grow.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SlotState {
+    /// The node.
+    pub node: String,
+    /// Slots in which something was sent.
+    pub used: u64,
+    /// Slots in which nothing had to be sent.
+    pub empty: u64,
+    /// Slots that were left out because the router woke up too late for them.
+    pub late: u64,
+    /// Slots that went by while the router stood still.
+    pub skipped: u64,
+    /// Slots without packages because the time was not sure enough.
+    pub silent: u64,
+    /// Why it does not send now; empty if it does.
+    pub why_silent: String,
+    /// Datagrams in slots and synchronisation windows, and their bytes on the wire, all heads counted.
+    pub datagrams: u64,
+    /// See `datagrams`.
+    pub wire_bytes: u64,
+    /// Cycles in which it synchronised the others as the master, and in a silent master's place.
+    pub synchronisations_sent: u64,
+    /// See `synchronisations_sent`.
+    pub replacements_sent: u64,
+    /// Cycles in which the master's synchronisation came, in which a backup's came, and in which none did.
+    pub synchronisations_heard: u64,
+    /// See `synchronisations_heard`.
+    pub replacements_heard: u64,
+    /// See `synchronisations_heard`.
+    pub synchronisations_missed: u64,
+    /// Changes of role: slave, master.
+    pub roles: u64,
+    /// From the router's call to the wire, the median, ns.
+    pub lead_ns: u64,
+    /// How the kernel schedules who keeps the slots: `deadline`, `fifo` or `ordinary`.
+    pub scheduled: String,
+    /// The last slots and windows that were used, the oldest first.
+    pub last: Vec<SlotUse>,
+}
+
+/// A slot or synchronisation window that was used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SlotUse {
+    /// The slot, by its place in the configuration's table; none: the window of synchronisation.
+    pub slot: Option<u16>,
+    /// Beginning and end of sending, system time, ns since 1970.
+    pub begin_ns: u64,
+    /// See `begin_ns`.
+    pub end_ns: u64,
+    /// The first datagram was on the wire so long after the beginning, ns.
+    pub off_ns: i64,
+    /// Whether the kernel's stamp says so; else it is reckoned.
+    pub by_kernel: bool,
+    /// Datagrams in it.
+    pub datagrams: u64,
+}
+
 /// Carries packages between nodes; it does so also while it is off.
 #[interface(class = "router", crate = crate::macro_support)]
 pub trait Router {
@@ -201,4 +259,8 @@ pub trait Router {
     /// How it stands with system time.
     #[data(2)]
     fn clock() -> ClockState;
+
+    /// How it keeps its time slots, where there are any.
+    #[data(3)]
+    fn slots() -> SlotState;
 }

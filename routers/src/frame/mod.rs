@@ -29,6 +29,15 @@ pub const ALIVE_BYTES: usize = 24;
 /// Bytes of what a refusal says.
 pub const REFUSAL_BYTES: usize = 16;
 
+// Who computes how late packages can be counts on these sizes.
+const _: () = {
+    assert!(HEAD_BYTES == rohrpost_config::wire::FRAME_HEAD_BYTES);
+    assert!(FRAGMENT_HEAD_BYTES == rohrpost_config::wire::FRAGMENT_HEAD_BYTES);
+    assert!(ALIVE_BYTES == rohrpost_config::wire::ALIVE_BYTES);
+    assert!(REFUSAL_BYTES == rohrpost_config::wire::REFUSAL_BYTES);
+    assert!(crate::time::message::MESSAGE_BYTES == rohrpost_config::wire::TIME_BYTES);
+};
+
 const MAGIC: [u8; 2] = *b"Rp";
 /// A million datagrams a second reach it after nine years; so a sequence and a place in its datagram fit in 64 bits.
 pub const SEQUENCE_MAX: u64 = (1 << 48) - 1;

@@ -12,12 +12,11 @@
 //! meanwhile stay in. Whoever is not root goes into a user namespace first ([`become_able`]).
 
 mod namespace;
-mod netlink;
 
 pub use namespace::{Inside, become_able};
 
+use crate::netlink::{Device, End};
 use namespace::Namespace;
-use netlink::{Device, End};
 use std::io;
 use std::net::IpAddr;
 use std::process::{Child, Command};
@@ -128,7 +127,7 @@ impl Lab {
             told(&format!("set the link of {at} up"), hub.set_up(node.port, true))?;
             let (mut inside, address) = (node.namespace.netlink()?, node.spec.address);
             told(&format!("set the loopback of {at} up"), inside.set_up(LOOPBACK, true))?;
-            told(&format!("give {at} the address {address}"), inside.add_address(LAN, address))?;
+            told(&format!("give {at} the address {address}"), inside.add_address(LAN, address, None))?;
             told(&format!("set the device of {at} up"), inside.set_up(LAN, true))?;
             told(&format!("give {at} its route"), inside.add_route_to_all(LAN, address))?;
         }
@@ -147,6 +146,15 @@ impl Lab {
     /// [`LabError::NoNode`], or when the system does not allow it.
     pub fn enter(&self, node: &str) -> Result<Inside, LabError> {
         self.node(node)?.namespace.enter()
+    }
+
+    /// Takes this thread to the bridge, which all frames between nodes cross: a packet socket made there sees each when it comes in by the
+    /// port of its sender. As [`Lab::enter`].
+    ///
+    /// # Errors
+    /// When the system does not allow it.
+    pub fn enter_bridge(&self) -> Result<Inside, LabError> {
+        self.hub.enter()
     }
 
     /// Starts a program on a node. Its parent is this thread: what it asks to be told of its parent's death, it is told of this thread's.

@@ -1,7 +1,7 @@
 //! Network namespaces that are held by a descriptor alone.
 
 use super::LabError;
-use super::netlink::Netlink;
+use crate::netlink::Netlink;
 use nix::errno::Errno;
 use nix::sched::{CloneFlags, setns, unshare};
 use nix::unistd::{getegid, geteuid};

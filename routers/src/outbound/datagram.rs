@@ -1,6 +1,7 @@
 //! How a datagram is made: of one package where it lies, of many that wait, of a part of one, or of nothing but "still there".
 
-use super::{DIRECT_HEAD_BYTES, Outbound, Output, Peer, is_stale};
+use super::{DIRECT_HEAD_BYTES, Outbound, Peer, is_stale};
+use crate::broken::broken;
 use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
 use crate::queue::Place;
@@ -8,6 +9,9 @@ use crate::report::Report;
 use crate::settings::Settings;
 use crate::stats::Cause;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
+
+/// Where a part begins in its datagram.
+pub(super) const PART_START: usize = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
 
 impl Outbound {
     pub(super) fn direct(&mut self, now_ns: u64, peer: NodeIndex, head: &Head, body: &[u8]) -> [u8; DIRECT_HEAD_BYTES] {
@@ -22,7 +26,7 @@ impl Outbound {
         bytes
     }
 
-    /// As many whole packages for a peer as fit, level by level. The first one fits.
+    /// As many whole packages for a peer as fit, level by level; how long the datagram is. The first one fits.
     pub(super) fn pack(
         &mut self,
         now_ns: u64,
@@ -30,15 +34,21 @@ impl Outbound {
         from: u8,
         datagram: &mut [u8],
         report: &mut impl Report,
-    ) -> Output {
+    ) -> usize {
         let mut end = frame::HEAD_BYTES;
-        let mut level = from;
+        let (mut level, last) = (from, self.last_level_of_company(peer));
         while let Some(next) = self.queue.next_level(peer, level) {
             level = next;
+            if level > last {
+                break;
+            }
             let Some(place) = self.queue.first_of(peer, level) else { break };
             let waiting = *self.queue.at(place);
             let size = PACKAGE_HEAD_BYTES + usize::from(waiting.head.len);
             if waiting.parts > 0 || end + size > datagram.len() {
+                if self.in_slots && !broken!(OvertakesInSlot) {
+                    break;
+                }
                 // Its turn comes; behind it nothing of its level may go, but perhaps something of a lower one fits.
                 level += 1;
                 continue;
@@ -58,12 +68,12 @@ impl Outbound {
         self.finish(now_ns, (Kind::Packages, Some(from)), peer, &mut datagram[..end])
     }
 
-    /// The next part of a package that does not fit in a datagram.
-    pub(super) fn part(&mut self, now_ns: u64, place: Place, datagram: &mut [u8]) -> Output {
+    /// The next part of a package that does not fit in a datagram; how long its datagram is.
+    pub(super) fn part(&mut self, now_ns: u64, place: Place, datagram: &mut [u8]) -> usize {
         let waiting = *self.queue.at(place);
         let peer = waiting.peer;
-        let start = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
-        let (len, part_bytes) = (usize::from(waiting.head.len), datagram.len() - start);
+        let start = PART_START;
+        let (len, part_bytes) = (usize::from(waiting.head.len), self.datagram_bytes - start);
         let first = if waiting.parts == 0 { self.stats.peer(peer).sent.datagrams.get() } else { waiting.first };
         let offset = usize::from(waiting.parts) * part_bytes;
         let size = part_bytes.min(len - offset);
@@ -81,7 +91,8 @@ impl Outbound {
         self.finish(now_ns, (Kind::Fragment, Some(waiting.level)), peer, &mut datagram[..start + size])
     }
 
-    pub(super) fn alive(&mut self, now_ns: u64, peer: NodeIndex, datagram: &mut [u8]) -> Output {
+    /// "Still there", for a peer; how long the datagram is.
+    pub(super) fn alive(&mut self, now_ns: u64, peer: NodeIndex, datagram: &mut [u8]) -> usize {
         let stats = self.stats.peer(peer);
         let told = stats.link.told(now_ns, stats.received.missing()).to_bytes();
         let end = frame::HEAD_BYTES + told.len();
@@ -90,12 +101,12 @@ impl Outbound {
         self.finish(now_ns, (Kind::Alive, None), peer, &mut datagram[..end])
     }
 
-    /// Writes the head before what lies in the datagram already: of this kind, with packages of this level first.
-    fn finish(&mut self, now_ns: u64, (kind, level): (Kind, Option<u8>), to: NodeIndex, datagram: &mut [u8]) -> Output {
+    /// Writes the head before what lies in the datagram already: of this kind, with packages of this level first. How long it is.
+    fn finish(&mut self, now_ns: u64, (kind, level): (Kind, Option<u8>), to: NodeIndex, datagram: &mut [u8]) -> usize {
         let (head, rest) = datagram.split_at_mut(frame::HEAD_BYTES);
         head.copy_from_slice(&self.head(kind, to).to_bytes(&[rest]));
         self.left(now_ns, to, datagram.len(), level);
-        Output::Send { to, bytes: datagram.len() }
+        datagram.len()
     }
 
     fn head(&self, kind: Kind, to: NodeIndex) -> FrameHead {

@@ -19,6 +19,7 @@ use std::sync::Arc;
 
 mod datagram;
 mod pace;
+mod slot;
 
 use pace::Pace;
 
@@ -89,6 +90,10 @@ pub struct Outbound {
     /// The quota of everyone else.
     others: u16,
     peers: Box<[Peer]>,
+    /// Most bytes of a datagram.
+    datagram_bytes: usize,
+    /// It sends in time slots only.
+    in_slots: bool,
     /// Nobody is due to be told anything before this, ns.
     alive_ns: u64,
     sweep_ns: u64,
@@ -116,6 +121,8 @@ impl Outbound {
             senders: senders.into(),
             others: others as u16,
             peers: vec![Peer::default(); settings.nodes.len()].into(),
+            datagram_bytes: settings.datagram_bytes(),
+            in_slots: settings.tdma.is_some(),
             alive_ns: 0,
             sweep_ns: 0,
             settings: settings.clone(),
@@ -124,7 +131,7 @@ impl Outbound {
     }
 
     /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram; nor need one
-    /// so large that no second of its size would fit.
+    /// so large that no second of its size would fit. Where there are time slots, each waits for one.
     pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
         let mut head = package.head;
         if matches!(head.kind.kind(), rohrpost_mailbox::Kind::Command(_)) {
@@ -162,7 +169,7 @@ impl Outbound {
 
     /// Whether what waits fills a datagram and the next: then more is of use only if it is more important.
     pub fn has_plenty(&self) -> bool {
-        self.queue.used_bytes() >= 2 * self.settings.network.datagram_bytes_max as u64
+        self.queue.used_bytes() >= 2 * self.datagram_bytes as u64
     }
 
     /// What waits has at most this priority: only what is above it may leave before what waits.
@@ -172,19 +179,19 @@ impl Outbound {
         Priority(highest.unwrap_or_default())
     }
 
-    /// What leaves next, or when to ask again. `datagram` has room for the largest.
+    /// What leaves next, or when to ask again. `datagram` has room for the largest. Where there are time slots, see [`Self::poll_slot`].
     ///
     /// # Panics
     /// If it has not.
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
-        let datagram = &mut datagram[..self.settings.network.datagram_bytes_max];
+        let datagram = &mut datagram[..self.datagram_bytes];
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
         }
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {
-            return self.alive(now_ns, peer, datagram);
+            return Output::Send { to: peer, bytes: self.alive(now_ns, peer, datagram) };
         }
         let quiet_until_ns = if self.queue.is_empty() { self.alive_ns } else { self.alive_ns.min(self.sweep_ns) };
         while let Some(place) = self.queue.first() {
@@ -196,11 +203,12 @@ impl Outbound {
                 self.drop_out(place, cause, report);
                 continue;
             }
-            return if self.is_large(&waiting) {
+            let bytes = if self.is_large(&waiting) {
                 self.part(now_ns, place, datagram)
             } else {
                 self.pack(now_ns, waiting.peer, waiting.level, datagram, report)
             };
+            return Output::Send { to: waiting.peer, bytes };
         }
         Output::Wait { until_ns: self.alive_ns }
     }
@@ -272,17 +280,18 @@ impl Outbound {
     fn may_leave_at_once(&self, now_ns: u64, level: u8, body_bytes: usize) -> bool {
         let bytes = DIRECT_HEAD_BYTES + body_bytes;
         self.queue.is_empty()
-            && bytes <= self.settings.network.datagram_bytes_max
+            && bytes <= self.datagram_bytes
+            && !self.in_slots
             && self.pace.may_leave(now_ns, level).is_ok()
     }
 
     /// Two of this size are more than a datagram holds. Copied into the queue and out of it, it would leave no sooner.
     fn fills_a_datagram(&self, body_bytes: usize) -> bool {
-        frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.settings.network.datagram_bytes_max
+        frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.datagram_bytes
     }
 
     fn is_large(&self, waiting: &Waiting) -> bool {
-        DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.settings.network.datagram_bytes_max
+        DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.datagram_bytes
     }
 
     fn passed(&self, peer: NodeIndex, head: &Head) {

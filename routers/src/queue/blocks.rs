@@ -4,6 +4,7 @@ use crate::report::BEGINNING_BYTES;
 
 /// Bytes of a block: what is told of a lost package lies in its first.
 pub(super) const BLOCK_BYTES: usize = BEGINNING_BYTES;
+const _: () = assert!(BLOCK_BYTES as u64 == rohrpost_config::wire::KEPT_IN_BYTES);
 const NONE: u32 = u32::MAX;
 
 /// All blocks.

@@ -195,6 +195,12 @@ impl Queue {
         (levels != 0).then(|| levels.trailing_zeros() as u8)
     }
 
+    /// The first level on which something waits for others than this peer.
+    pub fn first_level_besides(&self, peer: NodeIndex) -> Option<u8> {
+        let others = |level: &usize| self.busy[*level] & !(1 << peer) != 0;
+        bits(self.levels.into()).find(others).map(|level| level as u8)
+    }
+
     /// What waits at a place.
     pub fn at(&self, place: Place) -> &Waiting {
         &self.entries[place.0 as usize].waiting

@@ -3,6 +3,7 @@
 use super::ages::Ages;
 use super::answers::Answers;
 use super::news::News;
+use super::slots::{REFUSAL_BYTES, Refusal};
 use super::socket::{InSocket, Received};
 use super::threads::{Awake, Shared};
 use super::ways::Ways;
@@ -12,6 +13,7 @@ use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::stats::Cause;
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
 use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
 
 /// Room for the largest that UDP carries.
 const DATAGRAM_BYTES: usize = 1 << 16;
@@ -25,12 +27,14 @@ pub(super) struct Arrivals {
     pub(super) socket: Arc<InSocket>,
     pub(super) inbound: Inbound,
     pub(super) desk: Desk,
+    /// Where there are time slots, refusals leave through them.
+    pub(super) refusals: Option<SyncSender<Refusal>>,
 }
 
 impl Arrivals {
     /// Until the socket is closed.
     pub(super) fn run(mut self) {
-        let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; 128]);
+        let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
         let (mut awake, mut ring_ns) = (Awake::default(), 0);
         loop {
             let (received, now_ns) = (self.socket.receive(&mut datagram), monotonic_ns());
@@ -44,7 +48,11 @@ impl Arrivals {
                 }
             }
             while let Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.desk) {
-                self.socket.answer(to, &refusal[..bytes]);
+                match &self.refusals {
+                    // With no room in the line it is lost, and said again a second later.
+                    Some(slots) => drop(slots.try_send(Refusal { to, bytes, datagram: refusal })),
+                    None => self.socket.answer(to, &refusal[..bytes]),
+                }
             }
             if now_ns >= ring_ns {
                 ring_ns = now_ns + RING_EVERY_NS;

@@ -140,7 +140,7 @@ impl Wire {
     }
 
     /// Sends a datagram, or has the impairment keep it for a while.
-    fn send(&mut self, now_ns: u64, to: NodeIndex, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
+    pub(super) fn send(&mut self, now_ns: u64, to: NodeIndex, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
         let Some(impairment) = &mut self.impairment else { return self.send_now(to, parts) };
         self.whole.clear();
         parts.iter().for_each(|part| self.whole.extend_from_slice(part));
@@ -150,7 +150,7 @@ impl Wire {
     }
 
     /// Sends what the impairment has kept for long enough; when it has more.
-    fn deliver(&mut self, now_ns: u64) -> u64 {
+    pub(super) fn deliver(&mut self, now_ns: u64) -> u64 {
         loop {
             let Some(impairment) = &mut self.impairment else { return u64::MAX };
             match impairment.poll(now_ns) {

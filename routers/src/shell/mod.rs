@@ -10,6 +10,9 @@
 //!                              └────────────────────────────────────────────┘
 //! ```
 //!
+//! Where there are time slots, the thread of [`slots`] stands in the place of departures, and has the clock besides; else that has a thread
+//! of its own ([`clock`]).
+//!
 //! Each thread is a participant of its own, since a participant has one bell. Neither waits for the other, takes from the heap for a
 //! package, or makes a system call but for the datagram, for sleep, and to wake whom it brings a package.
 
@@ -20,9 +23,11 @@ pub mod clock;
 mod departures;
 mod failure;
 mod news;
+pub mod slots;
 mod socket;
 mod threads;
 mod transit;
+pub mod tunnel;
 mod ways;
 
 pub use ages::Ages;
@@ -36,14 +41,18 @@ use crate::inbound::Inbound;
 use crate::outbound::Outbound;
 use crate::settings::Settings;
 use crate::stats::Stats;
+use crate::tdma::{Discipline, Table};
 use answers::Answers;
 use arrivals::{Arrivals, Desk};
+use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
 use departures::{Departures, Wire};
 use news::News;
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
+use slots::Slots;
 use socket::InSocket;
 use std::io;
 use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use threads::Shared;
 use ways::{Reach, Ways};
@@ -60,6 +69,12 @@ pub enum ShellError {
     /// Its mailbox.
     #[error(transparent)]
     Mailbox(#[from] CreateError),
+    /// Its clock.
+    #[error(transparent)]
+    Clock(#[from] ClockError),
+    /// Time slots without a master of time, by which they are counted.
+    #[error("time slots need the time of a master; write `source = \"master\"` in [time]")]
+    NoTime,
     /// The system has no thread for it.
     #[error("a thread of the router: {0}; is the limit of processes reached (ulimit -u)?")]
     Thread(io::Error),
@@ -77,6 +92,8 @@ pub struct Parts<'a> {
     pub faults: Arc<dyn Faults>,
     /// A bad network between it and its sockets.
     pub impair: Option<impair::Settings>,
+    /// Its clock; none unless time comes from a master.
+    pub clock: Option<ClockParts>,
 }
 
 /// A router at work; dropped, it ends. What waits in its mailbox stays there.
@@ -87,16 +104,21 @@ pub struct Shell {
     ages: Arc<Ages>,
     shared: Arc<Shared>,
     socket: Arc<InSocket>,
+    clock: Option<Arc<ClockState>>,
+    slots: Option<Arc<slots::State>>,
+    tunnel: Option<Arc<tunnel::Passed>>,
+    /// The clock's own thread.
+    service: Option<ClockService>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Shell {
-    /// Binds the address, makes the mailbox, tells the node what is elsewhere, and starts both threads.
+    /// Binds the addresses, makes the mailbox, tells the node what is elsewhere, and starts all threads.
     ///
     /// # Errors
     /// [`ShellError`]
     pub fn start(parts: Parts<'_>) -> Result<Self, ShellError> {
-        let Parts { node, name, settings, faults, impair } = parts;
+        let Parts { node, name, settings, faults, impair, clock } = parts;
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
         let socket = Arc::new(InSocket::open(own)?);
         if socket.receive_bytes < InSocket::WANTED_BYTES {
@@ -112,20 +134,20 @@ impl Shell {
         let ages = Arc::new(Ages::new(node));
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         let via = transit::name(name);
-        let mailbox = sender.receiver(via, transit::shape())?;
+        let transit = sender.receiver(via, transit::shape())?;
         node.set_routes(via, &transit::ranges(&settings.routes))?;
         let shared = Arc::new(Shared::new(&sender));
         let answers = |participant| Answers::new(&settings, &stats, &faults, participant);
         let departures = Departures {
             shared: shared.clone(),
-            transit: mailbox,
+            transit,
             outbound: Outbound::new(&settings, stats.clone()),
             stats: stats.clone(),
             answers: answers(&sender),
             wire: Wire::new(&settings, impair, &failures),
             datagram: vec![0; settings.network.datagram_bytes_max].into(),
         };
-        let arrivals = Arrivals {
+        let mut arrivals = Arrivals {
             shared: shared.clone(),
             socket: socket.clone(),
             inbound: Inbound::new(&settings, stats.clone()),
@@ -136,19 +158,39 @@ impl Shell {
                 ages: ages.clone(),
                 takes_bytes: None,
             },
+            refusals: None,
         };
         // From here on, whatever fails ends what has begun.
-        let mut shell = Self { settings, stats, failures, ages, shared, socket, threads: Vec::new() };
-        shell.begin("departures", move || {
-            if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
-                tracing::warn!(
-                    "the router's threads run as modules do, and not before them: {error}; allow it with a limit `rtprio` of {} \
-                     for this user (limits.conf) or CAP_SYS_NICE",
-                    threads::ARRIVALS_FIFO
-                );
-            }
-            departures.run();
-        })?;
+        let mut shell = Self {
+            settings,
+            stats,
+            failures,
+            ages,
+            shared,
+            socket,
+            clock: None,
+            slots: None,
+            tunnel: None,
+            service: None,
+            threads: Vec::new(),
+        };
+        if shell.settings.tdma.is_some() {
+            arrivals.refusals = Some(shell.send_in_slots(departures, clock.ok_or(ShellError::NoTime)?)?);
+            shell.open_tunnel(node, name)?;
+        } else {
+            shell.service = clock.map(ClockService::start).transpose()?;
+            shell.clock = shell.service.as_ref().map(|service| service.state().clone());
+            shell.begin("departures", move || {
+                if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
+                    tracing::warn!(
+                        "the router's threads run as modules do, and not before them: {error}; allow it with a limit `rtprio` of {} \
+                         for this user (limits.conf) or CAP_SYS_NICE",
+                        threads::ARRIVALS_FIFO
+                    );
+                }
+                departures.run();
+            })?;
+        }
         shell.begin("arrivals", move || {
             // A refusal was told by the other.
             let _ = threads::schedule(threads::ARRIVALS_FIFO);
@@ -157,10 +199,64 @@ impl Shell {
         Ok(shell)
     }
 
+    /// Starts the thread that sends in time slots, from what else would send as packages come; the way there for refusals.
+    fn send_in_slots(
+        &mut self,
+        departures: Departures,
+        clock: ClockParts,
+    ) -> Result<SyncSender<slots::Refusal>, ShellError> {
+        let settings = self.settings.clone();
+        let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
+        let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
+        let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
+        let works = Works::new(clock)?.in_slots(table.for_clock());
+        let spin_ns = slots::spin_ns(table.cycle_ns());
+        let (refusals, line) = sync_channel(slots::REFUSALS);
+        let discipline = Discipline::new(table, spin_ns);
+        let slots = Slots::new(departures, works, discipline, self.socket.clone(), line);
+        (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
+        self.begin("slots", move || slots.run())?;
+        Ok(refusals)
+    }
+
+    /// Where there are time slots, ordinary traffic may cross the network through them alone. Without the right to a device it is told, and all
+    /// else goes on.
+    fn open_tunnel(&mut self, node: &Arc<Node>, name: Name) -> Result<(), ShellError> {
+        let settings = self.settings.clone();
+        let Some(wanted) = settings.tdma.as_ref().and_then(|tdma| tdma.tunnel) else { return Ok(()) };
+        let participants = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
+        match tunnel::ends(&settings, &wanted, name, &self.stats, &self.shared, &participants) {
+            Ok((outgoing, incoming, passed)) => {
+                self.tunnel = Some(passed);
+                self.begin("tunnel-out", move || outgoing.run())?;
+                self.begin("tunnel-in", move || incoming.run())
+            }
+            Err(error) => {
+                tracing::warn!("there is no tunnel for ordinary traffic: {error}");
+                Ok(())
+            }
+        }
+    }
+
     fn begin(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), ShellError> {
         let begun = std::thread::Builder::new().name(name.into()).spawn(run);
         self.threads.push(begun.map_err(ShellError::Thread)?);
         Ok(())
+    }
+
+    /// How it stands with system time; none unless that comes from a master.
+    pub fn clock(&self) -> Option<&Arc<ClockState>> {
+        self.clock.as_ref()
+    }
+
+    /// How it stands with time slots, where there are any.
+    pub fn slots(&self) -> Option<&Arc<slots::State>> {
+        self.slots.as_ref()
+    }
+
+    /// What went through the tunnel for ordinary traffic, where there is one.
+    pub fn tunnel(&self) -> Option<&Arc<tunnel::Passed>> {
+        self.tunnel.as_ref()
     }
 
     /// Who it is, who the others are.
@@ -183,9 +279,10 @@ impl Shell {
         &self.ages
     }
 
-    /// Whether both threads still run: if one has panicked, the process should end and be started again.
+    /// Whether all threads still run: if one has panicked, the process should end and be started again.
     pub fn is_well(&self) -> bool {
-        self.threads.iter().all(|thread| !thread.is_finished())
+        self.service.as_ref().is_none_or(ClockService::is_well)
+            && self.threads.iter().all(|thread| !thread.is_finished())
     }
 }
 

@@ -10,6 +10,7 @@ use super::receiving::Receiving;
 use super::sending::Sending;
 use super::table::Table;
 use super::times::Times;
+use super::wire::Wire;
 use crate::frame::NodeIndex;
 use crate::settings::LEVELS;
 use crate::time::Term;
@@ -61,6 +62,17 @@ pub enum Promise {
     TimeForward,
     /// One master in a term, and one master a while after the last fault.
     OneMaster,
+    /// With time slots no two nodes transmit at once, unless a fault has divided them for longer than [`HOLDOVER_NS`], or the
+    /// router of one began meanwhile, and until [`HEALED_CYCLES`] cycles after it.
+    ///
+    /// [`HOLDOVER_NS`]: super::slots::HOLDOVER_NS
+    /// [`HEALED_CYCLES`]: super::slots::HEALED_CYCLES
+    Exclusive,
+    /// With time slots each datagram is on the wire in a window of its sender, before its guard, as the sender reckons, and none is sent
+    /// in a window whose wake-up came too late.
+    InWindow,
+    /// With time slots nobody sends while its own bound is greater than what is allowed.
+    SilentWhenUnsure,
 }
 
 /// What a package is for.
@@ -150,6 +162,8 @@ pub struct Book {
     pub(super) receiving: BTreeMap<u32, Receiving>,
     /// When a router last took something of another, true ns, and the lives of both: receiver, sender.
     pub(super) heard: Table<(usize, usize), (u64, u32, u32)>,
+    /// From posting to delivery at most, ns, by sender, mailbox and priority.
+    pub slowest_ns: BTreeMap<(Name, Name, u8), u64>,
     /// What was broken.
     pub problems: Vec<Problem>,
     /// What was seen, so that a test knows that it saw enough.
@@ -158,8 +172,12 @@ pub struct Book {
     pattern: Vec<u8>,
     /// Level of a priority.
     bulk_below: u8,
+    /// From then on all must be well, true ns.
+    pub well_ns: u64,
     /// System time.
     pub times: Times,
+    /// Who transmits when, with time slots.
+    pub wire: Wire,
     /// The master, and its term, that all nodes must agree on by now.
     pub master: Option<(Option<NodeIndex>, Term)>,
 }

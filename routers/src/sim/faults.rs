@@ -55,15 +55,15 @@ impl World<'_> {
                 for _ in 0..count {
                     let bytes = self.foreign(to);
                     let known = self.chance.percent(70).then(|| self.chance.below(self.stations.len() as u64) as usize);
-                    let arrived = Arrived { source: known, bytes, stamp: Now::default(), damaged: false };
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
                     let port = usize::from(self.chance.percent(20));
-                    self.at(at_ns, Event::Arrive { to, port, arrived });
+                    let arrived = Arrived { port, source: known, bytes, stamp: Now::default(), damaged: false };
+                    self.at(at_ns, Event::Arrive { to, arrived });
                 }
             }
             Fault::Replay { to, count } => {
                 for _ in 0..count.min(self.old.len() as u64) {
-                    let (port, whose, life, arrived) = self.chance.pick_ref(&self.old).clone();
+                    let (whose, life, arrived) = self.chance.pick_ref(&self.old).clone();
                     // To whom it was for, mostly. A router that began since cannot know it from one that is new: that the wire keeps
                     // nothing for long is relied on.
                     let is_same = self.stations[whose].router.as_ref().is_some_and(|router| router.life == life);
@@ -72,7 +72,7 @@ impl World<'_> {
                         continue;
                     }
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
-                    self.at(at_ns, Event::Arrive { to, port, arrived });
+                    self.at(at_ns, Event::Arrive { to, arrived });
                 }
             }
         }

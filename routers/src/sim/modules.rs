@@ -3,7 +3,7 @@
 use super::book::{Promise, Role, Way};
 use super::calls::{Answer, Waiting};
 use super::host::Parcel;
-use super::plan::{MS, RECOVERY_NS, US};
+use super::plan::{MS, US};
 use super::world::{Event, World};
 use rohrpost_mailbox::{Head, Name, Options, Priority, Type, local};
 
@@ -192,7 +192,7 @@ impl World<'_> {
             let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
             self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.close(io)));
         }
-        let well_ns = self.plan.mended_ns + RECOVERY_NS;
+        let well_ns = self.book.well_ns;
         let now = self.now(0);
         for (index, call) in self.calls.all.iter().enumerate() {
             let meant = call.began_true_ns > well_ns && call.valid_for_ns >= ANSWERED_WITHIN_NS;

@@ -13,8 +13,10 @@ use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::settings::{NodeSettings, Settings};
 use crate::stats::{Cause, Side, Stats};
+use crate::tdma::Permit;
 use rohrpost_config::{Network, Route};
 use rohrpost_mailbox::{Head, Kind, Options, Type};
+use std::collections::VecDeque;
 use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -58,6 +60,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
             port: 21117,
             mtu: u16::MAX,
         },
+        tdma: plan.slots.as_ref().map(|slots| slots.table.clone()),
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
     }
@@ -83,6 +86,8 @@ pub struct Packages {
     present_since_ns: Vec<u64>,
     /// Losses when all began to be well.
     lost_before: Option<(u64, u64)>,
+    /// What the receiving half wants to be sent.
+    refusals: VecDeque<Sent>,
     /// Commands that could not be delivered here; their callers are to be told.
     undelivered: Vec<Head>,
 }
@@ -98,6 +103,7 @@ impl Packages {
             queue_bytes_max: (settings.network.quota_bytes as u64 + 1024) * (settings.senders.len() as u64 + 1),
             in_hand: None,
             lost_before: None,
+            refusals: VecDeque::new(),
             undelivered: Vec::new(),
             steady_since_ns: now_ns,
             polled_ns: now_ns,
@@ -140,7 +146,12 @@ impl Packages {
             let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             return self.outbound.unsent(&bytes, &[], &mut watch);
         }
-        io.book.leaves(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
+        io.book.leaves(io.now, io.life, &bytes);
+        if io.plan.slots.is_some() {
+            io.book.is_strict(io.now, io.life, &bytes);
+        } else {
+            io.book.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
+        }
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
         io.sent.push(Sent { port: PORT, to: to.into(), bytes });
     }
@@ -166,6 +177,56 @@ impl Packages {
             io.book.saw("told a caller on another node");
             self.accept(io, head, io.now.monotonic_ns, &body, false);
         }
+    }
+
+    /// Does what is due of the receiving half, and writes the refusals that it wants to be sent; when to ask again.
+    fn poll_inbound(&mut self, io: &mut Io<'_>) -> u64 {
+        if io.now.monotonic_ns > self.polled_ns + STILL_NS {
+            self.steady_since_ns = io.now.monotonic_ns;
+        }
+        self.polled_ns = io.now.monotonic_ns;
+        let is_young = self.stats.is_young(io.now.monotonic_ns);
+        loop {
+            let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
+            match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
+                inbound::Output::Refuse { to, bytes } => {
+                    let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
+                    if let Some(to) = node {
+                        io.book.saw("refused");
+                        self.refusals.push_back(Sent { port: PORT, to, bytes: Rc::from(&self.buffer[..bytes]) });
+                    }
+                }
+                inbound::Output::Wait { until_ns } => return until_ns,
+            }
+        }
+    }
+
+    /// With time slots: sends in one what must be said, and then what is most important, as long as it fits.
+    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, permit: &mut Permit) {
+        let now_ns = io.now.monotonic_ns;
+        while let Some(refusal) = self.refusals.pop_front_if(|refusal| permit.fits(now_ns, refusal.bytes.len())) {
+            permit.takes(now_ns, refusal.bytes.len());
+            io.sent.push(refusal);
+        }
+        self.take_in(io);
+        while let Some(room_bytes) = permit.room_bytes(now_ns) {
+            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+            let Some((to, bytes)) = self.outbound.poll_slot(now_ns, room_bytes, &mut self.buffer, &mut watch) else {
+                break;
+            };
+            permit.takes(now_ns, bytes);
+            let bytes = Rc::from(&self.buffer[..bytes]);
+            self.send(io, to, bytes);
+        }
+    }
+
+    /// With time slots: does between them what passing time does; when to ask again.
+    pub(super) fn tidy(&mut self, io: &mut Io<'_>) -> u64 {
+        let until_ns = self.poll_inbound(io);
+        self.answer(io);
+        let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+        self.outbound.tidy(watch.io.now.monotonic_ns, &mut watch);
+        until_ns
     }
 
     fn counted(&self, source: Option<usize>) -> (u64, u64, u64) {
@@ -297,32 +358,12 @@ impl Layer for Packages {
         self.answer(io);
     }
 
-    fn left(&mut self, _: &mut Io<'_>, _: u64, _: Now) {}
+    fn left(&mut self, _: &mut Io<'_>, _: Port, _: u64, _: Now) {}
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
-        if io.now.monotonic_ns > self.polled_ns + STILL_NS {
-            self.steady_since_ns = io.now.monotonic_ns;
-        }
-        self.polled_ns = io.now.monotonic_ns;
         self.take_in(io);
-        let mut until_ns = u64::MAX;
-        let is_young = self.stats.is_young(io.now.monotonic_ns);
-        loop {
-            let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
-            match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
-                inbound::Output::Refuse { to, bytes } => {
-                    let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
-                    if let Some(to) = node {
-                        io.book.saw("refused");
-                        io.sent.push(Sent { port: PORT, to, bytes: Rc::from(&self.buffer[..bytes]) });
-                    }
-                }
-                inbound::Output::Wait { until_ns: then_ns } => {
-                    until_ns = until_ns.min(then_ns);
-                    break;
-                }
-            }
-        }
+        let until_ns = self.poll_inbound(io);
+        io.sent.extend(self.refusals.drain(..));
         self.answer(io);
         loop {
             let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };

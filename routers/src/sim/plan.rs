@@ -6,6 +6,7 @@
 
 use super::chance::Chance;
 use super::link::Quality;
+use super::slots::Slots;
 use crate::frame::NodeIndex;
 use crate::inbound::REFUSE_EVERY_NS;
 use crate::link::REFUSED_FOR_NS;
@@ -220,6 +221,8 @@ pub struct Plan {
     pub nodes: Vec<NodePlan>,
     /// Of all links, unless a fault says otherwise; after the faults only its delay and jitter are left.
     pub quality: Quality,
+    /// Who may send when; none: everyone, as packages come.
+    pub slots: Option<Slots>,
     /// Data.
     pub flows: Vec<Flow>,
     /// Commands.
@@ -232,6 +235,8 @@ pub struct Plan {
     pub has_stamps: bool,
     /// Whether damaged datagrams are dropped by the kernel, as UDP's checksum has it; else the routers get them.
     pub checksum: bool,
+    /// No data before this, ns.
+    pub traffic_begin_ns: u64,
     /// No fault and no flood after this, ns.
     pub mended_ns: u64,
     /// From then on all nodes follow one master, ns.
@@ -258,9 +263,8 @@ impl Plan {
         let quality = quality(&mut chance);
         let mended_ns = chance.between(2 * S, 6 * S);
         let masters = masters(count, &mut chance);
-        let timed_ns = mended_ns + (TIMED_INTERVALS + masters.len() as u64) * shape.interval_ns;
-        let stepped_ns = timed_ns + EPOCH_PAUSE_NS;
-        let traffic_end_ns = mended_ns + RECOVERY_NS + WELL_NS;
+        let checksum = chance.percent(90);
+        let waits_for_epochs = chance.percent(10);
         let mut plan = Self {
             seed,
             shape,
@@ -268,24 +272,41 @@ impl Plan {
             flows: Vec::new(),
             calls: Vec::new(),
             faults: Vec::new(),
-            checksum: chance.percent(90),
+            checksum,
+            traffic_begin_ns: 0,
             mended_ns,
-            traffic_end_ns,
-            end_ns: (traffic_end_ns + DRAIN_NS).max(timed_ns + S).max(if chance.percent(10) {
-                stepped_ns + S
-            } else {
-                0
-            }),
-            timed_ns,
-            stepped_ns,
+            traffic_end_ns: 0,
+            end_ns: 0,
+            timed_ns: 0,
+            stepped_ns: 0,
             masters,
             has_stamps: chance.percent(80),
+            slots: None,
             nodes,
         };
-        plan.draw_flows(&mut chance.fork());
-        plan.draw_calls(&mut chance.fork());
-        plan.draw_faults(&mut chance.fork());
+        plan.time();
+        if waits_for_epochs {
+            plan.end_ns = plan.end_ns.max(plan.stepped_ns + S);
+        }
+        plan.draw_all(&mut chance);
         plan
+    }
+
+    /// Draws what happens in the network.
+    pub(super) fn draw_all(&mut self, chance: &mut Chance) {
+        (self.flows, self.calls, self.faults) = Default::default();
+        self.draw_flows(&mut chance.fork());
+        self.draw_calls(&mut chance.fork());
+        self.draw_faults(&mut chance.fork());
+    }
+
+    /// When all must be well, and when it ends, from when the last fault is over.
+    pub(super) fn time(&mut self) {
+        let intervals = TIMED_INTERVALS + self.masters.len() as u64;
+        self.timed_ns = self.mended_ns + intervals * self.shape.interval_ns;
+        self.stepped_ns = self.timed_ns + EPOCH_PAUSE_NS;
+        self.traffic_end_ns = self.mended_ns + RECOVERY_NS + WELL_NS;
+        self.end_ns = (self.traffic_end_ns + DRAIN_NS).max(self.timed_ns + S);
     }
 
     /// A network in which nothing goes wrong.
@@ -411,7 +432,7 @@ pub(super) fn node(index: usize, chance: &mut Chance) -> NodePlan {
     }
 }
 
-fn masters(nodes: usize, chance: &mut Chance) -> Vec<NodeIndex> {
+pub(super) fn masters(nodes: usize, chance: &mut Chance) -> Vec<NodeIndex> {
     let mut masters: Vec<NodeIndex> = (0..nodes as NodeIndex).collect();
     if chance.percent(60) {
         let kept = chance.between(1, 4) as usize;

@@ -137,6 +137,9 @@ impl Book {
         let twice = package.deliveries.contains(&lives);
         package.deliveries.push(lives);
         let (head, place) = (package.head, package.place);
+        let took_ns = now.true_ns - package.posted_ns;
+        let slowest_ns = self.slowest_ns.entry((head.from, head.to, head.priority.0)).or_default();
+        *slowest_ns = took_ns.max(*slowest_ns);
         let has_place = !twice && !redelivered && !matches!(package.role, Role::Report { .. });
         if twice {
             let text = format!("package {number} was delivered twice by one router: {head:?}");

@@ -3,10 +3,12 @@
 use super::book::Problem;
 use super::calls::NewGuard;
 use super::packages::{Packages, settings};
-use super::plan::Plan;
+use super::plan::{Flow, Plan};
+use super::slotted::Slotted;
 use super::station::Layer;
 use super::ticking::{self, Ticking};
 use super::world::{NewLayers, World};
+use crate::tdma::Table;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -17,6 +19,8 @@ pub struct Outcome {
     pub problems: Vec<Problem>,
     /// What was seen, and how often.
     pub seen: BTreeMap<&'static str, u64>,
+    /// From posting to delivery at most, ns, of each flow of the plan.
+    pub slowest_ns: Vec<u64>,
     /// Lines, if they were asked for.
     pub trace: Vec<String>,
 }
@@ -48,9 +52,12 @@ pub enum Mistake {
 fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticking) + 'static) -> Outcome {
     let plan = Rc::new(plan);
     let layers = routers(&plan, change);
-    let mut world = World::new(plan, guard, layers, trace);
+    let mut world = World::new(plan.clone(), guard, layers, trace);
     world.run();
-    Outcome { problems: world.book.problems, seen: world.book.seen, trace: world.trace.lines }
+    let book = world.book;
+    let slowest = |flow: &Flow| book.slowest_ns.get(&(flow.from, flow.to, flow.priority)).copied().unwrap_or_default();
+    let slowest_ns = plan.flows.iter().map(slowest).collect();
+    Outcome { problems: book.problems, seen: book.seen, slowest_ns, trace: world.trace.lines }
 }
 
 /// Routers as this version has them.
@@ -59,9 +66,15 @@ fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayer
     Box::new(move |node, life, now, page| {
         // Never the same again, and in no order.
         let incarnation = (plan.seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        let packages = Packages::new(&settings(&plan, node, incarnation), now.monotonic_ns);
+        let settings = settings(&plan, node, incarnation);
+        let packages = Packages::new(&settings, now.monotonic_ns);
         let mut ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
         change(&mut ticking);
+        if let Some(slots) = &plan.slots {
+            let (own, nodes) = (settings.own, plan.nodes.len() as u8);
+            let table = Table::new(&slots.table, &plan.masters, own, nodes, settings.overhead_bytes());
+            return vec![Box::new(Slotted::new(packages, ticking, table))];
+        }
         vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]
     })
 }

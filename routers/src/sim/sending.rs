@@ -123,7 +123,7 @@ impl Book {
     }
 
     /// A datagram leaves a router: all that is in it was waiting, and may go now.
-    pub fn leaves(&mut self, now: Now, life: u32, datagram: &[u8], shape: &Shape, overhead_bytes: usize) {
+    pub fn leaves(&mut self, now: Now, life: u32, datagram: &[u8]) {
         let mut first = LEVELS;
         match Frame::parse(datagram) {
             Ok((_, Frame::Packages(packages))) => {
@@ -155,16 +155,51 @@ impl Book {
         }
         let sending = self.sending.entry(life).or_default();
         sending.below[..first.min(LEVELS)].iter_mut().for_each(|count| *count += u64::from(first < LEVELS));
+    }
+
+    /// Levels of the most and of the least important package in a datagram, if there is one.
+    fn levels(&self, datagram: &[u8]) -> Option<(usize, usize)> {
+        match Frame::parse(datagram) {
+            Ok((_, Frame::Packages(packages))) => {
+                let levels = || packages.clone().map(|(head, _)| self.level(head.priority.0));
+                Some((levels().min()?, levels().max()?))
+            }
+            Ok((_, Frame::Fragment(part))) => {
+                let level = self.level(part.head.priority.0);
+                Some((level, level))
+            }
+            _ => None,
+        }
+    }
+
+    /// In time slots nothing leaves while something more important waits, whoever it is for and however large.
+    pub fn is_strict(&mut self, now: Now, life: u32, datagram: &[u8]) {
+        let last = self.levels(datagram).map(|(_, last)| last);
+        let waiting = self.sending.get(&life).into_iter().flat_map(|sending| sending.waiting.values());
+        let first = waiting.filter_map(|waiting| waiting.packages.first()).min().copied();
+        if let (Some(last), Some((first, _, number))) = (last, first)
+            && first < last
+        {
+            let text = format!("a package of level {last} leaves, and {number} of level {first} waits");
+            self.broken(now, Promise::Urgency, text);
+        }
+    }
+
+    /// Without time slots no router sends faster than it may; "still there" goes anyway.
+    pub fn paces(&mut self, now: Now, life: u32, datagram: &[u8], shape: &Shape, overhead_bytes: usize) {
+        let first = self.levels(datagram).map(|(first, _)| first);
+        let sending = self.sending.entry(life).or_default();
         let ahead_ns = sending.through_ns.saturating_sub(now.monotonic_ns);
         let takes_ns = (datagram.len() + overhead_bytes) as u64 * 1_000_000_000 / shape.rate_bytes_s;
         sending.through_ns = sending.through_ns.max(now.monotonic_ns) + takes_ns;
+        let Some(first) = first else { return };
         // What is more urgent than what left last may go in advance, by one datagram.
         let advance_ns = match first < sending.last {
             true => (shape.datagram_bytes_max + overhead_bytes) as u64 * 1_000_000_000 / shape.rate_bytes_s,
             false => 0,
         };
-        sending.last = if first < LEVELS { first } else { sending.last };
-        if first < LEVELS && ahead_ns > AHEAD_NS_MAX + advance_ns {
+        sending.last = first;
+        if ahead_ns > AHEAD_NS_MAX + advance_ns {
             self.broken(now, Promise::Pace, format!("a datagram leaves {ahead_ns} ns before its time"));
         }
     }

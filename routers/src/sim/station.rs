@@ -1,7 +1,8 @@
 //! One computer of a simulated network: clocks, modules, and the layers that its router is made of.
 //!
-//! A [`Layer`] is one protocol with one socket: packages, time, and what comes later. It sees what a real one sees: its own clocks,
-//! the datagrams of its socket, the mailboxes of its computer. When its router dies, all layers are dropped, and made anew.
+//! A [`Layer`] is one protocol with one socket, packages or time, or all that one thread does with both. It sees what a real one sees:
+//! its own clocks, the datagrams of its sockets, the mailboxes of its computer. When its router dies, all layers are dropped, and made
+//! anew.
 
 use super::book::Book;
 use super::chance::Chance;
@@ -64,6 +65,8 @@ pub struct Sent {
 /// A datagram that came in.
 #[derive(Clone, Debug)]
 pub struct Arrived {
+    /// Socket that has it.
+    pub port: Port,
     /// Node whose address it comes from; none: an address that no node has.
     pub source: Option<usize>,
     /// Its bytes.
@@ -78,8 +81,8 @@ pub struct Arrived {
 pub trait Layer {
     /// A datagram came in.
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived);
-    /// The kernel says when a datagram of this layer left: which one, counted from 0, and on which clocks.
-    fn left(&mut self, io: &mut Io<'_>, index: u64, stamp: Now);
+    /// The kernel says when a datagram left a socket: which one, counted from 0, and on which clocks.
+    fn left(&mut self, io: &mut Io<'_>, port: Port, index: u64, stamp: Now);
     /// Does what is due; when to be called again, on its monotonic clock.
     fn poll(&mut self, io: &mut Io<'_>) -> u64;
     /// Its router dies now: only the books may be looked at.
@@ -94,10 +97,18 @@ pub trait Layer {
 pub struct Router {
     /// Which life this is, over all nodes.
     pub life: u32,
-    /// Its protocols, by their ports.
+    /// Its protocols: one for each socket, or one for all.
     pub layers: Vec<Box<dyn Layer>>,
-    /// Datagrams that each layer has sent.
+    /// Datagrams that left each socket.
     pub sent: [u64; PORTS],
+}
+
+impl Router {
+    /// The protocol that has a socket.
+    pub fn layer(&mut self, port: Port) -> Option<&mut Box<dyn Layer>> {
+        let last = self.layers.len().saturating_sub(1);
+        self.layers.get_mut(port.min(last))
+    }
 }
 
 /// A computer.
@@ -144,7 +155,8 @@ impl Station {
     }
 
     /// Puts a datagram in a socket that nobody reads now; false: it is full.
-    pub fn keep(&mut self, port: Port, arrived: Arrived) -> bool {
+    pub fn keep(&mut self, arrived: Arrived) -> bool {
+        let port = arrived.port;
         let waiting: usize = self.sockets[port].iter().map(|other| other.bytes.len() + 256).sum();
         let fits = waiting + arrived.bytes.len() <= SOCKET_BYTES_MAX;
         if fits {

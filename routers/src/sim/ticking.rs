@@ -4,8 +4,9 @@ use super::book::Promise;
 use super::clock::Now;
 use super::plan::{Plan, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
-use crate::frame::FrameHead;
-use crate::time::{Clock, Role, SentId, Stamp, Step, TIME_BYTES, TimeSettings};
+use crate::frame::{FrameHead, NodeIndex};
+use crate::tdma::{Permit, Table};
+use crate::time::{Allowed, Clock, Role, SentId, Stamp, Step, TIME_BYTES, TimeSettings};
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -47,12 +48,49 @@ impl Ticking {
         Self { clock, has_stamps, awaited: VecDeque::new(), sent: 0 }
     }
 
+    /// The same with time slots; all of its datagrams leave in windows.
+    pub(super) fn in_slots(self, table: &Table) -> Self {
+        Self { clock: self.clock.in_slots(table.for_clock()), ..self }
+    }
+
     /// The core, so that mistakes can be switched on.
     pub fn clock(&mut self) -> &mut Clock {
         &mut self.clock
     }
 
-    fn stamp(&self, io: &mut Io<'_>, at: Now) -> Stamp {
+    /// With time slots: sends what a window is for, as long as it fits; without one does what passing time does. When to ask again.
+    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, mut permit: Option<&mut Permit>) -> u64 {
+        let (mut datagram, now_ns) = ([0; TIME_BYTES], io.now.monotonic_ns);
+        loop {
+            let fits = permit.as_ref().filter(|permit| permit.fits(now_ns, TIME_BYTES));
+            let allowed = fits.map_or(Allowed::Nothing, |permit| permit.allowed());
+            let step = self.clock.poll_in(now_ns, allowed, &mut datagram);
+            self.look(io);
+            match (step, &mut permit) {
+                (Step::Send { to, stamp }, Some(permit)) => {
+                    permit.takes(now_ns, TIME_BYTES);
+                    self.send(io, to, stamp, &datagram);
+                }
+                (Step::Send { .. }, None) => {
+                    io.book.broken(io.now, Promise::Exclusive, "a clock sends outside of its windows".into());
+                }
+                (Step::Wait { until_ns }, _) => return until_ns,
+            }
+        }
+    }
+
+    fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, stamp: Option<SentId>, datagram: &[u8; TIME_BYTES]) {
+        if let Some(id) = stamp {
+            self.awaited.push_back((self.sent, id));
+            if self.awaited.len() > AWAITED_MAX {
+                self.awaited.pop_front();
+            }
+        }
+        self.sent += 1;
+        io.sent.push(Sent { port: PORT, to: to.into(), bytes: Rc::from(*datagram) });
+    }
+
+    pub(super) fn stamp(&self, io: &mut Io<'_>, at: Now) -> Stamp {
         if !self.has_stamps {
             return Stamp::by_us(io.now.monotonic_ns);
         }
@@ -75,7 +113,7 @@ impl Layer for Ticking {
         self.look(io);
     }
 
-    fn left(&mut self, io: &mut Io<'_>, index: u64, at: Now) {
+    fn left(&mut self, io: &mut Io<'_>, _: Port, index: u64, at: Now) {
         self.awaited.retain(|(other, _)| *other >= index);
         let awaited = self.awaited.pop_front_if(|(other, _)| *other == index);
         // Now and then the kernel has none.
@@ -95,16 +133,7 @@ impl Layer for Ticking {
             let step = self.clock.poll(io.now.monotonic_ns, &mut datagram);
             self.look(io);
             match step {
-                Step::Send { to, stamp } => {
-                    if let Some(id) = stamp {
-                        self.awaited.push_back((self.sent, id));
-                        if self.awaited.len() > AWAITED_MAX {
-                            self.awaited.pop_front();
-                        }
-                    }
-                    self.sent += 1;
-                    io.sent.push(Sent { port: PORT, to: to.into(), bytes: Rc::from(datagram) });
-                }
+                Step::Send { to, stamp } => self.send(io, to, stamp, &datagram),
                 Step::Wait { until_ns } => return until_ns,
             }
         }

@@ -49,6 +49,13 @@ impl Times {
         self.pages.get(node)?.record
     }
 
+    /// How far a node's page is off the time of a term, ns; none if nobody began that.
+    pub fn off_ns(&self, now: Now, node: usize, term: Term) -> Option<u64> {
+        let (line, record) = (self.lines.get(&term.0)?, self.pages[node].record?);
+        let off_ns = i128::from(record.at(now.monotonic_ns).ns) - self.at(line, now.true_ns);
+        u64::try_from(off_ns.unsigned_abs()).ok()
+    }
+
     /// Looks at a node after its layer of time did anything: its reign, and what its page says from now on.
     pub fn look(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
         if core.role() == Role::Master {

@@ -1,17 +1,18 @@
 //! A network of simulated computers in virtual time: events in their order, datagrams on their links, layers called as their threads
 //! would be.
 
-use super::book::{Book, Problem};
+use super::book::{Book, Problem, Promise};
 use super::calls::{Calls, NewGuard, Server};
 use super::chance::Chance;
 use super::clock::{Clock, Now};
 use super::faults::damage;
 use super::link::Link;
 use super::modules::DATA_MAILBOXES;
-use super::plan::{MS, Plan, S, US};
+use super::plan::{MS, Plan, RECOVERY_NS, S, US};
 use super::station::{Arrived, Io, Layer, Port, Router, Sent, Station};
 use super::times::Times;
 use super::trace::Trace;
+use super::wire::{LEAD_NS, Wire};
 use rohrpost_mailbox::{Name, TimeRecord, local};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, BinaryHeap};
@@ -25,7 +26,7 @@ pub(super) enum Event {
     /// A router has something to do.
     Wake { node: usize },
     /// A datagram comes out of a link.
-    Arrive { to: usize, port: Port, arrived: Arrived },
+    Arrive { to: usize, arrived: Arrived },
     /// The kernel says when a datagram left.
     Left { node: usize, life: u32, port: Port, index: u64 },
     /// A router starts if nothing keeps it down.
@@ -95,8 +96,8 @@ pub struct World<'a> {
     lives: u32,
     /// The life of each node's router.
     living: Vec<u32>,
-    /// Datagrams that routers had, of which some come again: port, receiver, its life.
-    pub(super) old: Vec<(Port, usize, u32, Arrived)>,
+    /// Datagrams that routers had, of which some come again: receiver, its life.
+    pub(super) old: Vec<(usize, u32, Arrived)>,
     sent: Vec<Sent>,
 }
 
@@ -125,6 +126,7 @@ impl<'a> World<'a> {
         }
         let mut book = Book::new(plan.shape.bulk_below);
         book.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
+        (book.wire, book.well_ns) = (Wire::new(count), plan.mended_ns + RECOVERY_NS);
         let mut world = Self {
             now_ns: 0,
             events: BinaryHeap::new(),
@@ -158,7 +160,7 @@ impl<'a> World<'a> {
         }
         self.at(plan.mended_ns, Event::Mended);
         for (flow, its) in plan.flows.iter().enumerate() {
-            let at_ns = self.chance.below(its.period_ns);
+            let at_ns = plan.traffic_begin_ns + self.chance.below(its.period_ns);
             self.at(at_ns, Event::Flow { flow });
         }
         for (caller, its) in plan.calls.iter().enumerate() {
@@ -199,10 +201,14 @@ impl<'a> World<'a> {
             Event::Wake { node } if self.stations[node].wake_ns == Some(self.now_ns) => self.wake(node),
             // There was another, earlier one.
             Event::Wake { .. } => {}
-            Event::Arrive { to, port, arrived } => self.arrive(to, port, arrived),
+            Event::Arrive { to, arrived } => self.arrive(to, arrived),
             Event::Left { node, life, port, index } => {
                 let stamp = self.now(node);
-                self.with_router(node, life, |router, io| router.layers[port].left(io, index, stamp));
+                self.with_router(node, life, |router, io| {
+                    if let Some(layer) = router.layer(port) {
+                        layer.left(io, port, index, stamp);
+                    }
+                });
             }
             Event::Start { node } => self.start(node),
             Event::Begin { fault } => self.begin(fault),
@@ -247,13 +253,30 @@ impl<'a> World<'a> {
             let Some(router) = &mut self.stations[node].router else { return };
             let (life, index) = (router.life, router.sent[port]);
             router.sent[port] += 1;
-            // It takes a while from the call to the wire.
-            let out_ns = self.now_ns + self.chance.between(US, 30 * US);
-            if port > 0 {
-                self.at(out_ns, Event::Left { node, life, port, index });
+            let (left_ns, out_ns) = self.transmit(node, bytes.len());
+            if port > 0 || self.plan.slots.is_some() {
+                self.at(left_ns, Event::Left { node, life, port, index });
             }
             self.pass(node, to, port, bytes, out_ns);
         }
+    }
+
+    /// It takes a while from the call to the wire: when a datagram leaves, and when all of it has.
+    fn transmit(&mut self, node: usize, bytes: usize) -> (u64, u64) {
+        let Some(slots) = &self.plan.slots else {
+            let left_ns = self.now_ns + self.chance.between(US, 30 * US);
+            return (left_ns, left_ns);
+        };
+        let book = &mut self.book;
+        let at_ns = self.now_ns + self.chance.between(LEAD_NS.0, LEAD_NS.1);
+        let sent = book.wire.transmit(node, at_ns, bytes, slots, &mut book.problems);
+        let clock = &self.stations[node].clock;
+        let local_ns = [self.now_ns, sent.begin_ns, sent.end_ns].map(|true_ns| clock.at(true_ns).monotonic_ns);
+        if let Some(text) = book.wire.window(node, bytes, slots, local_ns) {
+            book.problems.push(Problem { promise: Promise::InWindow, at_ns: sent.begin_ns, text });
+        }
+        self.trace.line(self.now_ns, || format!("{node} transmits from {} to {} ns", sent.begin_ns, sent.end_ns));
+        (sent.begin_ns, sent.end_ns)
     }
 
     /// Lets a link do with a datagram what it does.
@@ -272,36 +295,36 @@ impl<'a> World<'a> {
                 }
                 bytes = damage(&bytes, &mut self.chance);
             }
-            let arrived = Arrived { source: Some(from), bytes, stamp: Now::default(), damaged: passage.damaged };
-            self.at(passage.at_ns, Event::Arrive { to, port, arrived });
+            let arrived = Arrived { port, source: Some(from), bytes, stamp: Now::default(), damaged: passage.damaged };
+            self.at(passage.at_ns, Event::Arrive { to, arrived });
         }
     }
 
     /// A datagram is in the kernel of its receiver.
-    pub(super) fn arrive(&mut self, to: usize, port: Port, mut arrived: Arrived) {
+    pub(super) fn arrive(&mut self, to: usize, mut arrived: Arrived) {
         arrived.stamp = self.now(to);
         if !self.stations[to].runs() {
             let is_up = self.stations[to].router.is_some();
-            if !is_up || !self.stations[to].keep(port, arrived) {
+            if !is_up || !self.stations[to].keep(arrived) {
                 self.book.saw(if is_up { "socket full" } else { "no router" });
             }
             return;
         }
-        self.hand_in(to, port, &arrived);
+        self.hand_in(to, &arrived);
         self.poll(to);
     }
 
-    fn hand_in(&mut self, node: usize, port: Port, arrived: &Arrived) {
+    fn hand_in(&mut self, node: usize, arrived: &Arrived) {
         let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { return };
         if self.chance.below(50) == 0 && arrived.source.is_some() {
-            self.old.push((port, node, life, arrived.clone()));
+            self.old.push((node, life, arrived.clone()));
             if self.old.len() > OLD_MAX {
                 let gone = self.chance.below(OLD_MAX as u64) as usize;
                 self.old.swap_remove(gone);
             }
         }
         self.with_router(node, life, |router, io| {
-            if let Some(layer) = router.layers.get_mut(port) {
+            if let Some(layer) = router.layer(arrived.port) {
                 layer.handle(io, arrived);
             }
         });
@@ -318,7 +341,7 @@ impl<'a> World<'a> {
     pub(super) fn catch_up(&mut self, node: usize) {
         for port in 0..self.stations[node].sockets.len() {
             while let Some(arrived) = self.stations[node].sockets[port].pop_front() {
-                self.hand_in(node, port, &arrived);
+                self.hand_in(node, &arrived);
                 if self.chance.percent(20) {
                     self.poll(node);
                 }
@@ -334,8 +357,12 @@ impl<'a> World<'a> {
         self.with_router(node, life, |router, io| {
             until_ns = router.layers.iter_mut().map(|layer| layer.poll(io)).min().unwrap_or(u64::MAX);
         });
-        // Threads wake a little late, and seldom much.
-        let late_ns = if self.chance.below(500) == 0 { self.chance.below(5 * MS) } else { self.chance.below(60 * US) };
+        let late_ns = match &self.plan.slots {
+            // Threads wake a little late, and seldom much.
+            None if self.chance.below(500) == 0 => self.chance.below(5 * MS),
+            None => self.chance.below(60 * US),
+            Some(slots) => slots.late_ns(self.now_ns >= self.plan.mended_ns, &mut self.chance),
+        };
         let at_ns = self.stations[node].clock.when(until_ns, self.now_ns).max(self.now_ns + 1).saturating_add(late_ns);
         self.wake_at(node, at_ns);
     }
@@ -358,6 +385,7 @@ impl<'a> World<'a> {
         self.lives += 1;
         let life = self.lives;
         self.living[node] = life;
+        self.book.wire.begins(node, self.now_ns);
         let now = self.now(node);
         let layers = (self.new_layers)(node, life, now, self.book.times.page(node));
         self.stations[node].router = Some(Router { life, layers, sent: Default::default() });
@@ -386,7 +414,7 @@ impl<'a> World<'a> {
             let now = self.now(node);
             self.book.times.read(now, node, &mut self.book.problems);
             let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
-            let well = self.now_ns >= self.plan.mended_ns + super::plan::RECOVERY_NS;
+            let well = self.now_ns >= self.book.well_ns;
             self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.check(io, well)));
         }
     }

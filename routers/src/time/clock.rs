@@ -2,10 +2,11 @@
 
 mod master;
 mod slave;
+mod slots;
 
 use super::broken::Broken;
 use super::election::{Election, State};
-use super::history::History;
+use super::history::{History, RATE_MAX};
 use super::line::{EVEN_PPB, Line};
 use super::message::{Message, Request};
 use super::types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
@@ -13,6 +14,9 @@ use super::{Stamp, TIME_BYTES, Term};
 use crate::frame::{FrameHead, HEAD_BYTES, NodeIndex};
 use rohrpost_mailbox::{TimeRecord, TimeSource};
 use std::collections::VecDeque;
+
+pub use slots::Allowed;
+use slots::Slots;
 
 /// Exchanges in an interval, and the shortest pause between two with one slave.
 const EXCHANGES: u64 = 8;
@@ -51,8 +55,16 @@ struct Asked {
 enum Draft {
     WarmUp,
     Sync { nominal_ns: u64 },
+    Replacement { nominal_ns: u64 },
     Request { id: u64 },
     Reply { id: u64, came: Stamp },
+}
+
+impl Draft {
+    /// Whether it matters when it leaves.
+    fn is_stamped(&self) -> bool {
+        matches!(self, Self::Sync { .. } | Self::Replacement { .. } | Self::Request { id: 1.. })
+    }
 }
 
 /// The sans-I/O core of time. See the module's own page.
@@ -85,6 +97,8 @@ pub struct Clock {
     last: Option<Exchange>,
     offset_ns: i64,
     contradictions: u64,
+    /// What time slots need besides; none in free mode.
+    slots: Option<Box<Slots>>,
     #[cfg(any(test, feature = "broken-variants"))]
     pub(super) broken: Option<Broken>,
 }
@@ -128,6 +142,7 @@ impl Clock {
             last: None,
             offset_ns: 0,
             contradictions: 0,
+            slots: None,
             #[cfg(any(test, feature = "broken-variants"))]
             broken: None,
             settings,
@@ -169,17 +184,12 @@ impl Clock {
 
     /// What is to be done now. To be called again after each datagram sent or taken, and when the time has come. `now_ns` goes into the
     /// datagram: it is to be read just before.
+    /// In time slots it sends nothing so: see [`Self::poll_in`].
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8; TIME_BYTES]) -> Step {
-        self.line.end_slew(now_ns);
-        self.keep_bound(now_ns);
-        if self.election.falls_silent(now_ns) {
-            self.line.stop_slew(now_ns);
-            self.forget();
-            self.hello_ns = now_ns;
+        if self.slots.is_some() {
+            return self.poll_in(now_ns, Allowed::Nothing, datagram);
         }
-        if let Some(term) = self.election.takes_over(now_ns, self.line.is_synchronised()) {
-            self.reign(now_ns, term);
-        }
+        self.advance(now_ns);
         if self.drafts.is_empty() {
             self.draft(now_ns);
         }
@@ -278,21 +288,34 @@ impl Clock {
         if !self.is(Broken::OldSamples) {
             self.history.clear();
         }
+        if self.slots.is_some() {
+            self.history.fades(2.0 * RATE_MAX);
+        }
         self.asked = [Asked::default(); PENDING];
         self.asked_ns = 0;
         self.far = false;
     }
 
+    /// What the passing of time does.
+    fn advance(&mut self, now_ns: u64) {
+        self.stood_still(now_ns);
+        self.line.end_slew(now_ns);
+        self.keep_bound(now_ns);
+        if self.election.falls_silent(now_ns) {
+            self.line.stop_slew(now_ns);
+            self.forget();
+            self.hello_ns = now_ns;
+        }
+        if let Some(term) = self.election.takes_over(now_ns, self.line.is_synchronised()) {
+            self.reign(now_ns, term);
+        }
+    }
+
     /// What is due without anybody having asked.
     fn draft(&mut self, now_ns: u64) {
         match self.election.state() {
-            State::Listening if self.hello_ns <= now_ns => {
-                self.hello_ns = now_ns.saturating_add(self.interval_ns);
-                for master in self.election.masters().iter().filter(|master| **master != self.settings.own) {
-                    self.drafts.push_back((*master, Draft::Request { id: 0 }));
-                }
-            }
-            State::Listening | State::Slave(_) => {}
+            State::Listening => self.draft_hello(now_ns),
+            State::Slave(_) => {}
             State::Master(_) => {
                 let due = (0..self.settings.nodes)
                     .filter(|node| *node != self.settings.own)
@@ -304,8 +327,20 @@ impl Clock {
         }
     }
 
+    /// Who hears no master says so.
+    fn draft_hello(&mut self, now_ns: u64) {
+        if self.hello_ns <= now_ns {
+            self.hello_ns = now_ns.saturating_add(self.interval_ns);
+            for master in self.election.masters().iter().filter(|master| **master != self.settings.own) {
+                self.drafts.push_back((*master, Draft::Request { id: 0 }));
+            }
+        }
+    }
+
     fn deadline_ns(&self, now_ns: u64) -> u64 {
         let role_ns = match self.election.state() {
+            // Its windows are somebody else's affair.
+            _ if self.slots.is_some() => None,
             State::Master(_) => {
                 let others = self.slaves.iter().enumerate().filter(|(node, _)| *node != usize::from(self.settings.own));
                 others.map(|(_, slave)| slave.next_ns).min()
@@ -331,6 +366,7 @@ impl Clock {
         let message = match draft {
             Draft::WarmUp => Message::WarmUp,
             Draft::Sync { nominal_ns } => Message::Sync(self.write_sync(now_ns, to, nominal_ns, sequence)?),
+            Draft::Replacement { nominal_ns } => Message::Sync(self.write_replacement(now_ns, nominal_ns)?),
             Draft::Request { id } => Message::Request(self.write_request(now_ns, id, sequence)?),
             Draft::Reply { id, came } => Message::Reply(self.write_reply(now_ns, to, id, came)?),
         };

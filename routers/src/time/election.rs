@@ -49,6 +49,8 @@ pub(super) struct Election {
     own: NodeIndex,
     masters: Vec<NodeIndex>,
     interval_ns: u64,
+    /// So long a master is given to answer.
+    deaf_ns: u64,
     state: State,
     /// Since when no master is heard, and who was the last.
     quiet_since_ns: u64,
@@ -58,6 +60,8 @@ pub(super) struct Election {
     highest_epoch: u64,
     /// When somebody that has time said that it hears no master.
     timed_heard_ns: Option<u64>,
+    /// This node stood still before.
+    awake_since_ns: u64,
 }
 
 impl Election {
@@ -66,13 +70,20 @@ impl Election {
             own,
             masters,
             interval_ns,
+            deaf_ns: DEAF_NS_MIN,
             state: State::Listening,
             quiet_since_ns: now_ns,
             lost: None,
             highest: Term::NONE,
             highest_epoch: 0,
             timed_heard_ns: None,
+            awake_since_ns: 0,
         }
+    }
+
+    /// A slave takes so many intervals until it asks: a master must not be replaced before that for not having answered.
+    pub(super) fn asks_after(&mut self, intervals: u64) {
+        self.deaf_ns = DEAF_NS_MIN.max(self.interval_ns.saturating_mul(2 * intervals));
     }
 
     pub(super) fn state(&self) -> State {
@@ -92,7 +103,13 @@ impl Election {
         u8::try_from(rank).ok()
     }
 
-    fn silence_ns(&self) -> u64 {
+    /// Whether somebody who stands behind the master of a term may act for it.
+    pub(super) fn stands_behind(&self, node: NodeIndex, term: Term) -> bool {
+        let mut behind = self.masters.iter().skip(usize::from(term.rank()) + 1);
+        behind.any(|master| *master == node)
+    }
+
+    pub(super) fn silence_ns(&self) -> u64 {
         self.interval_ns.saturating_mul(TAKEOVER_HALF_INTERVALS) / 2
     }
 
@@ -175,6 +192,16 @@ impl Election {
         }
     }
 
+    /// This node stood still until now: that it heard nobody says nothing of the others. What they sent is still to be read.
+    pub(super) fn awakes(&mut self, now_ns: u64) {
+        self.awake_since_ns = now_ns;
+    }
+
+    /// Somebody that has time sent in the place of the master.
+    pub(super) fn replaced(&mut self, received_ns: u64) {
+        self.timed_heard_ns = Some(received_ns);
+    }
+
     pub(super) fn speaks_of(&mut self, term: Term, epoch: u64) {
         self.highest = self.highest.max(term);
         self.highest_epoch = self.highest_epoch.max(epoch);
@@ -190,10 +217,11 @@ impl Election {
     /// Whether the master that this node follows fell silent.
     pub(super) fn falls_silent(&mut self, now_ns: u64) -> bool {
         let State::Slave(master) = self.state else { return false };
-        let silent = now_ns.saturating_sub(master.heard_ns) >= self.silence_ns();
+        let heard_ns = master.heard_ns.max(self.awake_since_ns);
+        let silent = now_ns.saturating_sub(heard_ns) >= self.silence_ns();
         if silent {
             self.state = State::Listening;
-            (self.quiet_since_ns, self.lost) = (master.heard_ns, Some(master.node));
+            (self.quiet_since_ns, self.lost) = (heard_ns, Some(master.node));
         }
         silent
     }
@@ -213,7 +241,8 @@ impl Election {
         let takeover_ns = self.takeover_ns(now_ns, timed);
         match self.state {
             State::Slave(master) => {
-                let silent_ns = master.heard_ns.saturating_add(self.silence_ns());
+                let heard_ns = master.heard_ns.max(self.awake_since_ns);
+                let silent_ns = heard_ns.saturating_add(self.silence_ns());
                 Some(takeover_ns.map_or(silent_ns, |takeover_ns| takeover_ns.min(silent_ns)))
             }
             State::Listening | State::Master(_) => takeover_ns,
@@ -225,7 +254,7 @@ impl Election {
         let rank = self.rank()?;
         let (since_ns, patience_ns, last) = match self.state {
             State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
-            State::Slave(master) => (master.answered_ns, self.silence_ns().max(DEAF_NS_MIN), Some(master.node)),
+            State::Slave(master) => (master.answered_ns, self.silence_ns().max(self.deaf_ns), Some(master.node)),
             State::Master(_) => return None,
         };
         let before = self.masters[..usize::from(rank)].iter().filter(|master| Some(**master) != last).count();
@@ -234,7 +263,7 @@ impl Election {
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = before + if others_timed && !timed { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
-        Some(since_ns.saturating_add(patience_ns).saturating_add(staggered_ns))
+        Some(since_ns.max(self.awake_since_ns).saturating_add(patience_ns).saturating_add(staggered_ns))
     }
 }
 

@@ -1,7 +1,8 @@
 //! What a slave measured, and what follows from it: an interval that holds the truth, and the best guess within it.
 //!
 //! A sample is an interval for `system time − local time`: the frame to us cannot have arrived before it left, nor ours at the master.
-//! Of each *bucket* of time only the narrowest is kept: the one whose frames waited least. From these follow
+//! Of each *bucket* of time only the narrowest is kept: the one whose frames waited least. (In time slots the bound of each moment matters, so a
+//! newer one is narrower if it is by the time that it came: what is old has drifted.) From these follow
 //! the rate and the guess (medians, so single bad ones do not matter), and an interval for both, which assumes nothing of delays.
 
 use super::{RATE_MAX_PPB, WANDER_PPB_S};
@@ -13,7 +14,8 @@ const SLOPES: usize = GUESS_BUCKETS * (GUESS_BUCKETS - 1) / 2;
 /// A bucket whose best frames took so many times as long as the best of all, and so much more, is not asked for a guess.
 const WAITED_TIMES: i64 = 2;
 const WAITED_NS: i64 = 1_000;
-const RATE_MAX: f64 = RATE_MAX_PPB as f64 * 1e-9;
+/// Of 1.
+pub(super) const RATE_MAX: f64 = RATE_MAX_PPB as f64 * 1e-9;
 /// Per nanosecond, so that times a span in ns it is a rate.
 const WANDER: f64 = WANDER_PPB_S as f64 * 1e-18;
 
@@ -55,16 +57,23 @@ pub(super) struct History {
     /// Oldest first; the last is still being filled.
     buckets: Vec<Sample>,
     samples: u32,
+    /// By how much a sample grows wider as it ages, for the choice of the narrowest.
+    fade: f64,
 }
 
 impl History {
     pub(super) fn new(bucket_ns: u64) -> Self {
-        Self { bucket_ns, buckets: Vec::with_capacity(BUCKETS), samples: 0 }
+        Self { bucket_ns, buckets: Vec::with_capacity(BUCKETS), samples: 0, fade: 0.0 }
     }
 
     pub(super) fn clear(&mut self) {
         self.buckets.clear();
         self.samples = 0;
+    }
+
+    /// From now on samples grow wider by so much as they age, of 1.
+    pub(super) fn fades(&mut self, fade: f64) {
+        self.fade = fade;
     }
 
     /// Samples since the last clearing.
@@ -82,7 +91,8 @@ impl History {
         let bucket = sample.local_ns / self.bucket_ns;
         match self.buckets.last_mut() {
             Some(last) if last.local_ns / self.bucket_ns >= bucket => {
-                if sample.width_ns() < last.width_ns() {
+                let faded_ns = (self.fade * span_ns(last.local_ns, sample.local_ns)) as i64;
+                if sample.width_ns() < last.width_ns().saturating_add(faded_ns) {
                     *last = sample;
                 }
             }

@@ -7,7 +7,7 @@ use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemTime, TimeRecord, TimeSource};
 const SLOWER_LEAD_NS: u64 = 1_000_000;
 /// What lines may be off by being whole numbers, until the source is heard again.
 const ROUNDING_NS: u64 = 4;
-const BILLION: i128 = 1_000_000_000;
+pub(super) const BILLION: i128 = 1_000_000_000;
 /// As the local clock.
 pub(super) const EVEN_PPB: u64 = 1_000_000_000;
 
@@ -128,11 +128,14 @@ impl Line {
         }
     }
 
-    /// Stops slewing, however far it came.
+    /// Stops slewing, however far it came: beyond where it was to go, if this node stood still meanwhile.
     pub(super) fn stop_slew(&mut self, now_ns: u64) {
-        if let Some(Slew { pace_ppb, drift_ns_s, .. }) = self.slew.take() {
+        if let Some(Slew { end_ns, pace_ppb, drift_ns_s }) = self.slew.take() {
             self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
             self.record.drift_ns_s = self.record.drift_ns_s.saturating_sub(drift_ns_s);
+            let late_ns = u128::from(now_ns.saturating_sub(end_ns));
+            let beyond_ns = (late_ns * u128::from(drift_ns_s)).div_ceil(BILLION as u128) as u64;
+            self.record.error_ns = self.record.error_ns.saturating_add(beyond_ns).min(ERROR_UNKNOWN_NS);
         }
     }
 
@@ -173,4 +176,25 @@ impl Line {
 pub(super) fn wander_ns_s(span_ns: u64) -> u64 {
     let ns_s = u128::from(span_ns) * WANDER_PPB_S as u128 / 2 / BILLION as u128;
     u64::try_from(ns_s).unwrap_or(u64::MAX).saturating_add(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_is_straightened_late_says_how_far_it_went_too_far() {
+        let (begin_ns, by_ns, within_ns) = (1_000_000_000, 500_000, 500_000_000);
+        for late_ns in [0, 1_000_000, 900_000_000] {
+            let mut line = Line::unsynchronised(begin_ns, begin_ns, 0);
+            line.step(begin_ns, 1, begin_ns, EVEN_PPB, 0, 0);
+            line.bend(begin_ns, by_ns, within_ns, EVEN_PPB, by_ns.unsigned_abs(), 0);
+            let now_ns = begin_ns + within_ns + late_ns;
+            line.end_slew(now_ns);
+            // The bound is for where it was and for where it was to go; the truth may be at either.
+            let off_ns = line.at(now_ns).ns.abs_diff(now_ns);
+            assert!(off_ns >= by_ns.unsigned_abs() + late_ns / 1_000, "it went too far: {off_ns}");
+            assert!(line.error_ns(now_ns) >= off_ns, "{off_ns} ns off after {late_ns} ns: {:?}", line.record());
+        }
+    }
 }

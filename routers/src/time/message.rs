@@ -21,6 +21,7 @@ pub const MESSAGE_BYTES: usize = 72;
 const TIME_MAX_NS: u64 = i64::MAX as u64;
 
 const FOLLOWED: u8 = 1;
+const REPLACEMENT: u8 = 2;
 const EAGER: u8 = 1;
 const FAR: u8 = 2;
 const TIMED: u8 = 4;
@@ -61,6 +62,8 @@ pub struct Sync {
     pub began: Term,
     /// Whether slaves answer this master.
     pub followed: bool,
+    /// A backup master sends it, in the place of the master of this term: the cycle lives. Nobody goes by its times.
+    pub replacement: bool,
 }
 
 /// A slave's question; with id 0 it only says that the sender hears no master.
@@ -127,7 +130,7 @@ impl Message {
             Self::WarmUp => {}
             Self::Sync(m) => {
                 fields.words = [m.id, m.cycle, m.nominal_ns, m.sent_ns, m.error_ns, m.epoch, m.term.0, m.began.0];
-                fields.flags = flag(m.followed, FOLLOWED);
+                fields.flags = flag(m.followed, FOLLOWED) | flag(m.replacement, REPLACEMENT);
             }
             Self::Request(m) => {
                 fields.words = [m.id, 0, 0, 0, m.error_ns, m.epoch, m.term.0, 0];
@@ -154,8 +157,9 @@ impl Message {
         let message = match kind {
             Kind::WarmUp => Self::WarmUp,
             Kind::Sync => {
-                let (cycle, nominal_ns, sent_ns, followed) = (a, b, c, has(FOLLOWED));
-                Self::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed })
+                let (cycle, nominal_ns, sent_ns) = (a, b, c);
+                let (followed, replacement) = (has(FOLLOWED), has(REPLACEMENT));
+                Self::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed, replacement })
             }
             Kind::Request => {
                 let (eager, far, timed) = (has(EAGER), has(FAR), has(TIMED));

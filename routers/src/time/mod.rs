@@ -29,6 +29,13 @@
 //! after a split is mended there is one master after at most two intervals, as long as some of its datagrams arrive. The nodes of the other part slew if they are off by
 //! at most [`STEP_MIN_NS`]; else they say so, and the master begins a new epoch, in which they step.
 //!
+//! # In time slots
+//! [`Clock::in_slots`] makes the interval the cycle, and takes from the clock when it sends: [`Clock::poll_in`] is asked window by window,
+//! and a Sync leaves in the master's own alone (see [`tdma`](crate::tdma)). Questions wait for a slot, so between t2 and t3 may lie a cycle or more; what
+//! clocks drift meanwhile is in the sample. Whoever starts, yields to another master, or turns to one whose time is another goes by
+//! nothing until it has measured: by [`Clock::coarse`] it may ask. [`Clock::reckoning`] is what slots are found by; its bound leaves
+//! out what the master may be off an earlier term, as all nodes are off alike.
+//!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
 #[cfg_attr(
@@ -37,18 +44,22 @@
 )]
 mod broken;
 mod clock;
+mod coarse;
 mod election;
 mod history;
 mod line;
 pub mod message;
+mod reckoning;
 #[cfg(test)]
 mod tests;
 mod types;
 
 #[cfg(any(test, feature = "broken-variants"))]
 pub use broken::Broken;
-pub use clock::Clock;
-pub use types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
+pub use clock::{Allowed, Clock};
+pub use coarse::JOINING_SYNCS;
+pub use reckoning::Reckoning;
+pub use types::{Exchange, Ignored, InSlots, Reading, Role, SentId, Step, SyncCounts, TimeSettings};
 
 /// The bound of a node that does not know the time.
 pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;

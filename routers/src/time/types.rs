@@ -118,3 +118,29 @@ pub struct Exchange {
     /// All four stamps that count are the kernel's.
     pub by_kernel: bool,
 }
+
+/// What a clock in time slots has to know of them; see [`TimeShare`](crate::tdma::TimeShare).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct InSlots {
+    /// A warm-up goes before each Sync.
+    pub warm_ups: bool,
+    /// Replies go in the synchronisation window alone.
+    pub replies_in_synchronisation: bool,
+    /// The quickest of a few Syncs is taken to be on its way for no longer, ns.
+    pub delay_max_ns: u64,
+}
+
+/// What was sent and heard of synchronisation in time slots.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct SyncCounts {
+    /// Cycles in which this node sent Syncs as the master.
+    pub sent: u64,
+    /// Cycles in which the master's Sync came.
+    pub heard: u64,
+    /// Cycles between two of the same master in which none came.
+    pub missed: u64,
+    /// Cycles in which this node sent Syncs in the master's place.
+    pub replacements_sent: u64,
+    /// Cycles in which another did.
+    pub replacements_heard: u64,
+}

@@ -1,10 +1,12 @@
 //! Two nodes in one process, each with its router, at addresses of the loopback.
 
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
 use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
-use std::net::{IpAddr, Ipv4Addr};
+use rohrpost_routers::time::TimeSettings;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
@@ -35,14 +37,56 @@ pub(crate) struct Side {
     pub(crate) shell: Option<Shell>,
 }
 
+/// Two nodes that take turns, 2 ms each.
+#[allow(dead_code, reason = "each test uses a part")]
+pub(crate) fn turns() -> Tdma {
+    let us = Duration::from_micros;
+    let slot = |node: u8| TimeSlot {
+        node,
+        offset: us(1000 + 2000 * u64::from(node)),
+        length: us(2000),
+        period: 1,
+        phase: 0,
+        line: 0,
+    };
+    Tdma {
+        cycle: us(5000),
+        synchronisation: us(1000),
+        guard: us(400),
+        link_bytes_s: 125_000_000,
+        slots: vec![slot(0), slot(1)],
+        tunnel: None,
+        line: 0,
+    }
+}
+
 impl Side {
     /// Ends its router, if it has one, and starts it anew.
     pub(crate) fn start(&mut self) {
         self.shell = None;
         self.settings.incarnation += 1;
         let name = Name::new(1, 250, self.settings.own, 0);
-        let (settings, faults) = (self.settings.clone(), Arc::new(Words));
-        self.shell = Some(Shell::start(Parts { node: &self.node, name, settings, faults, impair: None }).unwrap());
+        let (settings, faults, clock) = (self.settings.clone(), Arc::new(Words), self.clock());
+        let parts = Parts { node: &self.node, name, settings, faults, impair: None, clock };
+        self.shell = Some(Shell::start(parts).unwrap());
+    }
+
+    /// Of the first node's time, where slots need one.
+    fn clock(&self) -> Option<ClockParts> {
+        let Settings { system, own, digest, incarnation, ref nodes, ref network, .. } = self.settings;
+        let interval = self.settings.tdma.as_ref()?.cycle;
+        let (masters, count) = (vec![0], nodes.len() as u8);
+        let settings = TimeSettings { system, own, nodes: count, masters, interval, digest, incarnation };
+        let nodes = nodes.iter().map(|node| SocketAddr::new(node.address, network.time_port())).collect();
+        Some(ClockParts {
+            settings,
+            nodes,
+            node: Some(self.node.clone()),
+            impair: None,
+            kernel_stamps: true,
+            skew: None,
+            observer: None,
+        })
     }
 
     pub(crate) fn join(&self) -> Arc<Participant> {
@@ -66,6 +110,11 @@ pub(crate) struct Pair {
 
 impl Pair {
     pub(crate) fn new() -> Self {
+        Self::with(None)
+    }
+
+    /// That sends in time slots, if there is a table.
+    pub(crate) fn with(tdma: Option<Tdma>) -> Self {
         static COUNT: AtomicU8 = AtomicU8::new(0);
         let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         // Addresses that no other test has, by process and count.
@@ -93,6 +142,7 @@ impl Pair {
                     digest: 7,
                     incarnation: 1,
                     network,
+                    tdma: tdma.clone(),
                     routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
                     senders: vec![vec![module(own)]],
                 },

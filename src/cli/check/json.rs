@@ -2,8 +2,8 @@
 
 use rohrpost::Name;
 use rohrpost::config::{
-    Errors, Installation, MailboxSpec, MissingProgram, Module, Network, Program, RestartPolicy, Scheduling, Start,
-    TimeSource,
+    Bound, Errors, FlowBound, Installation, MailboxSpec, MissingProgram, Module, Network, Program, RestartPolicy,
+    Scheduling, Start, Tdma, TimeSource, bounds,
 };
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -35,10 +35,12 @@ pub(super) fn installation(installation: &Installation, only: Option<&str>, miss
     let levels = output.levels.iter().map(|(module, level)| (text(*module), level.as_str().into()));
     let show = installation.gui.show.iter();
     let show = show.map(|show| json!({ "from": text(show.from), "data": show.data, "rate_hz": show.rate }));
-    let flows = installation.flows.iter().map(|flow| {
+    let bounds = bounds(installation);
+    let flows = installation.flows.iter().enumerate().map(|(index, flow)| {
+        let bound = bounds.iter().find(|bound| bound.flow == index);
         json!({
             "from": text(flow.from), "to": text(flow.to), "size": flow.size, "period_ms": ms(flow.period),
-            "deadline_ms": ms(flow.deadline),
+            "deadline_ms": ms(flow.deadline), "at_worst": bound.map(at_worst),
         })
     });
     let notes = missing.iter().map(
@@ -52,6 +54,7 @@ pub(super) fn installation(installation: &Installation, only: Option<&str>, miss
             "system": { "id": system.id, "name": system.name },
             "time": time(installation),
             "network": installation.network.map(network),
+            "tdma": installation.tdma.as_ref().map(|tdma| self::tdma(installation, tdma)),
             "digest": installation.digest().to_string(),
             "parameters": installation.parameters,
             "classes": class_entries.collect::<Vec<_>>(),
@@ -124,6 +127,34 @@ fn network(network: Network) -> Value {
         "datagram_bytes_max": network.datagram_bytes_max, "rate_bytes_s": network.rate_bytes_s,
         "quota_bytes": network.quota_bytes, "bulk_below": network.bulk_below,
     })
+}
+
+fn tdma(installation: &Installation, tdma: &Tdma) -> Value {
+    let slots = tdma.slots.iter().map(|slot| {
+        json!({
+            "node": installation.nodes.get(usize::from(slot.node)).map(|node| &node.name), "offset_ms": ms(slot.offset),
+            "length_ms": ms(slot.length), "period": slot.period, "phase": slot.phase,
+            "bytes": tdma.budget_bytes(slot.length),
+        })
+    });
+    json!({
+        "cycle_ms": ms(tdma.cycle), "synchronisation_ms": ms(tdma.synchronisation), "guard_ms": ms(tdma.guard),
+        "link_bytes_s": tdma.link_bytes_s, "cycles": tdma.cycles(),
+        "tunnel": tdma.tunnel.map(|tunnel| format!("{}/{}", tunnel.network, tunnel.prefix)),
+        "slots": slots.collect::<Vec<_>>(),
+    })
+}
+
+/// The worst case of a flow between nodes: its latency and what that consists of, or why there is none.
+fn at_worst(bound: &FlowBound) -> Value {
+    match &bound.latency {
+        Err(why) => json!({ "level": bound.level, "latency_ms": null, "why": why.to_string() }),
+        Ok(Bound { latency, slot, waits, slots, others, own_earlier, said, own, datagrams, forward }) => json!({
+            "level": bound.level, "latency_ms": ms(*latency), "slot": slot, "waits_ms": ms(*waits), "slots": slots,
+            "others_ms": ms(*others), "own_earlier": own_earlier, "said_ms": ms(*said), "own_ms": ms(*own),
+            "datagrams": datagrams, "forward_ms": ms(*forward),
+        }),
+    }
 }
 
 fn time(installation: &Installation) -> Value {

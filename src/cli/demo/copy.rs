@@ -10,12 +10,14 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
 const SIMULATION: &str = include_str!("../../../config/demo.toml");
 const LOG: &str = include_str!("../../../config/demo-log.toml");
 const NODES: &str = include_str!("../../../config/demo-nodes.toml");
+const TDMA: &str = include_str!("../../../config/demo-tdma.toml");
 const BUILDING: &str = include_str!("../../../config/building.map");
 
 /// What runs. A copy is written into `temporary`.
 pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<Installation, Failure> {
     let (name, text) = match (&arguments.log, arguments.nodes) {
         (Some(_), _) => ("demo-log.toml", LOG),
+        (None, Some(2..)) if arguments.tdma => ("demo-tdma.toml", TDMA),
         (None, Some(2..)) => ("demo-nodes.toml", NODES),
         (None, _) => ("demo.toml", SIMULATION),
     };

@@ -1,19 +1,20 @@
 //! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
 
 use super::account::{self, Balance};
-use super::{Arguments, FIRST_FUNCTION, copy, drawn};
+use super::{Arguments, FIRST_FUNCTION, copy, drawn, slots};
 use crate::cli::launch::{Nodes, lab};
 use crate::cli::speech::Speech;
 use crate::cli::summary::print_classes;
 use crate::cli::{Failure, say};
 use rohrpost::common::{GET_DATA, State};
 use rohrpost::config::{Installation, Network};
-use rohrpost::interface::Interface;
-use rohrpost::interfaces::{CartographerInterface, Links, MapCounts, RouterInterface};
+use rohrpost::interface::{DataPort, Interface};
+use rohrpost::interfaces::{CartographerInterface, Links, MapCounts, RouterInterface, SlotState};
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
 use rohrpost::survey::Survey;
 use rohrpost::{CallError, ToolLink};
+use serde::de::DeserializeOwned;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
@@ -76,6 +77,7 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     let survey = |(node, config): (&Arc<Node>, &rohrpost::config::Node)| Survey::new(node, installation, &config.name);
     let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
     let links = settled(installation, &mut tool)?;
+    let kept = in_slots(installation, &mut tool)?;
     tool.close();
     let balance = Balance::of(&links, installation.classes.tool().0);
     let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
@@ -85,6 +87,12 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     text += &account::by_class(installation, &links);
     text += "\nOn the wire:\n\n";
     text += &account::by_link(&links);
+    if !kept.is_empty() {
+        text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
+        text += &slots::kept(&kept);
+        text += "\nFlows; seen: how old data were when they came to the mailbox:\n\n";
+        text += &slots::flows(installation, &links);
+    }
     text += &format!("\n{balance}\n{clocks}");
     text += &map;
     for error in &errors {
@@ -168,8 +176,7 @@ fn settled(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Links
     }
     let deadline = Instant::now() + SETTLE;
     loop {
-        let links = installation.nodes.iter().map(|node| links(installation, tool, &node.name));
-        let links = links.collect::<Result<Vec<_>, _>>()?;
+        let links: Vec<Links> = of_routers(installation, tool, RouterInterface::LINKS)?;
         if Balance::of(&links, installation.classes.tool().0).holds() || Instant::now() >= deadline {
             return Ok(links);
         }
@@ -177,11 +184,28 @@ fn settled(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Links
     }
 }
 
-fn links(installation: &Installation, tool: &mut ToolLink, node: &str) -> Result<Links, Failure> {
-    let router = installation.router_of(node).ok_or("no router")?;
-    let write = |body: &mut Vec<u8>| append(body, &(RouterInterface::LINKS.number,));
-    let read = |bytes: &[u8]| from_bytes::<(u64, Links)>(bytes);
-    let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
-    let told = |error: CallError| format!("router of {node}: {error}");
-    Ok(answer.map(|(_, links)| links).map_err(told)?)
+/// How each node kept its time slots; empty where there are none.
+fn in_slots(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<SlotState>, Failure> {
+    if installation.tdma.is_none() {
+        return Ok(Vec::new());
+    }
+    of_routers(installation, tool, RouterInterface::SLOTS)
+}
+
+/// What the routers of all nodes publish.
+fn of_routers<T: DeserializeOwned>(
+    installation: &Installation,
+    tool: &mut ToolLink,
+    data: DataPort<T>,
+) -> Result<Vec<T>, Failure> {
+    let mut all = Vec::new();
+    for node in &installation.nodes {
+        let router = installation.router_of(&node.name).ok_or("no router")?;
+        let write = |body: &mut Vec<u8>| append(body, &(data.number,));
+        let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
+        let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
+        let told = |error: CallError| format!("router of {}: {error}", node.name);
+        all.push(answer.map(|(_, told)| told).map_err(told)?);
+    }
+    Ok(all)
 }

@@ -4,7 +4,7 @@ mod show;
 
 use super::round::{Round, Rounds};
 use super::{Failure, say};
-use rohrpost::interfaces::{ClockState, Links, RouterInterface};
+use rohrpost::interfaces::{ClockState, Links, RouterInterface, SlotState};
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -18,7 +18,8 @@ const LOOK_AGAIN: Duration = Duration::from_millis(600);
   rohrpost net --watch        again and again; Ctrl-C ends it
   rohrpost net --node arm --json
 `lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. `refused` are \
-those that came from the peer's address and were not taken. Packages lost in routers stand below, by class and cause. The \
+those that came from the peer's address and were not taken. With time slots, `late` are those that were left out because the router woke \
+up too late, `skipped` those that went by while it stood still, `silent` those in which it was not sure enough of the time. Packages lost in routers stand below, by class and cause. The \
 exit code is 1 if a router does not answer or a peer is not alive.")]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -33,6 +34,7 @@ struct Told {
     time_ns: u64,
     links: Option<Links>,
     clock: Option<ClockState>,
+    slots: Option<SlotState>,
     /// Bytes and packages a second, by peer; empty at the first look.
     rates: Vec<Rates>,
     /// Why there is nothing.
@@ -81,13 +83,16 @@ fn look(round: &mut Round) -> Vec<Told> {
 
 fn ask(round: &mut Round, node: String) -> Told {
     let links = round.newest(&node, RouterInterface::LINKS);
-    // A router that has no clock publishes none.
+    // A router that has no clock publishes none, and none slots that has none.
     let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
+    let in_slots = links.is_ok() && round.running.installation.tdma.is_some();
+    let slots = in_slots.then(|| round.newest(&node, RouterInterface::SLOTS).ok()).flatten();
     let (time_ns, links, failure) = match links {
         Ok((time_ns, links)) => (time_ns, Some(links), None),
         Err(failure) => (0, None, Some(failure)),
     };
-    Told { node, time_ns, links, clock: clock.map(|(_, clock)| clock), rates: Vec::new(), failure }
+    let (clock, slots) = (clock.map(|(_, clock)| clock), slots.map(|(_, slots)| slots));
+    Told { node, time_ns, links, clock, slots, rates: Vec::new(), failure }
 }
 
 /// What went by between two looks; nothing if the router was started anew in between, or has not told anything new.

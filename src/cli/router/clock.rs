@@ -3,12 +3,12 @@
 use rohrpost::interfaces::{ClockRole, ClockState};
 use rohrpost::mailbox::monotonic_ns;
 use rohrpost_routers::shell::Shell;
-use rohrpost_routers::shell::clock::ClockService;
+use rohrpost_routers::shell::clock::ClockState as Shown;
 use rohrpost_routers::time::Role;
 
 /// How it stands now.
-pub(super) fn of(shell: &Shell, clock: &ClockService) -> ClockState {
-    let (settings, seen, now_ns) = (shell.settings(), clock.state().snapshot(), monotonic_ns());
+pub(super) fn of(shell: &Shell, clock: &Shown) -> ClockState {
+    let (settings, seen, now_ns) = (shell.settings(), clock.snapshot(), monotonic_ns());
     let name = |node: u8| settings.nodes.get(usize::from(node)).map(|node| node.name.clone()).unwrap_or_default();
     let time = seen.record.at(now_ns);
     ClockState {

@@ -3,6 +3,7 @@
 mod clock;
 mod faults;
 mod links;
+mod slots;
 
 use super::Failure;
 use rohrpost::config::Network;
@@ -12,7 +13,7 @@ use rohrpost::{Context, Module, ModuleError, Start};
 use rohrpost_modules::runtime::{exit, run_started};
 use rohrpost_routers::impair;
 use rohrpost_routers::settings::Settings;
-use rohrpost_routers::shell::clock::{ClockParts, ClockService};
+use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Parts, Shell};
 use serde::Deserialize;
 use std::process::ExitCode;
@@ -42,7 +43,6 @@ struct NoSettings {}
 
 struct RouterModule {
     shell: Shell,
-    clock: Option<ClockService>,
 }
 
 impl Router for RouterModule {}
@@ -63,19 +63,20 @@ impl Module for RouterModule {
         let faults = Arc::new(faults::Encoded::new(settings.digest));
         let node = context.link().borrow().participant().node().clone();
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
-        let clock = clock.map(ClockService::start).transpose()?;
-        let shell = Shell::start(Parts { node: &node, name: context.me(), settings, faults, impair })?;
+        let shell = Shell::start(Parts { node: &node, name: context.me(), settings, faults, impair, clock })?;
         context.set_period(PERIOD);
-        Ok(Self { shell, clock })
+        Ok(Self { shell })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         // Without one of its threads it is of no use; started again, it is.
         assert!(self.shell.is_well(), "a thread of the router has ended");
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
-        if let Some(clock) = &self.clock {
-            assert!(clock.is_well(), "the thread of the clock has ended");
+        if let Some(clock) = self.shell.clock() {
             context.publish_now(RouterInterface::CLOCK, &clock::of(&self.shell, clock))?;
+        }
+        if let Some(slots) = self.shell.slots() {
+            context.publish_now(RouterInterface::SLOTS, &slots::of(&self.shell, slots))?;
         }
         Ok(())
     }

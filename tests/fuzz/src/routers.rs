@@ -57,6 +57,7 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
             quota_bytes: 128 << 10,
             bulk_below: 16,
         },
+        tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(u8::MAX), node: other }],
         senders: Vec::new(),
     }

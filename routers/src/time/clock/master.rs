@@ -35,6 +35,10 @@ impl Clock {
         if request.far && request.term.round() <= own.round() {
             self.begin_epoch(received.ns, request.epoch);
         }
+        if self.slots.is_some() {
+            // One answer to each is enough, however many questions came before there is a window.
+            self.drafts.retain(|(to, draft)| *to != from || !matches!(draft, Draft::Reply { .. }));
+        }
         if self.drafts.len() < self.drafts.capacity() {
             self.drafts.push_back((from, Draft::Reply { id: request.id, came: received }));
         }
@@ -56,6 +60,10 @@ impl Clock {
         (self.term, self.began, self.timeline) = (term, term, term);
         (self.offset_ns, self.far, self.epoch_began_ns) = (0, false, 0);
         self.slaves.iter_mut().for_each(|slave| *slave = Slave { next_ns: now_ns, ..Slave::default() });
+        let error_ns = self.line.record().error_ns;
+        if let Some(slots) = &mut self.slots {
+            slots.goes_by(error_ns);
+        }
     }
 
     /// A master's own term may have been raised: its timeline goes on.
@@ -125,7 +133,8 @@ impl Clock {
         let (epoch, error_ns) = (self.line.record().epoch, self.line.error_ns(now_ns));
         let cycle = nominal_ns / self.interval_ns;
         let (sent_ns, began, followed) = (self.line.at(now_ns).ns, self.began, self.is_followed(now_ns));
-        Some(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed })
+        let replacement = false;
+        Some(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed, replacement })
     }
 
     pub(super) fn write_reply(&mut self, now_ns: u64, to: NodeIndex, id: u64, came: Stamp) -> Option<Reply> {

@@ -21,12 +21,17 @@ const HORIZON_NS_MIN: u64 = 2_000_000_000;
 
 impl Clock {
     pub(super) fn sync(&mut self, now_ns: u64, received: Stamp, head: &FrameHead, sync: &Sync) -> Result<(), Ignored> {
+        if sync.replacement {
+            return self.replaced(received, head, sync);
+        }
+        let is_contested = self.is_contested(received.ns);
         let was_master = matches!(self.election.state(), State::Master(_));
         let followed = self.is_followed(now_ns);
         if was_master && self.is(Broken::Stubborn) {
             return Err(Ignored::Late);
         }
-        match self.election.sync(head.from, head.incarnation, sync, received.ns, followed) {
+        let heard = self.election.sync(head.from, head.incarnation, sync, received.ns, followed);
+        match heard {
             Heard::Ignored => {
                 self.keep_term();
                 self.answer_master(now_ns, head.from);
@@ -43,8 +48,8 @@ impl Clock {
             Heard::Followed if self.timeline == sync.began => self.term = sync.term,
             Heard::Followed => {}
         }
-        let pause_ns = self.exchange_ns.min(EXCHANGE_NS_MIN) / 2;
-        let pauses = received.ns.saturating_sub(self.asked_ns) < pause_ns;
+        self.heard_in_slots(received, sync, heard == Heard::Turned && is_contested, heard == Heard::Turned);
+        let pauses = received.ns.saturating_sub(self.asked_ns) < self.pause_ns();
         if pauses || now_ns.saturating_sub(received.ns) > ANSWER_NS_MAX {
             return Ok(());
         }
@@ -101,6 +106,9 @@ impl Clock {
             return;
         };
         self.usual_rate = estimate.rate;
+        if self.slots.is_some() {
+            self.history.fades(estimate.rate_high - estimate.rate_low);
+        }
         let pace_ppb = EVEN_PPB.saturating_add_signed((estimate.rate * 1e9).round() as i64);
         let drift_ns_s = self.drift_ns_s(&estimate, pace_ppb);
         let target_ns = now_ns.saturating_add_signed(estimate.offset_ns);
@@ -111,6 +119,7 @@ impl Clock {
             self.line.step(now_ns, master.epoch, target_ns, pace_ppb, error_ns, drift_ns_s);
         } else if master.epoch < epoch || !self.line.is_synchronised() || by_ns.unsigned_abs() > STEP_MIN_NS {
             self.far = true;
+            self.slots.iter_mut().for_each(|slots| slots.unsure = true);
             return;
         } else {
             let page_ns = self.line.at(now_ns).ns.wrapping_sub(now_ns).cast_signed();
@@ -121,6 +130,22 @@ impl Clock {
         }
         (self.term, self.timeline, self.far, self.offset_ns) = (master.term, master.began, false, by_ns);
         self.stated = (now_ns.saturating_add(self.horizon_ns()), self.horizon_ns());
+        self.slots.iter_mut().for_each(|slots| slots.goes_by(master.error_ns));
+    }
+
+    /// The shortest pause between two questions.
+    fn pause_ns(&self) -> u64 {
+        let is_eager = self.history.samples() < SAMPLES_EAGER;
+        match &self.slots {
+            None => self.exchange_ns.min(EXCHANGE_NS_MIN) / 2,
+            // The newest Sync is the one to ask after, as long as no slot came to ask in.
+            Some(_) if is_eager || self.has_question() => 0,
+            Some(_) => EXCHANGE_NS_MIN.saturating_sub(self.interval_ns / 2),
+        }
+    }
+
+    fn has_question(&self) -> bool {
+        self.drafts.iter().any(|(_, draft)| matches!(draft, Draft::Request { id: 1.. }))
     }
 
     /// How far a line may be off that is `offset_ns` from the local clock now.

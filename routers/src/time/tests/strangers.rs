@@ -2,7 +2,7 @@
 
 use crate::frame::{FrameHead, Kind};
 use crate::time::message::{MESSAGE_BYTES, Message, Reply, Request, Sync};
-use crate::time::{Clock, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
+use crate::time::{Allowed, Clock, InSlots, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use proptest::prelude::*;
 use std::time::Duration;
 
@@ -36,8 +36,9 @@ fn message() -> impl Strategy<Value = Message> {
         let (term, began) = (Term(term), Term(began));
         match kind {
             0 => {
-                let (cycle, nominal_ns, sent_ns, followed) = (a, b, c, x);
-                Message::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed })
+                let (cycle, nominal_ns, sent_ns, followed, replacement) = (a, b, c, x, y);
+                let times = Sync { cycle, nominal_ns, sent_ns, error_ns, ..Sync::default() };
+                Message::Sync(Sync { id, epoch, term, began, followed, replacement, ..times })
             }
             1 => Message::WarmUp,
             2 => Message::Request(Request { id, error_ns, epoch, term, eager: x, far: y, timed: z }),
@@ -76,10 +77,14 @@ proptest! {
 
     #[test]
     fn a_clock_survives_whatever_it_is_told_and_never_goes_back(
-        told in prop::collection::vec((message(), prop_oneof![Just(0_u8), Just(2)], 0..200_000_000_u64, 0..300_000_000_u64), 1..60)
+        told in prop::collection::vec((message(), prop_oneof![Just(0_u8), Just(2)], 0..200_000_000_u64, 0..300_000_000_u64), 1..60),
+        in_slots in any::<bool>(),
     ) {
         let mut now_ns = 1_000_000_000;
         let mut clock = Clock::new(settings(), now_ns, 1_790_000_000_000_000_000, None);
+        if in_slots {
+            clock = clock.in_slots(InSlots { warm_ups: true, replies_in_synchronisation: false, delay_max_ns: 30_000 });
+        }
         let mut last = clock.reading(now_ns).time;
         for (message, from, waits_ns, came_before_ns) in told {
             now_ns += waits_ns;
@@ -88,7 +93,13 @@ proptest! {
             let mut datagram = [0; TIME_BYTES];
             for sent in 0.. {
                 prop_assert!(sent < 100, "it sends without end");
-                match clock.poll(now_ns, &mut datagram) {
+                let step = match sent % 3 {
+                    _ if !in_slots => clock.poll(now_ns, &mut datagram),
+                    0 => clock.poll_in(now_ns, Allowed::Slot { free_ns: 0 }, &mut datagram),
+                    1 => clock.poll_in(now_ns, Allowed::Synchronisation { cycle: now_ns, nominal_ns: now_ns, free_ns: 0 }, &mut datagram),
+                    _ => clock.poll_in(now_ns, Allowed::Nothing, &mut datagram),
+                };
+                match step {
                     Step::Send { stamp: Some(SentId { to, sequence }), .. } => {
                         clock.sent(SentId { to, sequence }, Stamp { ns: now_ns + 10, doubt_ns: 50, by_kernel: true });
                     }
@@ -112,7 +123,7 @@ fn a_reply_to_another_question_changes_nothing() {
     let sync = |id, ns| {
         let (cycle, nominal_ns, sent_ns) = (0, ns, ns);
         let (error_ns, epoch, term, began) = (0, 1, Term::new(1, 0), Term::new(1, 0));
-        Message::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed: true })
+        Message::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, ..Sync::default() })
     };
     let reply = |id| {
         let (sync_ns, request_ns, sent_ns) = (5_000_000, 5_200_000, 5_300_000);

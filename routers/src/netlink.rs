@@ -1,4 +1,4 @@
-//! The few words of rtnetlink that a lab needs: make a bridge and pairs of veth, set them up or down, give addresses.
+//! The few words of rtnetlink that are needed here: make a bridge and pairs of veth, set devices up or down, give addresses.
 //!
 //! ```text
 //!  nlmsghdr: length u32, type u16, flags u16, sequence u32, port u32
@@ -55,10 +55,10 @@ const RT_SCOPE_LINK: u8 = 253;
 const RTN_UNICAST: u8 = 1;
 
 /// A device of a namespace, by its number there.
-pub(super) type Device = u32;
+pub(crate) type Device = u32;
 
 /// A socket to the kernel of one namespace.
-pub(super) struct Netlink {
+pub(crate) struct Netlink {
     socket: OwnedFd,
     sequence: u32,
 }
@@ -131,14 +131,14 @@ fn octets(address: IpAddr) -> Vec<u8> {
 
 impl Netlink {
     /// For the namespace that this thread is in.
-    pub(super) fn new() -> io::Result<Self> {
+    pub(crate) fn new() -> io::Result<Self> {
         let socket = socket(AddressFamily::Netlink, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::NetlinkRoute)?;
         setsockopt(&socket, sockopt::ReceiveTimeout, &PATIENCE)?;
         Ok(Self { socket, sequence: 0 })
     }
 
     /// Makes a bridge.
-    pub(super) fn add_bridge(&mut self, device: Device, name: &str, mtu: u32) -> io::Result<()> {
+    pub(crate) fn add_bridge(&mut self, device: Device, name: &str, mtu: u32) -> io::Result<()> {
         let message = Message::new(RTM_NEWLINK, NLM_F_CREATE | NLM_F_EXCL, &link(device, 0, 0))
             .text(IFLA_IFNAME, name)
             .number(IFLA_MTU, mtu)
@@ -147,7 +147,7 @@ impl Netlink {
     }
 
     /// Makes a pair of veth: one end here, on a bridge, the other in another namespace.
-    pub(super) fn add_veth(
+    pub(crate) fn add_veth(
         &mut self,
         own: End<'_>,
         bridge: Device,
@@ -172,20 +172,20 @@ impl Netlink {
     }
 
     /// Sets a device up or down.
-    pub(super) fn set_up(&mut self, device: Device, up: bool) -> io::Result<()> {
+    pub(crate) fn set_up(&mut self, device: Device, up: bool) -> io::Result<()> {
         let flags = if up { IFF_UP } else { 0 };
         self.ask(Message::new(RTM_NEWLINK, 0, &link(device, flags, IFF_UP))).map(drop)
     }
 
     /// Changes the largest packet.
-    pub(super) fn set_mtu(&mut self, device: Device, mtu: u32) -> io::Result<()> {
+    pub(crate) fn set_mtu(&mut self, device: Device, mtu: u32) -> io::Result<()> {
         self.ask(Message::new(RTM_NEWLINK, 0, &link(device, 0, 0)).number(IFLA_MTU, mtu)).map(drop)
     }
 
-    /// Gives a device an address of its own, without neighbours.
-    pub(super) fn add_address(&mut self, device: Device, address: IpAddr) -> io::Result<()> {
+    /// Gives a device an address. The neighbours, those that share so many bits with it, are reached by the device; none: it has no neighbours.
+    pub(crate) fn add_address(&mut self, device: Device, address: IpAddr, prefix: Option<u8>) -> io::Result<()> {
         let octets = octets(address);
-        let prefix_bits = 8 * octets.len() as u8;
+        let prefix_bits = prefix.unwrap_or(8 * octets.len() as u8);
         let mut fixed = [0; 8];
         fixed[0..4].copy_from_slice(&[family(address), prefix_bits, IFA_F_NODAD, RT_SCOPE_UNIVERSE]);
         fixed[4..8].copy_from_slice(&device.to_ne_bytes());
@@ -196,14 +196,14 @@ impl Netlink {
     }
 
     /// All addresses of a kind are reached by a device, directly.
-    pub(super) fn add_route_to_all(&mut self, device: Device, like: IpAddr) -> io::Result<()> {
+    pub(crate) fn add_route_to_all(&mut self, device: Device, like: IpAddr) -> io::Result<()> {
         let scope = if like.is_ipv4() { RT_SCOPE_LINK } else { RT_SCOPE_UNIVERSE };
         let fixed = [family(like), 0, 0, 0, RT_TABLE_MAIN, RTPROT_STATIC, scope, RTN_UNICAST, 0, 0, 0, 0];
         self.ask(Message::new(RTM_NEWROUTE, NLM_F_CREATE | NLM_F_EXCL, &fixed).number(RTA_OIF, device)).map(drop)
     }
 
     /// Whether a device carries packets: it is up, and so is its other end.
-    pub(super) fn runs(&mut self, device: Device) -> io::Result<bool> {
+    pub(crate) fn runs(&mut self, device: Device) -> io::Result<bool> {
         let answer = self.ask(Message::new(RTM_GETLINK, 0, &link(device, 0, 0)))?;
         let flags = answer.get(HEAD_BYTES + 8..HEAD_BYTES + 12).and_then(|flags| flags.try_into().ok());
         Ok(u32::from_ne_bytes(flags.unwrap_or_default()) & IFF_RUNNING != 0)
@@ -250,7 +250,7 @@ fn split(bytes: &[u8]) -> Option<(u16, u32, &[u8], &[u8])> {
 
 /// One end of a pair of veth.
 #[derive(Clone, Copy)]
-pub(super) struct End<'a> {
-    pub(super) device: Device,
-    pub(super) name: &'a str,
+pub(crate) struct End<'a> {
+    pub(crate) device: Device,
+    pub(crate) name: &'a str,
 }

@@ -7,6 +7,8 @@ use crate::stats::Cause;
 use proptest::prelude::*;
 use rohrpost_mailbox::Type;
 
+mod slot;
+
 pub(crate) const CHECKS: &[fn()] = &[
     check_what_does_not_go,
     check_pace,
@@ -14,6 +16,9 @@ pub(crate) const CHECKS: &[fn()] = &[
     check_commands_do_not_hurry,
     check_order_on_the_wire,
     check_waiting_too_long,
+    slot::check_strict_order,
+    slot::check_room,
+    slot::check_company,
 ];
 
 /// The packages of a datagram, by their ids; a part stands for its package.

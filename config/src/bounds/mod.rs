@@ -1,0 +1,222 @@
+//! Bounds: how late a package of a flow can be, known before anything runs. The book's chapter "Time slots and bounds" derives it.
+//!
+//! What is bounded is the time from publishing, into the mailbox of the node's router, to the arrival of the last bit at the other computer.
+//! It holds as long as flows send no more than they say, nothing else is sent at their priority or above (tools, calls and
+//! replies included), no slot is left out, nothing is lost, and every slot begins at most [`LATE`] late. What a process takes to wake up and to read is not in it.
+
+mod mistakes;
+mod remedy;
+mod response;
+#[cfg(test)]
+mod simulation;
+#[cfg(test)]
+mod tests;
+
+use crate::flow::Flow;
+use crate::installation::Installation;
+use crate::network::LEVEL_NOT_REAL_TIME;
+use crate::tdma::{LATE, Tdma, TimeSlot, cycles};
+use crate::wire::Link;
+use response::{Ahead, Never, Stream, Supply, Window};
+use rohrpost_mailbox::Priority;
+use std::time::Duration;
+
+pub(crate) use remedy::remedy;
+
+/// What is published less than this before a slot begins may have to wait for the next one.
+pub const TAKEN_BEFORE: Duration = Duration::from_micros(100);
+/// Whatever waits longer in a router is dropped.
+const LONGEST: Duration = Duration::from_millis(1500);
+
+/// How late a flow's packages can be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FlowBound {
+    /// The flow, by its place in [`Installation::flows`].
+    pub flow: usize,
+    /// The level on which it waits in its node's router, see [`Network::level`](crate::Network::level).
+    pub level: u8,
+    /// From publishing to the arrival of the last bit at the other node, at most.
+    pub latency: Result<Bound, Unbounded>,
+}
+
+/// The worst case of a flow, and what it consists of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bound {
+    /// All of it.
+    pub latency: Duration,
+    /// The slot in which the package leaves then, by its place in [`Tdma::slots`].
+    pub slot: usize,
+    /// From publishing to the beginning of that slot.
+    pub waits: Duration,
+    /// Slots of its node that begin meanwhile, that one included.
+    pub slots: u64,
+    /// What other flows send before it meanwhile.
+    pub others: Duration,
+    /// Packages of its own flow that leave before it meanwhile.
+    pub own_earlier: u64,
+    /// What routers say to each other at the beginning of a slot.
+    pub said: Duration,
+    /// Its own datagrams.
+    pub own: Duration,
+    /// How many these are.
+    pub datagrams: u64,
+    /// The last datagram once more, from a switch to the other node.
+    pub forward: Duration,
+}
+
+/// Why a flow has no bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unbounded {
+    /// Its priority is below `bulk-below`, so that it waits behind everything, ordinary traffic included.
+    #[error("it is not real time")]
+    NotRealTime,
+    /// No slot of its node has room for a datagram of it, or of what goes before it.
+    #[error("a datagram has no room in any slot of its node")]
+    TooShort,
+    /// More comes than leaves.
+    #[error(
+        "with all that goes before it, it asks for {asked_permille} thousandths of the time, and the slots carry {carried_permille}"
+    )]
+    TooMuch {
+        /// Thousandths of the time of the link that it and all before it ask for.
+        asked_permille: u64,
+        /// Those that slots are sure to carry.
+        carried_permille: u64,
+    },
+    /// Packages would be dropped before they leave.
+    #[error("it may wait longer than the 1.5 s after which routers drop packages")]
+    TooLong,
+}
+
+/// The bounds of all flows between different nodes, in their order in the file; none if nodes send as packages come.
+pub fn bounds(installation: &Installation) -> Vec<FlowBound> {
+    let Some(tdma) = &installation.tdma else { return Vec::new() };
+    (0..installation.flows.len()).filter_map(|flow| bound(installation, tdma, flow)).collect()
+}
+
+/// The bound of a flow with this table.
+fn bound(installation: &Installation, tdma: &Tdma, flow: usize) -> Option<FlowBound> {
+    let network = installation.network.as_ref()?;
+    let own = Sent::new(installation, &installation.flows[flow])?;
+    let link = Link::new(tdma, network, &installation.nodes);
+    let level = network.level(own.least);
+    let latency = if level == LEVEL_NOT_REAL_TIME {
+        Err(Unbounded::NotRealTime)
+    } else {
+        let all = installation.flows.iter().enumerate().filter(|(index, _)| *index != flow);
+        let others = all.filter_map(|(_, flow)| Sent::new(installation, flow)).filter_map(|other| {
+            let ahead = other.ahead_of(&own, |priority| network.level(priority))?;
+            Some((other.stream(&link), ahead))
+        });
+        let others: Vec<_> = others.collect();
+        worst(installation, tdma, &link, &own, &others)
+    };
+    Some(FlowBound { flow, level, latency })
+}
+
+fn worst(
+    installation: &Installation,
+    tdma: &Tdma,
+    link: &Link,
+    own: &Sent<'_>,
+    others: &[(Stream, Ahead)],
+) -> Result<Bound, Unbounded> {
+    let supply = supply(installation, tdma, link, own.node);
+    if supply.windows.is_empty() {
+        return Err(Unbounded::TooShort);
+    }
+    let longest_ns = ns(LONGEST);
+    let worst = response::worst(&supply, &own.stream(link), others, longest_ns).map_err(|never| match never {
+        Never::NoRoom => Unbounded::TooShort,
+        Never::Overload { asked_ns_s, carried_ns_s } => Unbounded::TooMuch {
+            asked_permille: asked_ns_s.div_ceil(1_000_000),
+            carried_permille: carried_ns_s / 1_000_000,
+        },
+        Never::Late => Unbounded::TooLong,
+    })?;
+    let parcel = link.package(own.flow.size as usize);
+    Ok(Bound {
+        latency: Duration::from_nanos(worst.latency_ns + parcel.forward_ns),
+        slot: supply.windows[worst.window].slot,
+        waits: Duration::from_nanos(worst.waits_ns),
+        slots: worst.slots,
+        others: Duration::from_nanos(worst.others_ns),
+        own_earlier: worst.own_earlier,
+        said: Duration::from_nanos(supply.said_ns),
+        own: Duration::from_nanos(parcel.takes_ns),
+        datagrams: parcel.datagrams,
+        forward: Duration::from_nanos(parcel.forward_ns),
+    })
+}
+
+/// What the slots of a node have room for.
+fn supply(installation: &Installation, tdma: &Tdma, link: &Link, node: u8) -> Supply {
+    let is_own = |slot: &&TimeSlot| slot.node == node;
+    let cycles = cycles(tdma.slots.iter().filter(is_own));
+    let own = tdma.slots.iter().enumerate().filter(|(_, slot)| is_own(slot));
+    let window = |(index, slot): (usize, &TimeSlot), cycle: u64| Window {
+        begin_ns: cycle * ns(tdma.cycle) + ns(slot.offset),
+        sends_ns: ns(slot.length.saturating_sub(tdma.guard)),
+        slot: index,
+    };
+    let windows = (0..cycles).flat_map(|cycle| {
+        let there = own.clone().filter(move |(_, slot)| slot.is_in(cycle));
+        there.map(move |slot| window(slot, cycle))
+    });
+    Supply {
+        windows: windows.collect(),
+        repeats_ns: cycles * ns(tdma.cycle),
+        said_ns: link.said_ns(tdma, installation.nodes.len(), installation.time.masters().len()),
+        taken_before_ns: ns(TAKEN_BEFORE),
+        late_ns: ns(LATE),
+    }
+}
+
+/// A flow from one node to another, as its router sees it.
+struct Sent<'f> {
+    flow: &'f Flow,
+    node: u8,
+    peer: u8,
+    /// Its priority: the sender's if it is commands, that of the receiver's request if it is data; both if it may be either.
+    least: Priority,
+    most: Priority,
+}
+
+impl<'f> Sent<'f> {
+    /// None if both ends are on one node.
+    fn new(installation: &Installation, flow: &'f Flow) -> Option<Self> {
+        let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
+        let (node, peer) = (installation.node_index(&from.node)?, installation.node_index(&to.node)?);
+        let commands = to.names().any(|name| from.calls.contains(&name)).then(|| from.name.class().priority());
+        let data = from.names().any(|name| to.calls.contains(&name)).then(|| to.name.class().priority());
+        let (commands, data) = (commands.or(data)?, data.or(commands)?);
+        let (least, most) = if commands.outranks(data) { (data, commands) } else { (commands, data) };
+        (node != peer).then_some(Self { flow, node, peer, least, most })
+    }
+
+    fn stream(&self, link: &Link) -> Stream {
+        let parcel = link.package(self.flow.size as usize);
+        Stream {
+            period_ns: ns(self.flow.period).max(1),
+            takes_ns: parcel.takes_ns,
+            datagrams: parcel.datagrams,
+            largest_ns: parcel.largest_ns,
+            end_ns: parcel.end_ns,
+            last_ns: parcel.last_ns,
+        }
+    }
+
+    /// How this one's packages stand to another's.
+    fn ahead_of(&self, own: &Self, level: impl Fn(Priority) -> u8) -> Option<Ahead> {
+        if self.node != own.node || level(self.most) > level(own.least) {
+            return None;
+        }
+        // What is to another peer may leave in company of what is ahead; of one level the more important leave the mailbox first.
+        let is_beside = self.peer == own.peer && level(self.most) == level(own.least);
+        Some(if is_beside && !self.most.outranks(own.least) { Ahead::Earlier } else { Ahead::Always })
+    }
+}
+
+fn ns(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,339 @@
+//! How long a package of a stream waits and takes at worst: response-time analysis of one node.
+//!
+//! ```text
+//!        ▼ published just after this slot took what it sends
+//!  ──┬───────────┬───────────────────────┬───────────┬───────────────────────┬───────────┬──
+//!    │ slot v    │                       │ slot v+1  │                       │ slot v+2  │
+//!  ──┴───────────┴───────────────────────┴───────────┴───────────────────────┴───────────┴──
+//!                                         ███ ▓▓▓▓▓░░                         ██ ▒▒▒
+//!                           said by routers ┘   │   └ the next head does not fit   └ the package
+//!                                  ahead of it ─┘
+//! ```
+//!
+//! A *chain* is a series of slots each of which leaves something of what it found. Before it comes slot v, which left nothing; so whatever
+//! is ahead of our package was published after slot v took what it sends. A slot of a chain carries at least its room less the largest
+//! datagram (and one ns), and as many datagrams as would fit if all were largest ones: had it carried less, the head that ended it would have
+//! fitted. The chain ends with the slot that has room for all that is left and our package. Which slot was v, and how long after it our
+//! package was published, are tried out.
+
+use super::mistakes::mistake;
+
+/// Moments at which a package may come that are tried for one slot v: whatever takes more has no bound worth knowing.
+const TRIES_MAX: usize = 5_000;
+
+/// What slots of a node have room for, over and over.
+#[derive(Clone, Debug)]
+pub(crate) struct Supply {
+    /// By their beginning; none overlaps the next.
+    pub(crate) windows: Vec<Window>,
+    /// From one round of them to the next, ns.
+    pub(crate) repeats_ns: u64,
+    /// Taken at the beginning of each slot by what routers say to each other, ns.
+    pub(crate) said_ns: u64,
+    /// What is published less than this before a slot may miss it, ns.
+    pub(crate) taken_before_ns: u64,
+    /// A slot may be begun so late, ns.
+    pub(crate) late_ns: u64,
+}
+
+/// One slot of a round.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Window {
+    /// From the beginning of the round, ns.
+    pub(crate) begin_ns: u64,
+    /// Up to its guard, ns.
+    pub(crate) sends_ns: u64,
+    /// Its place in [`Tdma::slots`](crate::Tdma::slots).
+    pub(crate) slot: usize,
+}
+
+/// Packages that come no faster than one a period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stream {
+    pub(crate) period_ns: u64,
+    /// What one takes, see [`Parcel`](crate::wire::Parcel).
+    pub(crate) takes_ns: u64,
+    pub(crate) datagrams: u64,
+    pub(crate) largest_ns: u64,
+    pub(crate) end_ns: u64,
+    pub(crate) last_ns: u64,
+}
+
+/// What there is to carry, or what a slot carries at least.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+struct Work {
+    ns: u64,
+    datagrams: u64,
+}
+
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, more: Self) {
+        self.ns += more.ns;
+        self.datagrams += more.datagrams;
+    }
+}
+
+impl std::iter::Sum for Work {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |mut sum, work| {
+            sum += work;
+            sum
+        })
+    }
+}
+
+/// How other packages stand to ours.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Ahead {
+    /// They go first, even those that are published later.
+    Always,
+    /// Those go first that are published before.
+    Earlier,
+}
+
+/// The worst that can happen to a package.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Worst {
+    /// From its publishing to the end of its last datagram, ns.
+    pub(crate) latency_ns: u64,
+    /// Up to the beginning of the slot in which it ends, ns.
+    pub(crate) waits_ns: u64,
+    /// Which window of the round that is.
+    pub(crate) window: usize,
+    /// How many slots began while it waited, this one included.
+    pub(crate) slots: u64,
+    /// What of others went before it since slot v, ns.
+    pub(crate) others_ns: u64,
+    /// How many packages of its own stream went before it.
+    pub(crate) own_earlier: u64,
+}
+
+/// Why there is no worst.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Never {
+    /// No slot has room for one of its datagrams, or of those before it.
+    NoRoom,
+    /// More comes than leaves; both in ns a second.
+    Overload {
+        /// Comes.
+        asked_ns_s: u64,
+        /// Leaves.
+        carried_ns_s: u64,
+    },
+    /// It takes longer than any package may wait.
+    Late,
+}
+
+impl Supply {
+    fn begin_ns(&self, index: usize) -> u64 {
+        let round = index / self.windows.len();
+        // One round ahead, so that what is taken before the first slot is no negative time.
+        (round as u64 + 1) * self.repeats_ns + self.windows[index % self.windows.len()].begin_ns
+    }
+
+    /// Up to this time, what is published is found by a slot.
+    fn takes_until_ns(&self, index: usize) -> u64 {
+        self.begin_ns(index).saturating_sub(self.taken_before_ns)
+    }
+
+    fn sends_ns(&self, index: usize) -> u64 {
+        self.windows[index % self.windows.len()].sends_ns
+    }
+
+    /// Time for packages.
+    fn room_ns(&self, index: usize) -> u64 {
+        let said_ns = if mistake!(SaysNothing) { 0 } else { self.said_ns + self.late_ns };
+        self.sends_ns(index).saturating_sub(said_ns)
+    }
+}
+
+impl Stream {
+    fn work(&self, packages: u64) -> Work {
+        Work { ns: packages * self.takes_ns, datagrams: packages * self.datagrams }
+    }
+}
+
+/// The worst for a package of a stream beside others of the same node; none waits longer than `longest_ns`.
+pub(crate) fn worst(
+    supply: &Supply,
+    own: &Stream,
+    others: &[(Stream, Ahead)],
+    longest_ns: u64,
+) -> Result<Worst, Never> {
+    let largest_ns = others.iter().map(|(stream, _)| stream).chain([own]).map(|stream| stream.largest_ns).max();
+    let analysis = Analysis { supply, own, others, largest_ns: largest_ns.unwrap_or(1).max(1), longest_ns };
+    analysis.judge()?;
+    let mut worst: Option<Worst> = None;
+    let firsts = if mistake!(OneSlotFirst) { 1 } else { supply.windows.len() };
+    for first in 0..firsts {
+        worst = worse(worst, analysis.after(first)?);
+    }
+    worst.ok_or(Never::NoRoom)
+}
+
+fn worse(one: Option<Worst>, other: Worst) -> Option<Worst> {
+    Some(one.filter(|one| one.latency_ns >= other.latency_ns).unwrap_or(other))
+}
+
+struct Analysis<'a> {
+    supply: &'a Supply,
+    own: &'a Stream,
+    others: &'a [(Stream, Ahead)],
+    /// Of all datagrams.
+    largest_ns: u64,
+    longest_ns: u64,
+}
+
+/// Where a chain has come to.
+#[derive(Clone, Copy)]
+struct Chain {
+    /// Until when slot v took what it sent, ns.
+    from_ns: u64,
+    /// The next slot.
+    index: usize,
+    /// What those before it carried.
+    carried: Work,
+}
+
+impl Analysis<'_> {
+    fn streams(&self) -> impl Iterator<Item = &Stream> {
+        self.others.iter().map(|(stream, _)| stream).chain([self.own])
+    }
+
+    /// What a slot of a chain carries at least.
+    fn carries(&self, index: usize) -> Work {
+        let room_ns = self.supply.room_ns(index);
+        let wasted_ns = if mistake!(WastesNothing) { 0 } else { self.largest_ns - 1 };
+        Work { ns: room_ns.saturating_sub(wasted_ns), datagrams: room_ns / self.largest_ns }
+    }
+
+    /// What may be left of work after some was carried, ns.
+    fn left_ns(&self, all: Work, carried: Work) -> u64 {
+        let datagrams = all.datagrams.saturating_sub(carried.datagrams);
+        all.ns.saturating_sub(carried.ns).min(datagrams.saturating_mul(self.largest_ns))
+    }
+
+    /// Whether all that comes can leave in the long run.
+    fn judge(&self) -> Result<(), Never> {
+        let count = self.supply.windows.len();
+        let carried: Work = (0..count).map(|index| self.carries(index)).sum();
+        if carried.datagrams == 0 {
+            return Err(Never::NoRoom);
+        }
+        let a_second = |all: u64, period_ns: u64| (u128::from(all) * 1_000_000_000_000 / u128::from(period_ns)) as u64;
+        let asked = self.streams().map(|stream| {
+            let Work { ns, datagrams } = stream.work(1);
+            // Thousandths, since there may be less than one datagram a second.
+            Work { ns: a_second(ns, stream.period_ns), datagrams: a_second(datagrams, stream.period_ns) }
+        });
+        let asked: Work = asked.sum();
+        let repeats_ns = self.supply.repeats_ns;
+        let (ns, datagrams) = (a_second(carried.ns, repeats_ns), a_second(carried.datagrams, repeats_ns));
+        if asked.ns >= ns && asked.datagrams >= datagrams {
+            return Err(Never::Overload { asked_ns_s: asked.ns / 1000, carried_ns_s: ns / 1000 });
+        }
+        Ok(())
+    }
+
+    /// The worst if the slot before the chain is this one.
+    fn after(&self, first: usize) -> Result<Worst, Never> {
+        let misses = usize::from(!mistake!(CatchesTheSlot));
+        let from_ns = self.supply.takes_until_ns(first);
+        let mut chain = Chain { from_ns, index: first + misses, carried: Work::default() };
+        let (mut worst, mut later_ns) = (None, 0);
+        for _ in 0..TRIES_MAX {
+            // What slots found and left before ours was published.
+            while self.supply.takes_until_ns(chain.index) < from_ns + later_ns + misses as u64 {
+                let found = self.published(self.supply.takes_until_ns(chain.index) - from_ns);
+                if self.left_ns(found, chain.carried) <= self.supply.room_ns(chain.index) {
+                    return worst.ok_or(Never::NoRoom);
+                }
+                chain.carried += self.carries(chain.index);
+                chain.index += 1;
+            }
+            if later_ns > self.longest_ns {
+                return Err(Never::Late);
+            }
+            worst = worse(worst, self.ends(chain, later_ns)?);
+            later_ns = self.next_ns(later_ns);
+            if mistake!(FirstOnly) {
+                return worst.ok_or(Never::NoRoom);
+            }
+        }
+        Err(Never::Late)
+    }
+
+    /// When the next package could be published that goes before later ones of ours: nothing else makes it worse to be later.
+    fn next_ns(&self, later_ns: u64) -> u64 {
+        let earlier = self.others.iter().filter(|(_, ahead)| *ahead == Ahead::Earlier).map(|(stream, _)| stream);
+        let next = |stream: &Stream| (later_ns / stream.period_ns + 1) * stream.period_ns;
+        earlier.chain([self.own]).map(next).min().unwrap_or(u64::MAX)
+    }
+
+    /// All that could be published within a time after slot v.
+    fn published(&self, within_ns: u64) -> Work {
+        self.streams().map(|stream| stream.work(within_ns.div_ceil(stream.period_ns))).sum()
+    }
+
+    /// The end of the package that is published `later_ns` after slot v took what it sends, if the chain's next slot is the first to find it.
+    fn ends(&self, chain: Chain, later_ns: u64) -> Result<Worst, Never> {
+        let published_ns = chain.from_ns + later_ns;
+        let own_earlier = if mistake!(ForgetsOwn) { 0 } else { later_ns / self.own.period_ns };
+        let mut at = chain;
+        loop {
+            let begin_ns = self.supply.begin_ns(at.index);
+            if begin_ns > published_ns + self.longest_ns {
+                return Err(Never::Late);
+            }
+            if let Some((others_ns, starts_ns)) = self.fits(at, later_ns, own_earlier) {
+                let end_ns = (starts_ns + self.own.last_ns).min(self.supply.sends_ns(at.index));
+                return Ok(Worst {
+                    latency_ns: begin_ns + end_ns - published_ns,
+                    waits_ns: begin_ns.saturating_sub(published_ns),
+                    window: at.index % self.supply.windows.len(),
+                    slots: (at.index + 1 - chain.index) as u64,
+                    others_ns,
+                    own_earlier,
+                });
+            }
+            at.carried += self.carries(at.index);
+            at.index += 1;
+        }
+    }
+
+    /// Whether all that is left, and our package, have room in the next slot; what of others was ahead, and when its last datagram starts at
+    /// the latest, counted from the slot's beginning.
+    fn fits(&self, chain: Chain, later_ns: u64, own_earlier: u64) -> Option<(u64, u64)> {
+        let (begin_ns, room_ns) = (self.supply.begin_ns(chain.index), self.supply.room_ns(chain.index));
+        let said_ns = if mistake!(SaysNothing) { 0 } else { self.supply.said_ns + self.supply.late_ns };
+        let mut starts_ns = said_ns;
+        loop {
+            let others = self.others_ahead(begin_ns + starts_ns - chain.from_ns, later_ns);
+            // All but the last datagram of ours.
+            let mut ahead = self.own.work(own_earlier);
+            ahead += others;
+            ahead += Work { ns: self.own.takes_ns - self.own.end_ns, datagrams: self.own.datagrams - 1 };
+            let left_ns = self.left_ns(ahead, chain.carried);
+            if left_ns + self.own.end_ns > room_ns {
+                return None;
+            }
+            if said_ns + left_ns <= starts_ns {
+                return Some((others.ns, starts_ns));
+            }
+            starts_ns = said_ns + left_ns;
+        }
+    }
+
+    /// What others published that goes before our package, if its last datagram starts `within_ns` after slot v.
+    fn others_ahead(&self, within_ns: u64, later_ns: u64) -> Work {
+        let ahead = |(stream, ahead): &(Stream, Ahead)| {
+            stream.work(match ahead {
+                _ if mistake!(ComesOnce) => 1,
+                Ahead::Always => within_ns.div_ceil(stream.period_ns),
+                Ahead::Earlier if mistake!(ForgetsEqual) => 0,
+                Ahead::Earlier => later_ns / stream.period_ns + 1,
+            })
+        };
+        self.others.iter().map(ahead).sum()
+    }
+}

@@ -1,0 +1,198 @@
+//! One node and its slots, played through: written apart from the analysis, to hold it to its word.
+
+use super::response::{Supply, Window};
+
+/// A system to play.
+#[derive(Clone, Debug)]
+pub(super) struct System {
+    pub(super) supply: Supply,
+    pub(super) flows: Vec<Sent>,
+    /// A datagram of nothing, the shortest and the longest one, ns.
+    pub(super) head_ns: u64,
+    pub(super) least_ns: u64,
+    pub(super) most_ns: u64,
+}
+
+/// What a stream sends.
+#[derive(Clone, Debug)]
+pub(super) struct Sent {
+    pub(super) period_ns: u64,
+    /// 0 goes first.
+    pub(super) level: u8,
+    pub(super) peer: u8,
+    /// Bytes, as the time that they take.
+    pub(super) size_ns: u64,
+}
+
+/// How a play differs from others.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Play {
+    /// From the beginning of a round to the first package of any stream, ns.
+    pub(super) from_ns: u64,
+    /// Shifts the streams against each other and draws what is left open; 0: all come at once, and all is as bad as can be.
+    pub(super) seed: u64,
+    /// Packages that come during a slot may leave in it.
+    pub(super) looks_again: bool,
+    /// Rounds of the table.
+    pub(super) rounds: u64,
+}
+
+struct Waiting {
+    flow: usize,
+    published_ns: u64,
+    /// What is not sent yet, ns.
+    left_ns: u64,
+    parts: bool,
+}
+
+impl System {
+    /// Bytes of a part of a package too large for a datagram, ns.
+    fn part_ns(&self) -> u64 {
+        self.most_ns - self.head_ns
+    }
+
+    pub(super) fn is_whole(&self, flow: &Sent) -> bool {
+        flow.size_ns <= self.part_ns()
+    }
+
+    /// A datagram of so many bytes, ns.
+    pub(super) fn datagram_ns(&self, size_ns: u64) -> u64 {
+        (self.head_ns + size_ns).max(self.least_ns)
+    }
+
+    /// Datagrams of one package.
+    pub(super) fn datagrams_ns(&self, flow: &Sent) -> Vec<u64> {
+        let mut left_ns = flow.size_ns;
+        let mut datagrams = Vec::new();
+        while left_ns > 0 {
+            let part_ns = left_ns.min(self.part_ns());
+            datagrams.push(self.datagram_ns(part_ns));
+            left_ns -= part_ns;
+        }
+        datagrams
+    }
+
+    /// The longest time from publishing to the end of the last datagram, by stream.
+    pub(super) fn play(&self, play: Play) -> Vec<u64> {
+        let mut draw = Draw(play.seed);
+        let mut published = self.published(play, &mut draw);
+        published.reverse();
+        let (mut waiting, mut worst) = (Vec::<Waiting>::new(), vec![0; self.flows.len()]);
+        // The first round has begun when the first packages come.
+        for round in 0..play.rounds {
+            for window in &self.supply.windows {
+                let begin_ns = round * self.supply.repeats_ns + window.begin_ns;
+                self.slot(play, begin_ns, window, &mut draw, &mut published, &mut waiting, &mut worst);
+            }
+        }
+        let end_ns = play.rounds * self.supply.repeats_ns;
+        for late in waiting {
+            worst[late.flow] = worst[late.flow].max(end_ns - late.published_ns);
+        }
+        worst
+    }
+
+    /// All packages by time; of those at one time the last stream's first, so that the first stream finds all others ahead of it.
+    fn published(&self, play: Play, draw: &mut Draw) -> Vec<(u64, usize)> {
+        let end_ns = play.rounds.saturating_sub(1) * self.supply.repeats_ns;
+        let mut all = Vec::new();
+        for (index, flow) in self.flows.iter().enumerate() {
+            let mut at_ns = play.from_ns + draw.below(flow.period_ns);
+            while at_ns < end_ns {
+                all.push((at_ns, index));
+                at_ns += flow.period_ns + if draw.below(4) == 3 { draw.below(flow.period_ns / 4) } else { 0 };
+            }
+        }
+        all.sort_by_key(|(at_ns, index)| (*at_ns, usize::MAX - index));
+        all
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the whole state of a play")]
+    fn slot(
+        &self,
+        play: Play,
+        begin_ns: u64,
+        window: &Window,
+        draw: &mut Draw,
+        published: &mut Vec<(u64, usize)>,
+        waiting: &mut Vec<Waiting>,
+        worst: &mut [u64],
+    ) {
+        let mut now_ns = begin_ns + draw.most(self.supply.late_ns) + draw.most(self.supply.said_ns);
+        let guard_ns = begin_ns + window.sends_ns;
+        let mut takes_until_ns = begin_ns.saturating_sub(draw.most(self.supply.taken_before_ns));
+        loop {
+            while published.last().is_some_and(|(at_ns, _)| *at_ns <= takes_until_ns) {
+                let Some((published_ns, flow)) = published.pop() else { break };
+                let parts = !self.is_whole(&self.flows[flow]);
+                waiting.push(Waiting { flow, published_ns, left_ns: self.flows[flow].size_ns, parts });
+                waiting.sort_by_key(|package| self.flows[package.flow].level);
+            }
+            let Some(head) = waiting.first() else { break };
+            let peer = self.flows[head.flow].peer;
+            let mut size_ns = head.left_ns.min(self.part_ns());
+            if now_ns + self.datagram_ns(size_ns) > guard_ns {
+                break;
+            }
+            let mut inside = vec![0];
+            if !head.parts {
+                size_ns = self.company(peer, size_ns, guard_ns - now_ns, waiting, &mut inside);
+            }
+            let is_filled = !waiting[0].parts && inside.len() == waiting.len() && draw.below(2) == 0;
+            let filled_ns = if is_filled { self.part_ns() } else { size_ns };
+            // Bytes of a level below, if nothing else wants to leave.
+            let takes_ns = self.datagram_ns(filled_ns).min(guard_ns - now_ns).max(self.datagram_ns(size_ns));
+            now_ns += takes_ns;
+            for at in inside.into_iter().rev() {
+                let package = &mut waiting[at];
+                package.left_ns = package.left_ns.saturating_sub(self.part_ns());
+                if package.left_ns == 0 {
+                    let package = waiting.remove(at);
+                    worst[package.flow] = worst[package.flow].max(now_ns - package.published_ns);
+                }
+            }
+            if play.looks_again {
+                takes_until_ns = takes_until_ns.max(now_ns);
+            }
+        }
+    }
+
+    /// Who goes in the same datagram as the first that waits: to the same peer, and not less important than what waits for others.
+    fn company(&self, peer: u8, size_ns: u64, room_ns: u64, waiting: &[Waiting], inside: &mut Vec<usize>) -> u64 {
+        let level = |package: &Waiting| self.flows[package.flow].level;
+        let is_its = |package: &Waiting| self.flows[package.flow].peer == peer;
+        let others = waiting.iter().filter(|package| !is_its(package)).map(level).min();
+        let mut all_ns = size_ns;
+        for (at, package) in waiting.iter().enumerate().skip(1).filter(|(_, package)| is_its(package)) {
+            let longer_ns = all_ns + package.left_ns;
+            let fits = self.datagram_ns(longer_ns) <= room_ns.min(self.most_ns);
+            if package.parts || !fits || others.is_some_and(|others| level(package) > others) {
+                break;
+            }
+            all_ns = longer_ns;
+            inside.push(at);
+        }
+        all_ns
+    }
+}
+
+/// Chance from a seed.
+struct Draw(u64);
+
+impl Draw {
+    /// Below the limit; 0 in the play that is as bad as can be.
+    fn below(&mut self, limit: u64) -> u64 {
+        if self.0 == 0 {
+            return 0;
+        }
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % limit.max(1)
+    }
+
+    /// At most this, and exactly this in one of two cases and in the play that is as bad as can be.
+    fn most(&mut self, most: u64) -> u64 {
+        if self.0 == 0 || self.below(2) == 0 { most } else { self.below(most + 1) }
+    }
+}

@@ -1,0 +1,132 @@
+//! What time slots mean: the cycle drawn, the slots, and how late each flow can be.
+
+use super::{Page, timeline};
+use crate::bounds::{Bound, bounds};
+use crate::tdma::{LATE, Tdma, TimeSlot};
+use crate::units::{duration_decimal, duration_text, rate_text};
+use std::time::Duration;
+
+/// Below it some slots are begun too late for their successors; see the book's chapter.
+const GUARD_USUAL: Duration = Duration::from_micros(100);
+
+impl Page<'_> {
+    pub(super) fn slots(&mut self) {
+        let Some(tdma) = &self.installation.tdma else { return };
+        let masters = self.installation.time.masters();
+        self.line("");
+        self.line("Time slots. A node sends in its own only; a cycle begins at each multiple of its length.");
+        self.line("");
+        self.entry("cycle", &cycle(tdma));
+        let (guard, late) = (duration_text(tdma.guard), duration_text(LATE));
+        let mut words = format!(
+            "the last {guard} of each slot, so that clocks may be off {} each",
+            duration_decimal(tdma.guard / 2)
+        );
+        if tdma.guard < GUARD_USUAL {
+            words += &format!(
+                "; note: short for a computer without real-time kernel, better {}",
+                duration_text(GUARD_USUAL)
+            );
+        }
+        self.entry("guard", &words);
+        self.entry("late", &format!("a slot whose turn is noticed more than {late} too late is left unused"));
+        let names: Vec<&str> = masters.iter().map(|index| self.node_name(*index)).collect();
+        let window = duration_text(tdma.synchronisation);
+        self.entry("synchronised", &format!("in {window} at the beginning for each master: {}", names.join(", ")));
+        if let Some(tunnel) = tdma.tunnel {
+            let words = format!("ordinary traffic of {}/{}, behind all packages", tunnel.network, tunnel.prefix);
+            self.entry("tunnel", &words);
+        }
+        self.line("");
+        for row in timeline::rows(tdma, &self.installation.nodes, masters) {
+            self.line(row);
+        }
+        self.line("");
+        self.table(tdma);
+    }
+
+    fn node_name(&self, index: u8) -> &str {
+        self.installation.nodes.get(usize::from(index)).map_or("?", |node| node.name.as_str())
+    }
+
+    fn table(&mut self, tdma: &Tdma) {
+        let width = self.installation.nodes.iter().map(|node| node.name.len()).max().unwrap_or(0).max(4);
+        self.line(format!("  {:width$}  {:>8}  {:>8}  {:>9}  there", "node", "offset", "length", "bytes"));
+        for slot in &tdma.slots {
+            let (offset, length) = (duration_decimal(slot.offset), duration_decimal(slot.length));
+            let (node, bytes) = (self.node_name(slot.node), tdma.budget_bytes(slot.length));
+            self.line(format!("  {node:width$}  {offset:>8}  {length:>8}  {bytes:>9}  {}", there(slot)));
+        }
+        self.line("bytes: what the link carries before the guard, the heads of Ethernet, IP and UDP counted.");
+    }
+
+    /// The worst cases of flows.
+    pub(super) fn at_worst(&mut self) {
+        let bounds = bounds(self.installation);
+        if bounds.is_empty() {
+            return;
+        }
+        self.line("");
+        self.line("At worst, from publishing to the arrival at the other node; then a process has to wake up:");
+        self.line("");
+        let flows: Vec<String> = bounds
+            .iter()
+            .map(|bound| {
+                let flow = &self.installation.flows[bound.flow];
+                format!("{} → {}", self.name(flow.from), self.name(flow.to))
+            })
+            .collect();
+        let width = flows.iter().map(|flow| flow.chars().count()).max().unwrap_or(0).max(4);
+        let columns = "level   at worst     within  slots     waits    others    itself";
+        self.line(format!("  {:width$}  {columns}", "flow"));
+        for (bound, name) in bounds.iter().zip(flows) {
+            let deadline = duration_decimal(self.installation.flows[bound.flow].deadline);
+            let (worst, parts) = match &bound.latency {
+                Ok(bound) => (round(bound.latency), parts(bound)),
+                Err(why) => ("never".into(), why.to_string()),
+            };
+            self.line(format!("  {name:width$}  {:>5}  {worst:>9}  {deadline:>9}  {parts}", bound.level));
+        }
+        let said =
+            bounds.iter().find_map(|bound| bound.latency.ok()).map(|bound| round(bound.said)).unwrap_or_default();
+        self.entry(
+            "",
+            &format!(
+                "slots: of its node that begin while it waits; waits: until the last of them; others: what goes before it meanwhile; \
+                 itself: its own datagrams. In \"at worst\" besides: {said} said by routers in a slot, {} by which it may be begun late, what \
+                 else is in the last datagram, and that once more through a switch.",
+                duration_text(LATE)
+            ),
+        );
+    }
+}
+
+/// What a bound consists of, as columns.
+fn parts(bound: &Bound) -> String {
+    let (waits, others, own) = (round(bound.waits), round(bound.others), round(bound.own));
+    format!("{:>5}  {waits:>8}  {others:>8}  {own:>8}", bound.slots)
+}
+
+fn cycle(tdma: &Tdma) -> String {
+    let (length, link) = (duration_text(tdma.cycle), rate_text(tdma.link_bytes_s * 8));
+    let used: u128 = tdma.slots.iter().map(|slot| slot.length.as_nanos() / u128::from(slot.period)).sum();
+    let share = used * 100 / tdma.cycle.as_nanos().max(1);
+    let repeats = match tdma.cycles() {
+        1 => String::new(),
+        cycles => format!("; the table repeats itself after {cycles} cycles"),
+    };
+    format!("{length}, of which slots take {share} %, on links of {link}{repeats}")
+}
+
+fn there(slot: &TimeSlot) -> String {
+    let (period, phase) = (slot.period, slot.phase);
+    if period == 1 {
+        return "in each cycle".into();
+    }
+    format!("in cycles {phase}, {}, {}, …", phase + period, phase + 2 * period)
+}
+
+/// Up to ten microseconds.
+fn round(duration: Duration) -> String {
+    duration_decimal(Duration::from_micros(duration.as_nanos().div_ceil(10_000) as u64 * 10))
+}

@@ -1,0 +1,129 @@
+//! What packages take of a link: the sizes that routers write and that bounds are computed with.
+
+use crate::network::Network;
+use crate::node::Node;
+use crate::tdma::Tdma;
+use rohrpost_mailbox::HEAD_BYTES as PACKAGE_HEAD_BYTES;
+use std::time::Duration;
+
+/// What Ethernet adds to each packet: preamble 8, head 14, check 4, gap 12.
+pub const ETHERNET_BYTES: usize = 8 + 14 + 4 + 12;
+/// Before what a datagram of routers says.
+pub const FRAME_HEAD_BYTES: usize = 36;
+/// Before the bytes of a part of a package, the package's head included.
+pub const FRAGMENT_HEAD_BYTES: usize = 32;
+/// What a datagram of time says.
+pub const TIME_BYTES: usize = 72;
+/// What a datagram says that only says "still there".
+pub const ALIVE_BYTES: usize = 24;
+/// What a datagram says that refuses others.
+pub const REFUSAL_BYTES: usize = 16;
+/// A router keeps the body of a package that waits in pieces of so many bytes.
+pub const KEPT_IN_BYTES: u64 = 256;
+/// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
+pub const HAND_OVER: Duration = Duration::from_micros(20);
+
+/// The link of a system with time slots.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Link {
+    bytes_s: u64,
+    heads_bytes: usize,
+    datagram_bytes_max: usize,
+}
+
+impl Link {
+    pub(crate) fn new(tdma: &Tdma, network: &Network, nodes: &[Node]) -> Self {
+        let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
+        let heads_bytes = Network::heads_bytes(is_v6);
+        Self { bytes_s: tdma.link_bytes_s.max(1), heads_bytes, datagram_bytes_max: network.datagram_bytes_max }
+    }
+
+    /// How long the wire carries a datagram, ns.
+    pub(crate) fn wire_ns(&self, datagram_bytes: usize) -> u64 {
+        let bytes = (datagram_bytes + self.heads_bytes + ETHERNET_BYTES) as u64;
+        (bytes * 1_000_000_000).div_ceil(self.bytes_s)
+    }
+
+    /// How long a datagram keeps a slot busy, ns.
+    pub(crate) fn takes_ns(&self, datagram_bytes: usize) -> u64 {
+        self.wire_ns(datagram_bytes).max(HAND_OVER.as_nanos() as u64)
+    }
+
+    /// The same of the largest datagram.
+    pub(crate) fn largest_ns(&self) -> u64 {
+        self.takes_ns(self.datagram_bytes_max)
+    }
+
+    /// The same of a datagram of time.
+    pub(crate) fn time_ns(&self) -> u64 {
+        self.takes_ns(FRAME_HEAD_BYTES + TIME_BYTES)
+    }
+
+    /// How long the wire carries one, ns.
+    pub(crate) fn time_wire_ns(&self) -> u64 {
+        self.wire_ns(FRAME_HEAD_BYTES + TIME_BYTES)
+    }
+
+    /// How long one that says "still there" keeps a slot busy, ns.
+    pub(crate) fn alive_ns(&self) -> u64 {
+        self.takes_ns(FRAME_HEAD_BYTES + ALIVE_BYTES)
+    }
+
+    /// Frames of time that a synchronisation window has room for.
+    pub(crate) fn frames_in_synchronisation(&self, tdma: &Tdma) -> usize {
+        let sends_ns = tdma.synchronisation.saturating_sub(tdma.guard).as_nanos() as u64;
+        (sends_ns / self.time_wire_ns()) as usize
+    }
+
+    /// What routers say to each other in a slot at most, before any package, ns: frames of time, one to each other node that says "still
+    /// there", and a refusal. A slave sends a warm-up and a request, or a request to each master; a master its replies, unless its
+    /// synchronisation window has room for them besides a warm-up and a Sync to each.
+    pub(crate) fn said_ns(&self, tdma: &Tdma, nodes: usize, masters: usize) -> u64 {
+        let others = nodes.saturating_sub(1);
+        let replies = if self.frames_in_synchronisation(tdma) >= 3 * others { 0 } else { others };
+        let refusal_ns = self.takes_ns(FRAME_HEAD_BYTES + REFUSAL_BYTES);
+        replies.max(2).max(masters) as u64 * self.time_ns() + others as u64 * self.alive_ns() + refusal_ns
+    }
+
+    /// What the datagrams of a package take, none of them shared with another package.
+    pub(crate) fn package(&self, body_bytes: usize) -> Parcel {
+        let whole = FRAME_HEAD_BYTES + PACKAGE_HEAD_BYTES + body_bytes;
+        if whole <= self.datagram_bytes_max {
+            let takes_ns = self.takes_ns(whole);
+            // Another may follow it in the same datagram, which comes as one.
+            let last_ns = self.largest_ns();
+            let forward_ns = self.wire_ns(self.datagram_bytes_max);
+            return Parcel { datagrams: 1, takes_ns, largest_ns: takes_ns, last_ns, end_ns: takes_ns, forward_ns };
+        }
+        let head_bytes = FRAME_HEAD_BYTES + FRAGMENT_HEAD_BYTES;
+        let part_bytes = self.datagram_bytes_max - head_bytes;
+        let full = (body_bytes.div_ceil(part_bytes) - 1) as u64;
+        let last_bytes = head_bytes + body_bytes - full as usize * part_bytes;
+        let end_ns = self.takes_ns(last_bytes);
+        Parcel {
+            datagrams: full + 1,
+            takes_ns: full * self.largest_ns() + end_ns,
+            largest_ns: self.largest_ns(),
+            last_ns: end_ns,
+            end_ns,
+            forward_ns: self.wire_ns(last_bytes),
+        }
+    }
+}
+
+/// What a package takes of slots, in ns.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Parcel {
+    /// Number of its datagrams.
+    pub(crate) datagrams: u64,
+    /// All of them.
+    pub(crate) takes_ns: u64,
+    /// The largest of them.
+    pub(crate) largest_ns: u64,
+    /// Of the last one, what is its own.
+    pub(crate) end_ns: u64,
+    /// The last one with all that may be in it.
+    pub(crate) last_ns: u64,
+    /// The last one from a switch to the receiver.
+    pub(crate) forward_ns: u64,
+}

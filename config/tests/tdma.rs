@@ -1,0 +1,145 @@
+//! What a file of time slots means for routers.
+
+use rohrpost_config::{Installation, TimeSlot, TimeSource, Tunnel, bounds, duration_text, parse_duration};
+use std::net::Ipv4Addr;
+use std::path::Path;
+use std::time::Duration;
+
+const SLOTS: &str = include_str!("tdma.toml");
+
+fn parse(text: &str) -> Installation {
+    Installation::parse(text, Path::new("tdma.toml")).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+#[test]
+fn every_key_arrives() {
+    let installation = parse(SLOTS);
+    let tdma = installation.tdma.unwrap();
+    let us = Duration::from_micros;
+    assert_eq!((tdma.cycle, tdma.synchronisation, tdma.guard), (us(5000), us(500), us(150)));
+    assert_eq!(tdma.link_bytes_s, 12_500_000);
+    assert_eq!(tdma.tunnel, Some(Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 }));
+    assert_eq!(tdma.tunnel.unwrap().address(1), Ipv4Addr::new(10, 78, 0, 2));
+    let slot = |node, offset, length, period, phase, line| TimeSlot {
+        node,
+        offset: us(offset),
+        length: us(length),
+        period,
+        phase,
+        line,
+    };
+    assert_eq!(
+        tdma.slots,
+        [slot(0, 1000, 1000, 1, 0, 34), slot(1, 2000, 500, 2, 1, 39), slot(1, 3000, 1000, 1, 0, 46)]
+    );
+    assert_eq!((0..4).map(|cycle| tdma.slots[1].is_in(cycle)).collect::<Vec<_>>(), [false, true, false, true]);
+    assert_eq!(installation.time, TimeSource::Master { masters: vec![0, 1], interval: us(5000) }, "the cycle");
+    assert_eq!(installation.network.unwrap().rate_bytes_s, 12_500_000, "the link's");
+}
+
+#[test]
+fn a_slot_holds_what_the_link_carries_before_the_guard() {
+    let tdma = parse(SLOTS).tdma.unwrap();
+    for (length_us, bytes, why) in
+        [(1000, 10_625, "850 us"), (151, 12, "a microsecond"), (150, 0, "the guard"), (100, 0, "less")]
+    {
+        assert_eq!(tdma.budget_bytes(Duration::from_micros(length_us)), bytes, "{why}");
+    }
+}
+
+#[test]
+fn nodes_of_other_tables_do_not_understand_each_other() {
+    let free = SLOTS.split_once("[tdma]").unwrap();
+    let (before, after) = (free.0.replace("mode = \"tdma\"", ""), free.1.split_once("[time]").unwrap().1);
+    let free =
+        format!("{before}[time]\n{}", after.replace("source = \"master\"", "source = \"master\"\ninterval = \"1 s\""));
+    let own = parse(SLOTS).digest().lan();
+    assert_ne!(parse(&free).digest().lan(), own, "free mode");
+    for (old, new) in [
+        ("cycle = \"5 ms\"", "cycle = \"6 ms\""),
+        ("synchronisation = \"500 us\"", "synchronisation = \"499 us\""),
+        ("guard = \"150 us\"", "guard = \"151 us\""),
+        ("link = \"100 Mbit/s\"", "link = \"1 Gbit/s\""),
+        ("10.78.0.0/24", "10.79.0.0/24"),
+        ("tunnel = \"10.78.0.0/24\"", ""),
+        ("offset = \"3 ms\"", "offset = \"3.1 ms\""),
+        ("length = \"500 us\"", "length = \"501 us\""),
+        ("period = 2", "period = 3"),
+        ("phase = 1", "phase = 0"),
+    ] {
+        assert_eq!(SLOTS.matches(old).count(), 1, "{old}");
+        assert_ne!(parse(&SLOTS.replace(old, new)).digest().lan(), own, "{old} or {new}");
+    }
+    let [head, base, brain, last] = SLOTS.splitn(4, "[[slot]]").collect::<Vec<_>>()[..] else { panic!() };
+    let (last, rest) = last.split_once("[time]").unwrap();
+    let turned = format!("{head}[[slot]]{last}\n[[slot]]{brain}\n[[slot]]{base}\n[time]{rest}");
+    assert_eq!(parse(&turned).digest().lan(), own, "their order in the file does not count");
+}
+
+/// A line of messages, without file and line.
+fn message(text: &str) -> String {
+    let errors = Installation::parse(text, Path::new("tdma.toml")).expect_err("something is wrong");
+    errors.problems().iter().map(|problem| problem.message.clone()).collect::<Vec<_>>().join("\n")
+}
+
+/// What stands in quotes behind a key in a message.
+fn quoted<'m>(message: &'m str, key: &str) -> &'m str {
+    let (_, behind) = message.rsplit_once(&format!("`{key} = \"")).expect("a remedy with this key");
+    behind.split('"').next().unwrap_or_default()
+}
+
+#[test]
+fn what_a_message_says_is_a_remedy_and_less_is_none() {
+    let short = SLOTS.replacen("length = \"1 ms\"", "length = \"420 us\"", 1);
+    let soon = short.replacen("deadline = \"20 ms\"", "deadline = \"6 ms\"", 1);
+    let said = message(&soon);
+    assert!(said.contains("lengthen that of `base` at 1 ms (line 34)"), "{said}");
+    let length = parse_duration(quoted(&said, "length")).unwrap();
+    let with = |length| soon.replacen("420 us", &duration_text(length), 1);
+    parse(&with(length));
+    message(&with(length - Duration::from_micros(10)));
+
+    let soon = SLOTS.replacen("deadline = \"20 ms\"", "deadline = \"4 ms\"", 1);
+    let said = message(&soon);
+    let (offset, length) = (quoted(&said, "offset"), quoted(&said, "length"));
+    let slot = |length| format!("[[slot]]\nnode = \"base\"\noffset = \"{offset}\"\nlength = \"{length}\"\n\n[time]");
+    parse(&soon.replacen("[time]", &slot(length), 1));
+    let less = duration_text(parse_duration(length).unwrap() - Duration::from_micros(10));
+    message(&soon.replacen("[time]", &slot(&less), 1));
+
+    let soon = SLOTS.replacen("deadline = \"20 ms\"", "deadline = \"1 ms\"", 1);
+    let said = message(&soon);
+    parse(&soon.replacen("deadline = \"1 ms\"", &format!("deadline = \"{}\"", quoted(&said, "deadline")), 1));
+}
+
+/// By hand.
+#[test]
+fn bounds_are_what_the_book_derives() {
+    let installation = parse(SLOTS);
+    let [scan, drive] = &bounds(&installation)[..] else { panic!() };
+    assert_eq!((scan.flow, drive.flow, scan.level, drive.level), (0, 1, 14, 14), "both at the pilot's class, 140");
+    let ns = |us: &[u64]| Duration::from_nanos(us.iter().sum());
+
+    // Published just after a slot took what it sends, 100 us before its beginning, the scan waits a cycle and these 100 us. Two frames of time,
+    // one "still there" and a refusal take 20 us each to hand over. Of its 2048 bytes 1404 go first, in a datagram of 1472, with heads 1538 B,
+    // 123.04 us; then 644 in one of 712, 778 B, 62.24 us. The slot may have begun 50 us late. A switch passes the last one on.
+    let bound = scan.latency.unwrap();
+    assert_eq!((bound.waits, bound.slots, bound.said), (ns(&[5_100_000]), 1, ns(&[80_000])));
+    assert_eq!((bound.datagrams, bound.own, bound.forward), (2, ns(&[123_040, 62_240]), ns(&[62_240])));
+    assert_eq!(bound.latency, ns(&[5_100_000, 50_000, 80_000, 123_040, 62_240, 62_240]));
+
+    // The command may catch the slot at 3 ms or, in each other cycle, that at 2 ms; just after the one at 3 ms of a cycle without the other it
+    // waits longest. Others may follow it in its datagram, to 1538 B.
+    let bound = drive.latency.unwrap();
+    assert_eq!(
+        (bound.waits, installation.tdma.as_ref().unwrap().slots[bound.slot].offset),
+        (ns(&[5_100_000]), Duration::from_millis(3))
+    );
+    assert_eq!(bound.latency, ns(&[5_100_000, 50_000, 80_000, 123_040, 123_040]));
+}
+
+#[test]
+fn without_slots_there_are_no_bounds() {
+    let free = include_str!("full.toml");
+    assert_eq!(bounds(&parse(free)), []);
+}

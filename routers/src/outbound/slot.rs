@@ -1,0 +1,82 @@
+//! What leaves in a time slot: what is most important, as long as it fits.
+//!
+//! ```text
+//!  queue:  level 0 ▓▓  level 3 ▓▓▓▓▓▓▓▓▓  level 9 ▒          room in the slot: ▓▓▓▓▓▓▓
+//!          fits: leaves   does not fit: the slot ends        9 does not overtake 3, and 3 goes first in the next slot
+//! ```
+//!
+//! Who computes how late a package can be counts on it: nothing less important leaves before it but what was on the wire already.
+
+use super::datagram::PART_START;
+use super::{DIRECT_HEAD_BYTES, Outbound};
+use crate::broken::broken;
+use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
+use crate::queue::Waiting;
+use crate::report::Report;
+use crate::settings::LEVELS;
+
+impl Outbound {
+    /// What leaves next in a time slot: for whom, and how many bytes of the buffer; none when nothing is left that may. `room_bytes` is
+    /// how long a datagram may be to be on the wire before the slot's guard begins. `datagram` has room for the largest.
+    ///
+    /// # Panics
+    /// If it has not.
+    pub fn poll_slot(
+        &mut self,
+        now_ns: u64,
+        room_bytes: usize,
+        datagram: &mut [u8],
+        report: &mut impl Report,
+    ) -> Option<(NodeIndex, usize)> {
+        let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };
+        let datagram = &mut datagram[..room_bytes];
+        if now_ns >= self.alive_ns
+            && let Some(peer) = self.due(now_ns)
+        {
+            let fits = HEAD_BYTES + ALIVE_BYTES <= room_bytes;
+            return fits.then(|| (peer, self.alive(now_ns, peer, datagram)));
+        }
+        while let Some(place) = self.queue.first() {
+            let waiting = *self.queue.at(place);
+            if let Some(cause) = self.why_not(now_ns, waiting.peer, waiting.published_ns) {
+                self.drop_out(place, cause, report);
+                continue;
+            }
+            if self.takes_bytes(&waiting) > room_bytes {
+                return None;
+            }
+            let bytes = if self.is_large(&waiting) {
+                self.part(now_ns, place, datagram)
+            } else {
+                self.pack(now_ns, waiting.peer, waiting.level, datagram, report)
+            };
+            return Some((waiting.peer, bytes));
+        }
+        None
+    }
+
+    /// Looks through what waits for a slot, and drops what waits for too long or for nobody. To be called between slots.
+    pub fn tidy(&mut self, now_ns: u64, report: &mut impl Report) {
+        if now_ns >= self.sweep_ns {
+            self.sweep(now_ns, report);
+        }
+    }
+
+    /// Bytes of the datagram that a package leaves in without company; of one that leaves in parts, of its next.
+    fn takes_bytes(&self, waiting: &Waiting) -> usize {
+        let len = usize::from(waiting.head.len);
+        if !self.is_large(waiting) {
+            return DIRECT_HEAD_BYTES + len;
+        }
+        let left = len - usize::from(waiting.parts) * (self.datagram_bytes - PART_START);
+        self.datagram_bytes.min(PART_START + left)
+    }
+
+    /// In a slot a datagram carries nothing that is less important than what waits for other peers.
+    pub(super) fn last_level_of_company(&self, peer: NodeIndex) -> u8 {
+        if !self.in_slots || broken!(AnyCompany) {
+            return LEVELS as u8;
+        }
+        self.queue.first_level_besides(peer).unwrap_or(LEVELS as u8)
+    }
+}

@@ -1,0 +1,192 @@
+//! A clock's core and what it has of the system: its socket, the kernel's stamps, the node's page, and what others may look at. Whose
+//! thread it is, and when that sends, is its owner's business.
+
+use super::local::LocalClock;
+use super::socket::{Came, TimeSocket};
+use super::state::{ClockState, Snapshot};
+use super::{ClockError, ClockParts};
+use crate::frame::{FrameHead, NodeIndex};
+use crate::impair::{Impairment, Output};
+use crate::time::{Clock, Exchange, InSlots, SentId, Stamp, TIME_BYTES};
+use rohrpost_mailbox::{TimeKeeper, TimeRecord, realtime_ns};
+use std::net::{IpAddr, SocketAddr};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+/// So many datagrams are taken before what is due is sent.
+const BURST: usize = 64;
+/// A record that came too late is made anew, so often.
+const WRITE_TRIES: usize = 8;
+
+/// What the impairment keeps besides the bytes.
+#[derive(Clone, Copy)]
+struct Held {
+    source: IpAddr,
+    stamp: Stamp,
+    since_ns: u64,
+}
+
+/// All of a clock but its thread.
+pub(in crate::shell) struct Works {
+    pub(in crate::shell) clock: Clock,
+    local: LocalClock,
+    socket: TimeSocket,
+    keeper: Option<TimeKeeper>,
+    written: Option<TimeRecord>,
+    impairment: Option<Impairment<Held>>,
+    observer: Option<SyncSender<Exchange>>,
+    state: Arc<ClockState>,
+    snapshot: Snapshot,
+}
+
+impl Works {
+    /// Binds the socket. What an earlier life of this router wrote in the node's page goes on.
+    pub(in crate::shell) fn new(parts: ClockParts) -> Result<Self, ClockError> {
+        let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
+        let own = settings.own;
+        let at = nodes.get(usize::from(own)).copied().unwrap_or(SocketAddr::new(IpAddr::from([0; 16]), 0));
+        let socket = TimeSocket::open(at, &nodes, kernel_stamps).map_err(|error| ClockError::Socket(at, error))?;
+        let keeper = node.as_ref().map(TimeKeeper::resume).transpose()?;
+        let page = keeper.as_ref().and_then(TimeKeeper::record);
+        let local = LocalClock::new(skew);
+        let clock = Clock::new(settings, local.now_ns(), realtime_ns(), page);
+        let snapshot = Snapshot::of(&clock, local.now_ns());
+        Ok(Self {
+            clock,
+            local,
+            socket,
+            written: page,
+            keeper,
+            impairment: impair.map(|impair| Impairment::new(impair, u64::from(own) | 0x7469_6d65_0000)),
+            observer,
+            state: Arc::new(ClockState::new(snapshot)),
+            snapshot,
+        })
+    }
+
+    /// From now on its clock goes by the rules of time slots.
+    pub(in crate::shell) fn in_slots(self, settings: InSlots) -> Self {
+        Self { clock: self.clock.in_slots(settings), ..self }
+    }
+
+    /// What others may look at.
+    pub(in crate::shell) fn state(&self) -> &Arc<ClockState> {
+        &self.state
+    }
+
+    /// Local time.
+    pub(in crate::shell) fn now_ns(&self) -> u64 {
+        self.local.now_ns()
+    }
+
+    /// Whether its thread goes before others.
+    pub(in crate::shell) fn runs_in_real_time(&mut self, does: bool) {
+        self.snapshot.real_time = does;
+    }
+
+    /// Hands a datagram of time to the kernel.
+    pub(in crate::shell) fn send(&self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) -> bool {
+        self.socket.send(to, datagram)
+    }
+
+    /// Takes what came, without waiting: stamps of what `left`, then datagrams; when the impairment has more. When each left is known before an
+    /// answer to it is read.
+    pub(in crate::shell) fn take(&mut self, left: impl FnMut(SentId, Stamp)) -> u64 {
+        self.take_stamps(left);
+        self.take_datagrams()
+    }
+
+    fn take_stamps(&mut self, mut left: impl FnMut(SentId, Stamp)) {
+        while let Some((id, realtime_ns)) = self.socket.sent() {
+            if let Some(stamp) = self.local.stamp(realtime_ns) {
+                self.clock.sent(id, stamp);
+                left(id, stamp);
+            }
+        }
+    }
+
+    /// Lets others see how it stands: writes the node's page, and shows it to tools.
+    pub(in crate::shell) fn publish(&mut self) {
+        self.write_page();
+        self.show();
+    }
+
+    /// Takes what came; when the impairment has more.
+    fn take_datagrams(&mut self) -> u64 {
+        let mut datagram = [0; TIME_BYTES];
+        for _ in 0..BURST {
+            let Some(Came { bytes, source, realtime_ns }) = self.socket.receive(&mut datagram) else { break };
+            let now_ns = self.local.now_ns();
+            let stamp = realtime_ns.and_then(|ns| self.local.stamp(ns)).unwrap_or(Stamp::by_us(now_ns));
+            match &mut self.impairment {
+                Some(impairment) => {
+                    impairment.push(now_ns, Held { source, stamp, since_ns: now_ns }, &datagram[..bytes])
+                }
+                None => self.hand(now_ns, source, stamp, &datagram[..bytes]),
+            }
+        }
+        self.take_held(&mut datagram)
+    }
+
+    /// What the impairment has kept for long enough came so much later.
+    fn take_held(&mut self, datagram: &mut [u8; TIME_BYTES]) -> u64 {
+        loop {
+            let now_ns = self.local.now_ns();
+            let Some(impairment) = &mut self.impairment else { return u64::MAX };
+            let (Held { source, stamp, since_ns }, held) = match impairment.poll(now_ns) {
+                Output::Send { to, datagram } => (to, datagram),
+                Output::Wait { until_ns } => return until_ns,
+            };
+            let bytes = held.len().min(TIME_BYTES);
+            datagram[..bytes].copy_from_slice(&held[..bytes]);
+            let stamp = Stamp { ns: stamp.ns + (now_ns - since_ns), ..stamp };
+            self.hand(now_ns, source, stamp, &datagram[..bytes]);
+        }
+    }
+
+    fn hand(&mut self, now_ns: u64, source: IpAddr, stamp: Stamp, datagram: &[u8]) {
+        let taken = match FrameHead::parse(datagram) {
+            Ok((head, rest)) if self.socket.is_from(head.from, source) => {
+                self.clock.handle(now_ns, stamp, &head, rest).is_ok()
+            }
+            _ => false,
+        };
+        self.snapshot.ignored += u64::from(!taken);
+        if let Some(exchange) = self.clock.take_exchange() {
+            (self.snapshot.exchanges, self.snapshot.by_kernel) = (self.snapshot.exchanges + 1, exchange.by_kernel);
+            if let Some(observer) = &self.observer {
+                // Who does not keep up misses some.
+                let _ = observer.try_send(exchange);
+            }
+        }
+    }
+
+    fn write_page(&mut self) {
+        let Some(keeper) = &mut self.keeper else { return };
+        for _ in 0..WRITE_TRIES {
+            let record = *self.clock.record();
+            if self.written == Some(record) {
+                return;
+            }
+            if keeper.write(&record) {
+                self.written = Some(record);
+            } else if let Some(page) = keeper.record() {
+                self.clock.page_says(self.local.now_ns(), &page);
+            }
+        }
+    }
+
+    fn show(&mut self) {
+        let Snapshot { exchanges, by_kernel, ignored, real_time, .. } = self.snapshot;
+        let seen = Snapshot::of(&self.clock, self.local.now_ns());
+        self.snapshot = Snapshot { exchanges, by_kernel, ignored, real_time, ..seen };
+        self.state.show(&self.snapshot);
+    }
+}
+
+impl AsFd for Works {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}

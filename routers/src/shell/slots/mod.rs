@@ -1,0 +1,337 @@
+//! The thread that sends in time slots: it has the router's mailbox, its queue, all sockets that send, and the clock.
+//!
+//! ```text
+//!        sleep, at most a millisecond at a time             wake    call begin              guard
+//!  ──┬──────────────┬──────────────┬─────────────────────────┬───────┬────┬───────────────────┬─────▶ local time
+//!    mailbox ─▶ queue   the same       the same              │ spin  │lead│ time, refusal,    │
+//!                                       stamps, datagrams of time ─▶ Clock  │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
+//! ```
+//!
+//! Nothing but this thread sends, and this thread only with a [`Permit`]. It is never rung: who publishes a package makes no system call, and
+//! waits for a slot anyway. It takes nothing from the heap.
+
+mod alarm;
+mod granted;
+mod state;
+
+pub use granted::Granted;
+pub use state::{Snapshot, State, Used, WINDOWS};
+
+use super::answers::Answers;
+use super::clock::{ClockState, Works};
+use super::departures::{Departures, Wire};
+use super::socket::InSocket;
+use super::threads::Shared;
+use crate::frame::{FrameHead, NodeIndex};
+use crate::outbound::{Outbound, Package};
+use crate::tdma::{Carries, Counts, Discipline, Next, Permit, Planned, Silent, Verdict};
+use crate::time::{Allowed, SentId, Step, TIME_BYTES};
+use rohrpost_mailbox::{Receiver, monotonic_ns};
+use std::io::IoSlice;
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::sync::mpsc;
+
+/// It wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it wakes
+/// up 50 µs late on average, and to read takes 30 µs.
+const SPIN_NS_MAX: u64 = 150_000;
+/// Of the cycle, at most this part for each window: short cycles leave less time for it.
+const SPIN_CYCLES: u64 = 20;
+/// In the last moments before the call nothing is begun that might last until then.
+const QUIET_NS: u64 = 20_000;
+/// The mailbox is looked into this often: it has room for a burst of 64 packages.
+const NAP_NS: u64 = 1_000_000;
+/// Packages taken from the mailbox at a time: all that it may hold.
+const BURST: usize = 64;
+/// Packages taken between two datagrams of a slot: what came just now, and is perhaps more important.
+const FEW: usize = 4;
+/// Room for the longest refusal.
+pub(super) const REFUSAL_BYTES: usize = 128;
+/// Refusals that wait for a slot; more are lost, and said again a second later.
+pub(super) const REFUSALS: usize = 8;
+
+/// How long before the call it is to wake up, ns.
+pub(super) fn spin_ns(cycle_ns: u64) -> u64 {
+    SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)
+}
+
+/// A refusal that the thread that receives wants to have sent.
+pub(super) struct Refusal {
+    pub(super) to: IpAddr,
+    pub(super) bytes: usize,
+    pub(super) datagram: [u8; REFUSAL_BYTES],
+}
+
+/// What the thread has.
+pub(super) struct Slots {
+    shared: Arc<Shared>,
+    works: Works,
+    discipline: Discipline,
+    transit: Receiver,
+    outbound: Outbound,
+    answers: Answers,
+    wire: Wire,
+    /// By which refusals leave.
+    socket: Arc<InSocket>,
+    refusals: mpsc::Receiver<Refusal>,
+    /// The refusal whose turn is next.
+    refusal: Option<Refusal>,
+    /// Room for the largest datagram.
+    datagram: Box<[u8]>,
+    /// A datagram that lies there since the last slot.
+    held: Option<(NodeIndex, usize)>,
+    /// When the socket of time was read last, local ns.
+    looked_ns: u64,
+    /// The first datagram of the last window, if the kernel stamps it.
+    first: Option<First>,
+    snapshot: Snapshot,
+    state: Arc<State>,
+}
+
+/// A datagram that begins a window.
+#[derive(Clone, Copy)]
+struct First {
+    id: SentId,
+    /// When its window was asked for, local ns.
+    called_ns: u64,
+    /// When the window begins, local ns.
+    begin_ns: u64,
+}
+
+impl Slots {
+    /// From what would send as packages come.
+    pub(super) fn new(
+        departures: Departures,
+        works: Works,
+        discipline: Discipline,
+        socket: Arc<InSocket>,
+        refusals: mpsc::Receiver<Refusal>,
+    ) -> Self {
+        let Departures { shared, transit, outbound, answers, wire, datagram, .. } = departures;
+        let snapshot = Snapshot {
+            counts: Counts::default(),
+            silent: discipline.silent(),
+            lead_ns: (0, 0),
+            granted: Granted::Ordinary,
+            held: 0,
+            windows: [None; WINDOWS],
+        };
+        let state = Arc::new(State::new(snapshot));
+        Self {
+            shared,
+            works,
+            discipline,
+            transit,
+            outbound,
+            answers,
+            wire,
+            socket,
+            refusals,
+            refusal: None,
+            datagram,
+            held: None,
+            looked_ns: 0,
+            first: None,
+            snapshot,
+            state,
+        }
+    }
+
+    /// What others may look at.
+    pub(super) fn state(&self) -> Arc<State> {
+        self.state.clone()
+    }
+
+    /// And of the clock.
+    pub(super) fn clock_state(&self) -> Arc<ClockState> {
+        self.works.state().clone()
+    }
+
+    /// Until the router ends.
+    pub(super) fn run(mut self) {
+        alarm::be_punctual();
+        self.snapshot.granted = Granted::ask(self.discipline.table());
+        self.works.runs_in_real_time(self.snapshot.granted != Granted::Ordinary);
+        while !self.shared.ends() {
+            let now_ns = self.works.now_ns();
+            let next = self.discipline.next(now_ns, &self.works.clock);
+            let (planned, wake_ns) = match next {
+                Next::Window(planned) => (Some(planned), planned.wake_ns),
+                Next::Silent { until_ns, .. } => (None, until_ns),
+            };
+            let left_ns = wake_ns.saturating_sub(now_ns);
+            if left_ns > NAP_NS {
+                // Not so that the rest is a short one.
+                alarm::sleep(NAP_NS.min(left_ns / 2));
+                self.between(planned.is_none());
+                continue;
+            }
+            alarm::sleep(left_ns);
+            self.look();
+            match planned {
+                Some(planned) => self.window(&planned),
+                None => self.between(true),
+            }
+        }
+    }
+
+    /// Between windows: makes room in the mailbox. Whoever is `silent` waits for datagrams of time; others read them once a cycle at least.
+    fn between(&mut self, silent: bool) {
+        let now_ns = monotonic_ns();
+        self.outbound.tidy(now_ns, &mut self.answers);
+        self.take(BURST);
+        self.wire.deliver(now_ns);
+        if silent || self.works.now_ns().saturating_sub(self.looked_ns) > self.discipline.table().cycle_ns() {
+            self.look();
+        }
+    }
+
+    /// Hands all datagrams of time and stamps that came to the clock, and shows how it stands.
+    fn look(&mut self) {
+        let Self { works, discipline, first, snapshot, looked_ns, state, .. } = self;
+        works.take(|id, stamp| {
+            let Some(First { called_ns, begin_ns, .. }) = first.take_if(|first| first.id == id) else { return };
+            discipline.left(called_ns, stamp);
+            if let Some(Some(used)) = snapshot.windows.last_mut() {
+                used.off_ns = stamp.ns.wrapping_sub(begin_ns).cast_signed();
+                used.by_kernel = stamp.by_kernel;
+            }
+        });
+        let now_ns = works.now_ns();
+        // Roles and bounds go on with time; there is nothing to be sent.
+        let _ = works.clock.poll_in(now_ns, Allowed::Nothing, &mut [0; TIME_BYTES]);
+        works.publish();
+        *looked_ns = now_ns;
+        let counts = discipline.counts(&works.clock);
+        let (silent, lead_ns) = (discipline.silent(), discipline.lead_ns());
+        if kind(silent) != kind(snapshot.silent) {
+            tell(silent);
+        }
+        *snapshot = Snapshot { counts, silent, lead_ns, ..*snapshot };
+        state.show(snapshot);
+    }
+
+    /// Waits for the call, and uses the window.
+    fn window(&mut self, planned: &Planned) {
+        self.spin(planned.call_ns);
+        let called_ns = self.works.now_ns();
+        let Verdict::Send(mut permit) = self.discipline.judge(planned, called_ns, &self.works.clock) else { return };
+        self.first = None;
+        self.send_time(&mut permit, called_ns);
+        if permit.carries == Carries::All {
+            self.refuse(&mut permit);
+            self.send_packages(&mut permit);
+        }
+        self.discipline.close(&permit);
+        if permit.datagrams() > 0 {
+            let (_, lead_ns) = self.discipline.lead_ns();
+            self.snapshot.used(Used {
+                window: permit.window,
+                off_ns: (called_ns + lead_ns).wrapping_sub(permit.begin_ns).cast_signed(),
+                by_kernel: false,
+                datagrams: permit.datagrams(),
+                wire_bytes: permit.wire_bytes(),
+            });
+        }
+        self.look();
+    }
+
+    /// Takes what still comes, until shortly before the call.
+    fn spin(&mut self, call_ns: u64) {
+        loop {
+            let left_ns = call_ns.saturating_sub(self.works.now_ns());
+            if left_ns == 0 {
+                return;
+            }
+            if left_ns > QUIET_NS {
+                self.take(1);
+            }
+            std::hint::spin_loop();
+        }
+    }
+
+    /// Takes packages from the mailbox, most important first, at most so many.
+    fn take(&mut self, most: usize) {
+        let Self { transit, outbound, answers, .. } = self;
+        for _ in 0..most {
+            let Some(waiting) = transit.try_receive() else { return };
+            let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body: waiting.body() };
+            // None leaves at once where there are time slots.
+            let _ = outbound.accept(monotonic_ns(), &package, false, answers);
+        }
+    }
+
+    /// `called_ns`: when the window was asked for. From there on it counts how long the first frame takes to the wire.
+    fn send_time(&mut self, permit: &mut Permit, called_ns: u64) {
+        let mut datagram = [0; TIME_BYTES];
+        while permit.fits(self.works.now_ns(), TIME_BYTES)
+            && let Step::Send { to, .. } =
+                self.works.clock.poll_in(self.works.now_ns(), permit.allowed(), &mut datagram)
+        {
+            let now_ns = self.works.now_ns();
+            if !permit.fits(now_ns, TIME_BYTES) {
+                // The thread stood still: better lost than in another's slot.
+                return;
+            }
+            permit.takes(now_ns, TIME_BYTES);
+            self.works.send(to, &datagram);
+            if permit.datagrams() == 1 {
+                let id = FrameHead::parse(&datagram).ok().map(|(head, _)| SentId { to, sequence: head.sequence });
+                self.first = id.map(|id| First { id, called_ns, begin_ns: permit.begin_ns });
+            }
+        }
+    }
+
+    /// One in a slot: whoever brings refusals about must not take the slots of packages.
+    fn refuse(&mut self, permit: &mut Permit) {
+        self.refusal = self.refusal.take().or_else(|| self.refusals.try_recv().ok());
+        let now_ns = self.works.now_ns();
+        if let Some(Refusal { to, bytes, datagram }) =
+            self.refusal.take_if(|refusal| permit.fits(now_ns, refusal.bytes))
+        {
+            permit.takes(now_ns, bytes);
+            self.socket.answer(to, &datagram[..bytes]);
+        }
+    }
+
+    fn send_packages(&mut self, permit: &mut Permit) {
+        loop {
+            let next = self.held.take().or_else(|| {
+                self.take(FEW);
+                let room_bytes = permit.room_bytes(self.works.now_ns())?;
+                self.outbound.poll_slot(monotonic_ns(), room_bytes, &mut self.datagram, &mut self.answers)
+            });
+            let Some((to, bytes)) = next else { return };
+            let now_ns = self.works.now_ns();
+            if !permit.fits(now_ns, bytes) {
+                // The thread stood still, and it is made: it goes first in the next slot.
+                self.held = Some((to, bytes));
+                self.snapshot.held += 1;
+                return;
+            }
+            permit.takes(now_ns, bytes);
+            let datagram = &self.datagram[..bytes];
+            let sent = self.wire.send(monotonic_ns(), to, &[IoSlice::new(datagram)]);
+            if sent.is_err_and(super::Failure::is_loss) {
+                self.outbound.unsent(datagram, &[], &mut self.answers);
+            }
+        }
+    }
+}
+
+fn kind(silent: Option<Silent>) -> Option<std::mem::Discriminant<Silent>> {
+    silent.as_ref().map(std::mem::discriminant)
+}
+
+/// Says that it does not send any more, and that it does.
+fn tell(silent: Option<Silent>) {
+    match silent {
+        None => tracing::info!("sends in its time slots"),
+        Some(why @ Silent::BoundTooLarge { .. }) => {
+            tracing::warn!(
+                "sends nothing, lest it disturbs others: {why}; is a master of time running, and does the network reach it?"
+            );
+        }
+        Some(why) => tracing::info!("sends nothing yet: {why}"),
+    }
+}

@@ -1,0 +1,220 @@
+//! Ordinary traffic between nodes in time slots: a TUN device, whose packets go behind all packages of modules.
+//!
+//! ```text
+//!  ssh, HTTP ─▶ kernel ─▶ rohrpost0 ─ tunnel-out ─▶ router.I.3 ─▶ level 31 ═ slots ═▶ router.J.4 ─ tunnel-in ─▶ rohrpost0 ─▶ kernel
+//! ```
+//!
+//! An IP packet is a package like any other, of the least priority. Little of it may wait: then packets are dropped, which is how TCP learns
+//! how much a network carries. Both threads are ordinary ones.
+
+use super::threads::Shared;
+use super::ways::{Reach, Ways};
+use crate::frame::NodeIndex;
+use crate::netlink::Netlink;
+use crate::outbound::DIRECT_HEAD_BYTES;
+use crate::settings::{LEVELS, Settings};
+use crate::stats::{Count, Stats};
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use rohrpost_config::Tunnel;
+use rohrpost_mailbox::{CreateError, Head, Name, Participant, Priority, Receiver, Shape, Type, sys};
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::net::Ipv4Addr;
+use std::os::fd::AsFd;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Of a router: takes IP packets from other nodes.
+const LOCAL: u8 = 4;
+/// The kernel numbers the devices of one network.
+const DEVICE: &str = "rohrpost%d";
+/// Largest packet, where the largest datagram has room for it.
+const MTU_MAX: usize = 1500;
+/// Packets that may wait in the queue; more are dropped.
+const WAITING_MAX: u64 = 64;
+/// Slots of the mailbox that packets come to.
+const SLOTS: u16 = 64;
+/// The threads look this often whether the router ends.
+const LOOK: Duration = Duration::from_millis(100);
+const LOOK_MS: u8 = 100;
+/// Where an IPv4 packet has its destination.
+const DESTINATION: std::ops::Range<usize> = 16..20;
+
+/// What went through the tunnel.
+#[derive(Default, Debug)]
+pub struct Passed {
+    /// Packets handed to the router for other nodes.
+    pub sent: Count,
+    /// Packets for other nodes that were dropped: too many waited.
+    pub dropped: Count,
+    /// Packets for nobody, or not of IPv4.
+    pub stray: Count,
+    /// Packets from other nodes, handed to the kernel.
+    pub received: Count,
+    /// Packets from other nodes that the kernel did not take.
+    pub refused: Count,
+}
+
+/// Its end in the kernel.
+pub(super) struct Device {
+    file: File,
+    mtu: usize,
+}
+
+impl Device {
+    /// Makes it, in the network that the calling thread is in, and gives it the node's address.
+    pub(super) fn open(settings: &Settings, tunnel: &Tunnel) -> io::Result<Self> {
+        // In one datagram, never in parts.
+        let mtu = MTU_MAX.min(settings.datagram_bytes() - DIRECT_HEAD_BYTES);
+        let (file, name) = sys::tun(DEVICE)?;
+        let device = nix::net::if_::if_nametoindex(name.as_str())?;
+        let mut kernel = Netlink::new()?;
+        kernel.set_mtu(device, mtu as u32)?;
+        kernel.add_address(device, tunnel.address(settings.own).into(), Some(tunnel.prefix))?;
+        kernel.set_up(device, true)?;
+        Ok(Self { file: file.into(), mtu })
+    }
+
+    fn twin(&self) -> io::Result<Self> {
+        Ok(Self { file: self.file.try_clone()?, mtu: self.mtu })
+    }
+}
+
+/// What both threads know.
+struct Common {
+    shared: Arc<Shared>,
+    device: Device,
+    passed: Arc<Passed>,
+}
+
+/// From the kernel to other nodes.
+pub(super) struct Out {
+    common: Common,
+    ways: Ways,
+    stats: Arc<Stats>,
+    /// The router's name.
+    own: Name,
+    first: Ipv4Addr,
+    nodes: NodeIndex,
+}
+
+/// From other nodes to the kernel.
+pub(super) struct In {
+    common: Common,
+    mailbox: Receiver,
+}
+
+/// Why there is no tunnel.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum TunnelError {
+    #[error(
+        "{0}; it needs CAP_NET_ADMIN, and /dev/net/tun (`modprobe tun`; in a container `--cap-add=NET_ADMIN --device /dev/net/tun`)"
+    )]
+    Device(#[from] io::Error),
+    #[error(transparent)]
+    Mailbox(#[from] CreateError),
+}
+
+/// Both directions. `own` is the router's name; each direction is a participant of its own.
+pub(super) fn ends(
+    settings: &Settings,
+    tunnel: &Tunnel,
+    own: Name,
+    stats: &Arc<Stats>,
+    shared: &Arc<Shared>,
+    [sender, receiver]: &[Arc<Participant>; 2],
+) -> Result<(Out, In, Arc<Passed>), TunnelError> {
+    let device = Device::open(settings, tunnel)?;
+    let passed = Arc::new(Passed::default());
+    let common = |device| Common { shared: shared.clone(), device, passed: passed.clone() };
+    let shape = Shape { slots: SLOTS, body_bytes_max: MTU_MAX as u16, ..Shape::default() };
+    let incoming = In { common: common(device.twin()?), mailbox: receiver.receiver(own.with_local(LOCAL), shape)? };
+    let outgoing = Out {
+        common: common(device),
+        ways: Ways::new(sender, Reach::Everywhere),
+        stats: stats.clone(),
+        own: own.with_local(LOCAL),
+        first: tunnel.address(0),
+        nodes: settings.nodes.len() as NodeIndex,
+    };
+    Ok((outgoing, incoming, passed))
+}
+
+impl Out {
+    /// Until the router ends.
+    pub(super) fn run(mut self) {
+        let mut packet = vec![0; self.common.device.mtu];
+        while !self.common.shared.ends() {
+            let mut fds = [PollFd::new(self.common.device.file.as_fd(), PollFlags::POLLIN)];
+            if poll(&mut fds, PollTimeout::from(LOOK_MS)) != Ok(1) {
+                continue;
+            }
+            match self.common.device.file.read(&mut packet) {
+                Ok(bytes) => self.send(&packet[..bytes]),
+                // The device is down: nothing comes for a while.
+                Err(_) => std::thread::sleep(LOOK),
+            }
+        }
+    }
+
+    fn send(&mut self, packet: &[u8]) {
+        let passed = self.common.passed.clone();
+        let Some(node) = node_of(packet, self.first, self.nodes) else { return passed.stray.add(1) };
+        let to = Name::new(self.own.system(), self.own.class().0, node, LOCAL);
+        let head = Head {
+            to,
+            from: self.own,
+            len: packet.len() as u16,
+            kind: Type::data(1),
+            priority: Priority(0),
+            ..Head::default()
+        };
+        let full = self.stats.waiting[LEVELS - 1].get() >= WAITING_MAX;
+        let count = if full || self.ways.send(&head, packet).is_err() { &passed.dropped } else { &passed.sent };
+        count.add(1);
+    }
+}
+
+impl In {
+    /// Until the router ends.
+    pub(super) fn run(mut self) {
+        let Common { shared, device, passed } = &mut self.common;
+        while !shared.ends() {
+            let Some(packet) = self.mailbox.receive_timeout(LOOK) else { continue };
+            let taken = device.file.write(packet.body()).is_ok();
+            let count = if taken { &passed.received } else { &passed.refused };
+            count.add(1);
+        }
+    }
+}
+
+/// The node that an IPv4 packet is for; addresses begin with that of node 0.
+fn node_of(packet: &[u8], first: Ipv4Addr, nodes: NodeIndex) -> Option<NodeIndex> {
+    let is_v4 = packet.first().is_some_and(|byte| byte >> 4 == 4);
+    let destination: [u8; 4] = packet.get(DESTINATION)?.try_into().ok()?;
+    let node = u32::from_be_bytes(destination).checked_sub(first.to_bits())?;
+    NodeIndex::try_from(node).ok().filter(|node| is_v4 && *node < nodes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_packet_goes_to_the_node_with_its_address() {
+        let packet = |version: u8, to: [u8; 4]| [&[version << 4 | 5][..], &[0; 15], &to, b"payload"].concat();
+        let first = Ipv4Addr::new(10, 78, 0, 1);
+        for (bytes, node, why) in [
+            (packet(4, [10, 78, 0, 1]), Some(0), "the first"),
+            (packet(4, [10, 78, 0, 3]), Some(2), "the last"),
+            (packet(4, [10, 78, 0, 4]), None, "behind it"),
+            (packet(4, [10, 78, 0, 0]), None, "before the first"),
+            (packet(4, [10, 78, 1, 1]), None, "so far behind that a byte does not tell"),
+            (packet(6, [10, 78, 0, 1]), None, "not of IPv4"),
+            (packet(4, [10, 78, 0, 1])[..19].to_vec(), None, "cut short"),
+            (Vec::new(), None, "nothing"),
+        ] {
+            assert_eq!(node_of(&bytes, first, 3), node, "{why}");
+        }
+    }
+}

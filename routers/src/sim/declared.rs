@@ -1,0 +1,83 @@
+//! Networks with time slots in which nothing goes wrong, and flows are as they were declared: no package may be later than was computed.
+
+use super::chance::Chance;
+use super::plan::{DRAIN_NS, Flow, MS, Plan, S};
+use super::slots::node_bytes_s;
+use rohrpost_mailbox::{HEAD_BYTES, Name, local};
+
+/// By then all nodes have system time.
+const BEGIN_NS: u64 = 3 * S / 2;
+const TRAFFIC_NS: u64 = 2 * S;
+/// The least that lies between two packages of a flow, in percent of its period.
+pub const PERIOD_MIN_PERCENT: u64 = 90;
+/// The class of what nobody declares, and of which there may be any amount.
+const FLOOD_CLASS: u8 = 10;
+const CLASSES: [u8; 4] = [40, 90, 140, 200];
+
+impl Plan {
+    /// The declared flows come first; behind them one flood for each node, of the lowest level.
+    pub fn declared(seed: u64) -> Self {
+        let mut plan = Self::slotted(seed);
+        let mut chance = Chance::new(seed ^ 0xf10);
+        plan.faults.clear();
+        plan.calls.clear();
+        plan.flows.clear();
+        plan.quality = super::plan::mended(plan.quality);
+        for (index, node) in plan.nodes.iter_mut().enumerate() {
+            let classes = CLASSES.iter().chain(&[FLOOD_CLASS]);
+            node.modules = classes.map(|class| Name::new(super::plan::SYSTEM, *class, index as u8, 0)).collect();
+        }
+        plan.draw_declared(&mut chance);
+        plan.draw_floods(&mut chance);
+        plan.traffic_begin_ns = BEGIN_NS;
+        (plan.mended_ns, plan.timed_ns) = (BEGIN_NS + TRAFFIC_NS, BEGIN_NS);
+        plan.traffic_end_ns = BEGIN_NS + TRAFFIC_NS;
+        plan.end_ns = plan.traffic_end_ns + DRAIN_NS;
+        if let Some(slots) = &mut plan.slots {
+            (slots.late_ppm, slots.divided) = (0, Vec::new());
+        }
+        plan
+    }
+
+    fn draw_declared(&mut self, chance: &mut Chance) {
+        let Some(slots) = &self.slots else { return };
+        for node in 0..self.nodes.len() {
+            let count = chance.between(1, 4);
+            // All of them together ask for so much of what the node's slots carry.
+            let share = chance.between(5, 60);
+            let own_bytes_s = node_bytes_s(&slots.table, node) * share / (100 * count);
+            let mut classes = CLASSES.to_vec();
+            for _ in 0..count {
+                let class =
+                    if chance.percent(40) { chance.pick(&classes) } else { classes.pop().unwrap_or(CLASSES[0]) };
+                let from = Name::new(super::plan::SYSTEM, class, node as u8, 0);
+                let other = (node as u64 + 1 + chance.below(self.nodes.len() as u64 - 1)) % self.nodes.len() as u64;
+                let to = Name::new(super::plan::SYSTEM, chance.pick(&CLASSES), other as u8, local::DATA);
+                let most = if chance.percent(20) { chance.scale(2000, 12_000) } else { chance.scale(16, 1300) };
+                let period_ns = ((most + HEAD_BYTES as u64 + 100) * S / own_bytes_s).max(2 * MS);
+                let flow =
+                    Flow { node, from, to, priority: class, period_ns, bytes: (8, most), is_mixed: false, burst: 1 };
+                if !self.flows.iter().any(|other| (other.from, other.to) == (from, to)) {
+                    self.flows.push(flow);
+                }
+            }
+        }
+    }
+
+    fn draw_floods(&mut self, chance: &mut Chance) {
+        for node in 0..self.nodes.len() {
+            let to = (node + 1) % self.nodes.len();
+            let name = |node: usize| Name::new(super::plan::SYSTEM, FLOOD_CLASS, node as u8, 0);
+            self.flows.push(Flow {
+                node,
+                from: name(node),
+                to: name(to).with_local(local::DATA),
+                priority: FLOOD_CLASS,
+                period_ns: chance.scale(4 * MS, 50 * MS),
+                bytes: (8, chance.scale(16, 4000)),
+                is_mixed: false,
+                burst: chance.scale(2, 8),
+            });
+        }
+    }
+}

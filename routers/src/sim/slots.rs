@@ -1,0 +1,193 @@
+//! Networks with time slots: their tables, drawn from a seed, how late their timing threads wake, and when two nodes may not be
+//! blamed for transmitting at once.
+
+use super::chance::Chance;
+use super::link::Quality;
+use super::plan::{Fault, MS, Plan, Planned, S, US};
+use crate::frame::NodeIndex;
+use crate::time::{JOINING_SYNCS, TIME_BYTES};
+use rohrpost_config::{Tdma, TimeSlot};
+use std::ops::Range;
+use std::time::Duration;
+
+/// What Ethernet, IPv4 and UDP put around each datagram, bytes.
+pub const AROUND_BYTES: usize = 8 + 14 + 4 + 12 + 20 + 8;
+/// A fault that divides the network for longer than this may leave it with two times: two masters that do not hear each other.
+pub const HOLDOVER_NS: u64 = 100 * MS;
+/// So many cycles after such a fault no two nodes transmit at once any more.
+pub const HEALED_CYCLES: u32 = 16;
+/// A cycle is so long at most.
+const CYCLE_NS_MAX: u64 = 20 * MS;
+/// A master is given so long at least to answer.
+const DEAF_NS: u64 = 200 * MS;
+/// A thread wakes so late at most, unless it is frozen.
+const LATE_NS_MAX: u64 = 5 * MS;
+/// Bytes of the largest datagram there may be, with all around it.
+const TIME_WIRE_BYTES: usize = TIME_BYTES + AROUND_BYTES;
+
+/// What a network with time slots has besides.
+#[derive(Clone, Debug)]
+pub struct Slots {
+    /// Who may send when.
+    pub table: Tdma,
+    /// Who may be master, in order.
+    pub masters: Vec<NodeIndex>,
+    /// Wake-ups beyond what the late gate lets through, of a million.
+    pub late_ppm: u32,
+    /// When faults divide the network, and until it has healed, true ns.
+    pub divided: Vec<Range<u64>>,
+}
+
+impl Slots {
+    /// How long a datagram of so many bytes takes on a link.
+    pub fn takes_ns(&self, bytes: usize) -> u64 {
+        takes_ns(bytes + AROUND_BYTES, self.table.link_bytes_s)
+    }
+
+    /// Whether two nodes of different terms may transmit at once, whose routers began then: the network has been divided for so long that
+    /// it may have two times, or one of them began to live in a part of it, or does not know better yet than what it hears.
+    pub fn is_excused(&self, true_ns: u64, began_ns: u64) -> bool {
+        let divided = self.divided.iter().find(|range| range.contains(&true_ns));
+        divided.is_some_and(|range| range.start + HOLDOVER_NS <= true_ns || range.contains(&began_ns))
+    }
+
+    /// The window of a node in which a moment of system time is, from its beginning to its guard, system ns.
+    pub fn window(&self, node: usize, system_ns: u64) -> Option<Range<u64>> {
+        let ns = |duration: Duration| duration.as_nanos() as u64;
+        let table = &self.table;
+        let (cycle, in_cycle_ns) = (system_ns / ns(table.cycle), system_ns % ns(table.cycle));
+        let sync_ns = ns(table.synchronisation);
+        let rank = self.masters.iter().position(|master| usize::from(*master) == node);
+        let synchronisation = rank.map(|rank| (rank as u64 * sync_ns, sync_ns));
+        let own = table.slots.iter().filter(|slot| usize::from(slot.node) == node);
+        let own = own.filter(|slot| cycle % u64::from(slot.period) == u64::from(slot.phase));
+        let mut all = own.map(|slot| (ns(slot.offset), ns(slot.length))).chain(synchronisation);
+        let (offset_ns, length_ns) = all.find(|(offset, length)| (*offset..offset + length).contains(&in_cycle_ns))?;
+        let begin_ns = system_ns - in_cycle_ns + offset_ns;
+        Some(begin_ns..begin_ns + length_ns - ns(table.guard))
+    }
+
+    /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late that others
+    /// take over from a master.
+    pub fn late_ns(&self, mended: bool, chance: &mut Chance) -> u64 {
+        if chance.per_million(self.late_ppm) {
+            let late_ns = chance.scale(50 * US, LATE_NS_MAX);
+            return if mended { late_ns.min(self.table.cycle.as_nanos() as u64) } else { late_ns };
+        }
+        if chance.percent(5) { chance.below(45 * US) } else { chance.below(3 * US) }
+    }
+}
+
+impl Plan {
+    /// A network with time slots.
+    pub fn slotted(seed: u64) -> Self {
+        let mut plan = Self::new(seed);
+        let mut chance = Chance::new(seed ^ 0x51_07);
+        let chance = &mut chance;
+        plan.nodes = (0..chance.between(2, 6) as usize).map(|index| super::plan::node(index, chance)).collect();
+        plan.masters = super::plan::masters(plan.nodes.len(), chance);
+        plan.masters.truncate(3);
+        let link_bytes_s = chance.pick(&[100, 100, 1000]) * 1_000_000 / 8;
+        plan.shape.datagram_bytes_max = chance.pick(&[548, 1472, 1472]);
+        plan.has_stamps = true;
+        // What the cable and the switch take; what they take more, clocks are unsure of.
+        let delay_ns = chance.between(US, 10 * US);
+        plan.quality = Quality { delay_ns, jitter_ns: chance.below(delay_ns), ..plan.quality };
+        let table = table(&plan, link_bytes_s, chance);
+        plan.shape.interval_ns = table.cycle.as_nanos() as u64;
+        plan.shape.rate_bytes_s = (0..plan.nodes.len()).map(|node| node_bytes_s(&table, node)).min().unwrap_or(0);
+        plan.mended_ns = chance.between(2 * S, 4 * S);
+        plan.slots = Some(Slots { table, masters: plan.masters.clone(), late_ppm: 2000, divided: Vec::new() });
+        plan.time();
+        // Who joins hears some Syncs before it asks, and so long a master is given to answer.
+        plan.timed_ns += 2 * u64::from(JOINING_SYNCS) * plan.shape.interval_ns + DEAF_NS;
+        plan.end_ns = plan.end_ns.max(plan.timed_ns + S);
+        plan.draw_all(chance);
+        plan.divide();
+        plan
+    }
+
+    /// When faults divide the network.
+    fn divide(&mut self) {
+        let healed_ns = u64::from(HEALED_CYCLES) * self.shape.interval_ns;
+        let divides =
+            |planned: &&Planned| matches!(planned.fault, Fault::Cut { .. } | Fault::Split { .. } | Fault::Bad { .. });
+        let mut faults: Vec<_> =
+            self.faults.iter().filter(divides).map(|planned| planned.from_ns..planned.until_ns + healed_ns).collect();
+        faults.sort_unstable_by_key(|range| range.start);
+        let mut merged: Vec<Range<u64>> = Vec::new();
+        for range in faults {
+            match merged.last_mut().filter(|last| range.start <= last.end) {
+                Some(last) => last.end = last.end.max(range.end),
+                None => merged.push(range),
+            }
+        }
+        if let Some(slots) = &mut self.slots {
+            slots.divided = merged;
+        }
+    }
+}
+
+fn takes_ns(bytes: usize, link_bytes_s: u64) -> u64 {
+    (bytes as u64 * S).div_ceil(link_bytes_s)
+}
+
+/// What a node's slots carry.
+pub fn node_bytes_s(table: &Tdma, node: usize) -> u64 {
+    let slots = table.slots.iter().filter(|slot| usize::from(slot.node) == node);
+    let per_cycle_ns: u64 =
+        slots.map(|slot| (slot.length - table.guard).as_nanos() as u64 / u64::from(slot.period)).sum();
+    per_cycle_ns * (table.link_bytes_s / 1000) / (table.cycle.as_nanos() as u64 / 1000)
+}
+
+/// A table in which every node has a slot, in any order and with gaps; its cycle is as short as drawn, or as long as the slots need.
+fn table(plan: &Plan, link_bytes_s: u64, chance: &mut Chance) -> Tdma {
+    let others = plan.nodes.len() as u64 - 1;
+    let datagram_ns = takes_ns(plan.shape.datagram_bytes_max + AROUND_BYTES, link_bytes_s);
+    let time_ns = takes_ns(TIME_WIRE_BYTES, link_bytes_s);
+    let guard_ns = chance.between(100, 250) * US;
+    // For each slave a synchronisation; or a warm-up, too; or a reply, too. Without it replies go in the slots of the master.
+    let frames = chance.pick(&[1, 2, 3, 3]) * others;
+    let frames_in_slot = others.max(2).max(plan.masters.len() as u64);
+    let synchronisation_ns = guard_ns + frames * time_ns + chance.between(60, 120) * US;
+    let mut end_ns = plan.masters.len() as u64 * synchronisation_ns;
+    let mut slots = Vec::new();
+    for turns in owners(plan.nodes.len() as u8, chance) {
+        let begin_ns = end_ns + if chance.percent(30) { chance.below(300 * US) } else { 0 };
+        let sends_ns = frames_in_slot * time_ns + datagram_ns * chance.between(1, 4) + chance.between(60, 120) * US;
+        let (offset, length) = (Duration::from_nanos(begin_ns), Duration::from_nanos(guard_ns + sends_ns));
+        let period = turns.len() as u32;
+        let slot = |(phase, node): (u32, &u8)| TimeSlot { node: *node, offset, length, period, phase, line: 0 };
+        slots.extend((0..).zip(&turns).map(slot));
+        end_ns = begin_ns + guard_ns + sends_ns;
+    }
+    let cycle_ns = chance.scale(MS, CYCLE_NS_MAX).max(end_ns.next_multiple_of(100 * US));
+    Tdma {
+        cycle: Duration::from_nanos(cycle_ns),
+        synchronisation: Duration::from_nanos(synchronisation_ns),
+        guard: Duration::from_nanos(guard_ns),
+        link_bytes_s,
+        slots,
+        tunnel: None,
+        line: 0,
+    }
+}
+
+/// For each place in the cycle the nodes that take turns there.
+fn owners(nodes: u8, chance: &mut Chance) -> Vec<Vec<u8>> {
+    let mut places: Vec<Vec<u8>> = Vec::new();
+    for node in 0..nodes {
+        match places.last_mut().filter(|place| place.len() < 3 && chance.percent(20)) {
+            Some(place) => place.push(node),
+            None => places.push(vec![node]),
+        }
+    }
+    for _ in 0..chance.below(3) {
+        places.push(vec![chance.below(nodes.into()) as u8]);
+    }
+    // In any order.
+    for at in (1..places.len()).rev() {
+        places.swap(at, chance.below(at as u64 + 1) as usize);
+    }
+    places
+}

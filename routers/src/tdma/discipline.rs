@@ -1,0 +1,297 @@
+//! When this node sends, and why not.
+
+use super::LATE_NS;
+use super::lead::Lead;
+use super::permit::{Carries, Permit};
+use super::table::{Kind, Table, Window};
+use crate::broken::broken;
+use crate::time::{Clock, JOINING_SYNCS, Reckoning, Role, Stamp, SyncCounts};
+
+/// What comes next.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Next {
+    /// A window of this node: see [`Planned`].
+    Window(Planned),
+    /// This node may not send; ask again then, or when a datagram of time has come.
+    Silent {
+        /// Why.
+        why: Silent,
+        /// Local ns.
+        until_ns: u64,
+    },
+}
+
+/// A window that comes, by the clock of just now. All but the window itself is local monotonic time.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Planned {
+    /// In system time.
+    pub window: Window,
+    /// When to wake up, and read what came.
+    pub wake_ns: u64,
+    /// When to judge, and to hand over the first datagram: the lead before the beginning.
+    pub call_ns: u64,
+    /// The first local ns in it.
+    pub begin_ns: u64,
+    /// The last local ns before its guard.
+    pub end_ns: u64,
+}
+
+/// Why a node does not send.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum Silent {
+    /// It has no system time, and no master is heard.
+    #[error("no system time, and no master is heard")]
+    NoTime,
+    /// It has no system time, and listens to a master.
+    #[error("joining: {heard} of {JOINING_SYNCS} Syncs heard, then it measures")]
+    Joining {
+        /// Syncs that count, so far.
+        heard: u8,
+    },
+    /// Its time may be too far off: no master was heard for too long, or the network is too slow for such a guard.
+    #[error("its clock may be {bound_ns} ns off, and {allowance_ns} ns are allowed: half of the guard")]
+    BoundTooLarge {
+        /// At most so far off.
+        bound_ns: u64,
+        /// So much is allowed.
+        allowance_ns: u64,
+    },
+    /// The table has no slot for it, and it has nothing to synchronise.
+    #[error("no slot in the table")]
+    NoSlot,
+}
+
+/// What to do with a window, now that it is there.
+#[derive(Clone, Debug)]
+pub enum Verdict {
+    /// Use it.
+    Send(Permit),
+    /// The clock was bent meanwhile: ask for the next window anew.
+    Early,
+    /// The wake-up came too late: somebody else's window is too near.
+    Late,
+    /// There is nothing for it: a synchronisation window, and another master has synchronised.
+    Idle,
+    /// This node may not send.
+    Silent(Silent),
+}
+
+/// What became of this node's slots, and of synchronisation, since the start.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Counts {
+    /// Slots in which something was sent.
+    pub used: u64,
+    /// Slots in which nothing had to be sent.
+    pub empty: u64,
+    /// Slots not used because the wake-up came too late.
+    pub late: u64,
+    /// Slots that went by without any wake-up: the thread stood still.
+    pub skipped: u64,
+    /// Slots without packages because the time was not sure enough.
+    pub silent: u64,
+    /// Datagrams in slots and synchronisation windows.
+    pub datagrams: u64,
+    /// Bytes of these on the wire, all heads counted.
+    pub wire_bytes: u64,
+    /// Synchronisation windows of a reigning master not used because the wake-up came too late.
+    pub synchronisations_late: u64,
+    /// Changes of role.
+    pub roles: u64,
+    /// What was sent and heard of synchronisation.
+    pub syncs: SyncCounts,
+}
+
+/// Says when this node sends. Holds no clock: that is asked each time.
+#[derive(Debug)]
+pub struct Discipline {
+    table: Table,
+    spin_ns: u64,
+    lead: Lead,
+    counts: Counts,
+    role: Role,
+    silent: Option<Silent>,
+    /// Slots before this are done with, system time of this epoch; none while there is no time.
+    done: Option<(u64, u64)>,
+}
+
+impl Discipline {
+    /// `spin_ns`: the wake-up comes so much earlier, to spin until the call.
+    pub fn new(table: Table, spin_ns: u64) -> Self {
+        Self {
+            table,
+            spin_ns,
+            lead: Lead::default(),
+            counts: Counts::default(),
+            role: Role::Listening,
+            silent: Some(Silent::NoTime),
+            done: None,
+        }
+    }
+
+    /// The slots.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// Why this node does not send at present; none if it does.
+    pub fn silent(&self) -> Option<Silent> {
+        self.silent
+    }
+
+    /// From the call to the wire, ns: the median, and by how much calls are made earlier.
+    pub fn lead_ns(&self) -> (u64, u64) {
+        (self.lead.median_ns(), self.lead.ns())
+    }
+
+    /// What became of slots so far.
+    pub fn counts(&self, clock: &Clock) -> Counts {
+        Counts { syncs: clock.sync_counts(), ..self.counts }
+    }
+
+    /// The next window of this node. Whatever came is to be handed to the clock before.
+    pub fn next(&mut self, now_ns: u64, clock: &Clock) -> Next {
+        if self.role != clock.role() {
+            self.role = clock.role();
+            self.counts.roles += 1;
+        }
+        let sure = self.reckon(now_ns, clock);
+        let basis = sure.as_ref().ok().map(|(reckoning, _)| *reckoning);
+        self.pass(now_ns, basis.or_else(|| clock.reckoning()).or_else(|| clock.coarse(now_ns)), sure.is_ok());
+        let asks_only = matches!(sure, Ok((_, Carries::Time)));
+        self.silent = asks_only.then(|| self.why_silent(now_ns, clock));
+        let planned = sure.and_then(|(reckoning, carries)| {
+            let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
+            let window = self.next_window(from_ns, clock, carries);
+            window.and_then(|window| self.plan(window, &reckoning)).ok_or(Silent::NoSlot)
+        });
+        match planned {
+            Ok(planned) => Next::Window(planned),
+            Err(why) => {
+                self.silent = Some(why);
+                Next::Silent { why, until_ns: now_ns.saturating_add(self.table.cycle_ns()) }
+            }
+        }
+    }
+
+    /// Whether a planned window may be used: to be asked at its call, when all that came was handed to the clock. Once for each window,
+    /// unless it is early.
+    pub fn judge(&mut self, planned: &Planned, now_ns: u64, clock: &Clock) -> Verdict {
+        let verdict = self.look(planned.window, now_ns, clock);
+        let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
+        match verdict {
+            Verdict::Early => return verdict,
+            Verdict::Late if is_slot => self.counts.late += 1,
+            Verdict::Late => self.counts.synchronisations_late += 1,
+            Verdict::Silent(_) if is_slot => self.counts.silent += 1,
+            _ => {}
+        }
+        self.done = self.done.map(|(epoch, _)| (epoch, planned.window.begin_ns + 1));
+        verdict
+    }
+
+    /// A window is over, or nothing is left to send.
+    pub fn close(&mut self, permit: &Permit) {
+        self.counts.datagrams += permit.datagrams();
+        self.counts.wire_bytes += permit.wire_bytes();
+        if let Kind::Slot { .. } = permit.window.kind {
+            *match (permit.carries, permit.datagrams()) {
+                (Carries::Time, _) => &mut self.counts.silent,
+                (Carries::All, 0) => &mut self.counts.empty,
+                (Carries::All, _) => &mut self.counts.used,
+            } += 1;
+        }
+    }
+
+    /// The first datagram of a window, handed over at `user_ns`, left then.
+    pub fn left(&mut self, user_ns: u64, stamp: Stamp) {
+        self.lead.add(user_ns, stamp);
+    }
+
+    /// By what this node goes, and for what that is good enough.
+    fn reckon(&self, now_ns: u64, clock: &Clock) -> Result<(Reckoning, Carries), Silent> {
+        let allowance_ns = self.table.allowance_ns();
+        let is_sure = |reckoning: &Reckoning| reckoning.bound_ns(now_ns) <= allowance_ns;
+        let own = clock.reckoning().filter(|own| is_sure(own) || broken!(SendsWhenUnsure));
+        let coarse = || clock.coarse(now_ns).filter(is_sure).map(|coarse| (coarse, Carries::Time));
+        own.map(|own| (own, Carries::All)).or_else(coarse).ok_or_else(|| self.why_silent(now_ns, clock))
+    }
+
+    /// Why this node does not go by its own time.
+    fn why_silent(&self, now_ns: u64, clock: &Clock) -> Silent {
+        match (clock.reckoning(), clock.joining()) {
+            (Some(own), _) => {
+                Silent::BoundTooLarge { bound_ns: own.bound_ns(now_ns), allowance_ns: self.table.allowance_ns() }
+            }
+            (None, Some(heard)) => Silent::Joining { heard },
+            (None, None) => Silent::NoTime,
+        }
+    }
+
+    /// Counts the slots that went by since it was asked last.
+    fn pass(&mut self, now_ns: u64, basis: Option<Reckoning>, sure: bool) {
+        let Some(reckoning) = basis else {
+            self.done = None;
+            return;
+        };
+        let system_ns = reckoning.system_ns(now_ns);
+        let reached_ns = system_ns.saturating_sub(LATE_NS);
+        let done_ns = match self.done {
+            // Who has followed a master that was far off may have been far ahead.
+            Some((epoch, done_ns))
+                if epoch == reckoning.epoch() && done_ns <= system_ns.saturating_add(self.table.cycle_ns()) =>
+            {
+                done_ns
+            }
+            // In another epoch the window of just now may be one that was used.
+            _ => system_ns,
+        };
+        let passed = self.table.slots_between(done_ns, reached_ns);
+        let was_silent = self.silent.is_some() || !sure;
+        *(if was_silent { &mut self.counts.silent } else { &mut self.counts.skipped }) += passed;
+        self.done = Some((reckoning.epoch(), done_ns.max(reached_ns)));
+    }
+
+    /// Own synchronisation windows matter only to who may have to send in them.
+    fn next_window(&self, from_ns: u64, clock: &Clock, carries: Carries) -> Option<Window> {
+        if carries == Carries::All && clock.may_synchronise() {
+            self.table.next_window(from_ns)
+        } else {
+            self.table.next_slot(from_ns)
+        }
+    }
+
+    fn plan(&self, window: Window, reckoning: &Reckoning) -> Option<Planned> {
+        let begin_ns = reckoning.first_ns(window.begin_ns)?;
+        let end_ns = reckoning.last_ns(window.end_ns)?;
+        let call_ns = begin_ns.saturating_sub(self.lead.ns());
+        Some(Planned { window, wake_ns: call_ns.saturating_sub(self.spin_ns), call_ns, begin_ns, end_ns })
+    }
+
+    fn look(&self, window: Window, now_ns: u64, clock: &Clock) -> Verdict {
+        let (reckoning, carries) = match self.reckon(now_ns, clock) {
+            Ok(sure) => sure,
+            Err(why) => return Verdict::Silent(why),
+        };
+        // No such window after an epoch began in another time.
+        let Some(planned) = self.plan(window, &reckoning) else { return Verdict::Late };
+        if now_ns < planned.call_ns {
+            return Verdict::Early;
+        }
+        if now_ns > planned.begin_ns.saturating_add(LATE_NS) && !broken!(NoLateGate) {
+            return Verdict::Late;
+        }
+        let (bound_ns, allowance_ns) = (reckoning.bound_ns(planned.end_ns), self.table.allowance_ns());
+        if bound_ns > allowance_ns && !broken!(SendsWhenUnsure) {
+            return Verdict::Silent(Silent::BoundTooLarge { bound_ns, allowance_ns });
+        }
+        let carries = match window.kind {
+            Kind::Slot { .. } => carries,
+            Kind::Synchronisation { .. } if clock.synchronises(window.cycle) && carries == Carries::All => {
+                Carries::Time
+            }
+            Kind::Synchronisation { .. } => return Verdict::Idle,
+        };
+        let Planned { begin_ns, end_ns, .. } = planned;
+        Verdict::Send(Permit::new(window, begin_ns, end_ns, carries, self.lead.ns(), *self.table.wire()))
+    }
+}

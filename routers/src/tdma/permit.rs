@@ -1,0 +1,95 @@
+//! One window being used: what still fits in it.
+
+use super::table::{Kind, Window};
+use super::wire::Wire;
+use crate::broken::broken;
+use crate::time::Allowed;
+
+/// What a window may be used for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Carries {
+    /// Datagrams of time alone: it is a synchronisation window, or the node knows the time by others' Syncs only.
+    Time,
+    /// All that waits, time first.
+    All,
+}
+
+/// The wire is this node's, from `begin_ns` to `end_ns`.
+#[derive(Clone, Debug)]
+pub struct Permit {
+    /// Which window, in system time.
+    pub window: Window,
+    /// From when on, local ns.
+    pub begin_ns: u64,
+    /// Until when, local ns: here the guard begins.
+    pub end_ns: u64,
+    /// For what.
+    pub carries: Carries,
+    /// From the call to the wire, ns.
+    pub(super) lead_ns: u64,
+    pub(super) wire: Wire,
+    /// When the wire has carried what was handed over, local ns.
+    free_ns: u64,
+    datagrams: u64,
+    wire_bytes: u64,
+}
+
+impl Permit {
+    pub(super) fn new(window: Window, begin_ns: u64, end_ns: u64, carries: Carries, lead_ns: u64, wire: Wire) -> Self {
+        Self { window, begin_ns, end_ns, carries, lead_ns, wire, free_ns: begin_ns, datagrams: 0, wire_bytes: 0 }
+    }
+
+    /// The largest datagram that would be off the wire before the guard if it were handed over now, in bytes. None: nothing fits.
+    pub fn room_bytes(&self, now_ns: u64) -> Option<usize> {
+        let starts_ns = self.starts_ns(now_ns);
+        self.wire.datagram_bytes_in(self.end_ns.checked_sub(starts_ns)?)
+    }
+
+    /// Whether a datagram of this size would be off the wire before the guard.
+    pub fn fits(&self, now_ns: u64, datagram_bytes: usize) -> bool {
+        self.room_bytes(now_ns).is_some_and(|room_bytes| datagram_bytes <= room_bytes)
+    }
+
+    /// A datagram is being handed over now.
+    pub fn takes(&mut self, now_ns: u64, datagram_bytes: usize) {
+        self.free_ns = self.starts_ns(now_ns).saturating_add(self.wire.ns(datagram_bytes));
+        self.datagrams += 1;
+        self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
+    }
+
+    /// When a datagram is on the wire that is handed over now: not before those that were.
+    fn starts_ns(&self, now_ns: u64) -> u64 {
+        let at_once_ns = now_ns.saturating_add(self.lead_ns);
+        if broken!(ForgetsHandedOver) { at_once_ns } else { self.free_ns.max(at_once_ns) }
+    }
+
+    /// Datagrams so far.
+    pub fn datagrams(&self) -> u64 {
+        self.datagrams
+    }
+
+    /// Bytes on the wire so far, all heads counted.
+    pub fn wire_bytes(&self) -> u64 {
+        self.wire_bytes
+    }
+
+    /// What the clock may send in it now.
+    pub fn allowed(&self) -> Allowed {
+        self.allowed_from(0)
+    }
+
+    /// The same, but the clock waits with what is stamped until the wire is free: see [`Allowed`]. Worth it where datagrams queue up behind
+    /// their stamps, in a network card.
+    pub fn spaced(&self) -> Allowed {
+        self.allowed_from(self.free_ns.saturating_sub(self.lead_ns))
+    }
+
+    fn allowed_from(&self, free_ns: u64) -> Allowed {
+        match self.window.kind {
+            Kind::Synchronisation { .. } => {
+                Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns, free_ns }
+            }
+            Kind::Slot { .. } => Allowed::Slot { free_ns },
+        }
+    }
+}

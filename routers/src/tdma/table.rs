@@ -1,0 +1,279 @@
+//! The slot table of a system, as one node reads it: arithmetic over system time, and nothing that remembers.
+//!
+//! ```text
+//!  cycle n begins at n × cycle                                                                                cycle n + 1
+//!  ├── rank 0 ───┬── rank 1 ───┬─ … ─┬──── slot ─────────┬── slot ───────┬─ nobody's ─┬──── slot ────────┬─ … ─┤
+//!  │ send  guard │ send  guard │     │ send        guard │ send    guard │            │ send       guard │
+//! ```
+//!
+//! A *window* is what one node may send in, without a pause: that of its synchronisation, or a slot. Here it ends where its guard begins.
+//! The owner of the table has seen to it that windows do not overlap (`rohrpost check`).
+
+use super::wire::Wire;
+use crate::broken::broken;
+use crate::frame::NodeIndex;
+use crate::time::{InSlots, TIME_BYTES};
+use rohrpost_config::Tdma;
+use std::time::Duration;
+
+/// What a window is for.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Kind {
+    /// Of the synchronisation of the master that stands at this place in their order.
+    Synchronisation {
+        /// From 0.
+        rank: u8,
+    },
+    /// The slot with this place in [`Tdma::slots`].
+    Slot {
+        /// From 0.
+        index: u16,
+    },
+}
+
+/// When one node may send, in system time.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Window {
+    /// What for.
+    pub kind: Kind,
+    /// Counts cycles of system time since 1970.
+    pub cycle: u64,
+    /// The first frame is on the wire no earlier than this, system ns.
+    pub begin_ns: u64,
+    /// The last frame is off the wire by now, system ns: here the guard begins.
+    pub end_ns: u64,
+}
+
+/// Whose a moment is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Owner {
+    /// The node.
+    pub node: NodeIndex,
+    /// Which window of its.
+    pub window: Window,
+    /// The window is over: it is the guard behind it.
+    pub is_guard: bool,
+}
+
+/// What of time fits in the windows of a system: the rule by which clocks send, for `check` and for the analysis of bounds.
+///
+/// In each of its synchronisation windows the master sends a Sync to every other node. If the window has room for twice as many frames,
+/// a warm-up goes before each of them; if it has room for a Reply to each besides, Replies go there too, and nowhere else; otherwise in slots of the
+/// master, before all else. A slave sends a warm-up and a Request in a slot, before all else, at most once in a cycle; who hears no master a
+/// Request to each master. All these are datagrams of [`TIME_BYTES`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TimeShare {
+    /// Frames of time that a synchronisation window has room for.
+    pub frames_in_synchronisation: usize,
+    /// A warm-up goes before each Sync.
+    pub warm_ups: bool,
+    /// Replies go in the synchronisation window alone.
+    pub replies_in_synchronisation: bool,
+    /// Every other node gets a Sync in each cycle. If not, some do in turns, and all others miss some: too few to rely on.
+    pub suffices: bool,
+    /// Frames of time at most in each slot of a node.
+    pub frames_in_slot: usize,
+}
+
+/// The slots of a system, and which of its windows are this node's.
+#[derive(Clone, Debug)]
+pub struct Table {
+    own: NodeIndex,
+    nodes: u8,
+    masters: Vec<NodeIndex>,
+    cycle_ns: u64,
+    synchronisation_ns: u64,
+    guard_ns: u64,
+    wire: Wire,
+    slots: Vec<Slot>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    node: NodeIndex,
+    offset_ns: u64,
+    length_ns: u64,
+    period: u64,
+    phase: u64,
+}
+
+impl Table {
+    /// The table of `nodes` nodes as `own` reads it. `masters` in their order. `heads_bytes`: what IP and UDP put before each datagram,
+    /// see [`Settings::overhead_bytes`](crate::settings::Settings::overhead_bytes).
+    pub fn new(tdma: &Tdma, masters: &[NodeIndex], own: NodeIndex, nodes: u8, heads_bytes: usize) -> Self {
+        let slots = tdma.slots.iter().map(|slot| Slot {
+            node: slot.node,
+            offset_ns: ns(slot.offset),
+            length_ns: ns(slot.length),
+            period: u64::from(slot.period.max(1)),
+            phase: u64::from(slot.phase % slot.period.max(1)),
+        });
+        Self {
+            own,
+            nodes,
+            masters: masters.to_vec(),
+            cycle_ns: ns(tdma.cycle).max(1),
+            synchronisation_ns: ns(tdma.synchronisation),
+            guard_ns: ns(tdma.guard),
+            wire: Wire::new(tdma, heads_bytes),
+            slots: slots.collect(),
+        }
+    }
+
+    /// The node that reads it.
+    pub fn own(&self) -> NodeIndex {
+        self.own
+    }
+
+    /// Its place among the masters.
+    pub fn rank(&self) -> Option<u8> {
+        self.masters.iter().position(|master| *master == self.own).map(|rank| rank as u8)
+    }
+
+    /// From the beginning of one cycle to that of the next, ns.
+    pub fn cycle_ns(&self) -> u64 {
+        self.cycle_ns
+    }
+
+    /// The end of each window that is kept free, ns.
+    pub fn guard_ns(&self) -> u64 {
+        self.guard_ns
+    }
+
+    /// A node may send while its clock is off by so much at most, ns: with another that is off as much the other way, it is the guard.
+    pub fn allowance_ns(&self) -> u64 {
+        self.guard_ns / 2
+    }
+
+    /// The first window of this node that begins at `from_ns`, system time, or later. None if it has none.
+    pub fn next_window(&self, from_ns: u64) -> Option<Window> {
+        let windows = self.next_slot(from_ns).into_iter().chain(self.next_synchronisation(from_ns));
+        windows.min_by_key(|window| window.begin_ns)
+    }
+
+    /// The first slot of this node that begins at `from_ns`, system time, or later. None if it has none.
+    pub fn next_slot(&self, from_ns: u64) -> Option<Window> {
+        let slots = self.own_slots().filter_map(|(index, slot)| {
+            let cycle = slot.cycle_from(self.cycles_begun(from_ns, slot.offset_ns));
+            self.slot_window(index, slot, cycle)
+        });
+        slots.min_by_key(|window| window.begin_ns)
+    }
+
+    /// The first window of this node's synchronisation that begins at `from_ns`, system time, or later. None if it is no master.
+    pub fn next_synchronisation(&self, from_ns: u64) -> Option<Window> {
+        let rank = self.rank()?;
+        let offset_ns = u64::from(rank) * self.synchronisation_ns;
+        self.synchronisation(rank, self.cycles_begun(from_ns, offset_ns))
+    }
+
+    /// How many windows of this node there are in a cycle at most: slots, and that of its synchronisation.
+    pub fn own_windows_of_cycle(&self) -> u64 {
+        self.own_slots().count() as u64 + u64::from(self.rank().is_some())
+    }
+
+    /// How many slots of this node begin from `from_ns` on and before `to_ns`, system time.
+    pub fn slots_between(&self, from_ns: u64, to_ns: u64) -> u64 {
+        let slots = self.own_slots().map(|(_, slot)| {
+            let begun = |at_ns| {
+                let cycles = self.cycles_begun(at_ns, slot.offset_ns);
+                cycles.saturating_sub(slot.phase).div_ceil(slot.period)
+            };
+            begun(to_ns).saturating_sub(begun(from_ns))
+        });
+        slots.sum()
+    }
+
+    /// How many cycles have what lies at this offset before a moment.
+    fn cycles_begun(&self, before_ns: u64, offset_ns: u64) -> u64 {
+        before_ns.saturating_sub(offset_ns).div_ceil(self.cycle_ns)
+    }
+
+    /// Whose a moment of system time is; nobody's between slots.
+    pub fn owner(&self, system_ns: u64) -> Option<Owner> {
+        let (cycle, in_cycle_ns) = (system_ns / self.cycle_ns, system_ns % self.cycle_ns);
+        let rank = in_cycle_ns.checked_div(self.synchronisation_ns).filter(|rank| *rank < self.masters.len() as u64);
+        let (node, window) = match rank {
+            Some(rank) => (self.masters[rank as usize], self.synchronisation(rank as u8, cycle)?),
+            None => {
+                let mut slots = self.slots.iter().enumerate();
+                let (index, slot) = slots.find(|(_, slot)| slot.holds(cycle, in_cycle_ns))?;
+                (slot.node, self.slot_window(index, slot, cycle)?)
+            }
+        };
+        Some(Owner { node, window, is_guard: system_ns >= window.end_ns })
+    }
+
+    /// The link that all nodes share.
+    pub fn wire(&self) -> &Wire {
+        &self.wire
+    }
+
+    /// What of time goes in which windows.
+    pub fn time_share(&self) -> TimeShare {
+        let sends_ns = self.synchronisation_ns.saturating_sub(self.guard_ns);
+        let fits = self.wire.bytes_in(sends_ns) / self.wire.bytes(TIME_BYTES);
+        let others = usize::from(self.nodes.saturating_sub(1));
+        let replies_in_synchronisation = fits >= 3 * others;
+        let replies = if replies_in_synchronisation { 0 } else { others };
+        TimeShare {
+            frames_in_synchronisation: fits,
+            warm_ups: fits >= 2 * others,
+            replies_in_synchronisation,
+            suffices: fits >= others,
+            frames_in_slot: replies.max(2).max(self.masters.len()),
+        }
+    }
+
+    /// What a clock in time slots has to know of them.
+    pub fn for_clock(&self) -> InSlots {
+        let share = self.time_share();
+        InSlots {
+            warm_ups: share.warm_ups,
+            replies_in_synchronisation: share.replies_in_synchronisation,
+            delay_max_ns: self.guard_ns / 4,
+        }
+    }
+
+    fn own_slots(&self) -> impl Iterator<Item = (usize, &Slot)> {
+        self.slots.iter().enumerate().filter(|(_, slot)| slot.node == self.own)
+    }
+
+    fn synchronisation(&self, rank: u8, cycle: u64) -> Option<Window> {
+        self.window(
+            Kind::Synchronisation { rank },
+            cycle,
+            u64::from(rank) * self.synchronisation_ns,
+            self.synchronisation_ns,
+        )
+    }
+
+    fn slot_window(&self, index: usize, slot: &Slot, cycle: u64) -> Option<Window> {
+        self.window(Kind::Slot { index: index as u16 }, cycle, slot.offset_ns, slot.length_ns)
+    }
+
+    /// None after the year 2554.
+    fn window(&self, kind: Kind, cycle: u64, offset_ns: u64, length_ns: u64) -> Option<Window> {
+        let begin_ns = cycle.checked_mul(self.cycle_ns)?.checked_add(offset_ns)?;
+        let guard_ns = if broken!(IgnoresGuard) { 0 } else { self.guard_ns };
+        let end_ns = begin_ns.checked_add(length_ns.saturating_sub(guard_ns))?;
+        Some(Window { kind, cycle, begin_ns, end_ns })
+    }
+}
+
+impl Slot {
+    /// The first cycle from this one on that has it.
+    fn cycle_from(&self, cycle: u64) -> u64 {
+        let ahead = (self.phase + self.period - cycle % self.period) % self.period;
+        cycle.saturating_add(ahead)
+    }
+
+    fn holds(&self, cycle: u64, in_cycle_ns: u64) -> bool {
+        let is_there = cycle % self.period == self.phase;
+        is_there && in_cycle_ns >= self.offset_ns && in_cycle_ns - self.offset_ns < self.length_ns
+    }
+}
+
+fn ns(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,39 @@
+//! The table by properties, the discipline by scenes; and each mistake must be seen by one of the checks.
+
+mod arithmetic;
+mod scenes;
+mod single;
+mod world;
+
+use crate::broken::{Broken, with};
+
+/// Checks that hold; with each mistake one of them fails.
+const CHECKS: [fn(); 10] = [
+    arithmetic::windows_end_where_their_guard_begins,
+    single::what_is_late_is_not_sent,
+    single::silence_begins_right_above_the_allowance,
+    single::no_frame_starts_before_its_slot,
+    single::what_was_handed_over_counts,
+    single::a_replacement_is_a_sign_of_life_and_nothing_else,
+    single::who_turns_while_the_first_master_lives_is_not_sure,
+    scenes::nodes_join_one_by_one_and_never_meet,
+    scenes::a_master_dies_and_no_slot_is_lost,
+    scenes::two_masters_become_one,
+];
+
+#[test]
+fn all_checks_hold() {
+    CHECKS.into_iter().for_each(|check| check());
+}
+
+#[test]
+fn every_mistake_is_noticed() {
+    let mut missed = Vec::new();
+    for broken in Broken::SLOTS {
+        let notices = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
+        if !CHECKS.iter().any(notices) {
+            missed.push(broken);
+        }
+    }
+    assert_eq!(missed, []);
+}

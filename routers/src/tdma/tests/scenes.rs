@@ -1,0 +1,152 @@
+//! What may happen to three nodes on one wire.
+
+use super::world::{CYCLE, MS, SECOND, US, World};
+use crate::frame::NodeIndex;
+use crate::tdma::Silent;
+use crate::time::Role;
+
+/// How many seeds each scene is run with: `ROHRPOST_TIME_SEEDS`, else a few.
+fn seeds() -> std::ops::Range<u64> {
+    let asked = std::env::var("ROHRPOST_TIME_SEEDS").ok().and_then(|seeds| seeds.parse().ok());
+    0..asked.unwrap_or(3)
+}
+
+/// Three nodes that agree.
+fn agreed(seed: u64) -> World {
+    let mut world = World::new(seed);
+    world.start_all();
+    assert!(world.run_until(2 * SECOND, World::agrees), "seed {seed}: no agreement at first: {}", tell(&world));
+    world.run(SECOND);
+    world
+}
+
+fn tell(world: &World) -> String {
+    let node = |node: NodeIndex| {
+        let clock = world.nodes[usize::from(node)].clock.as_ref()?;
+        Some(format!(
+            "{node}: {:?} of {:?}, {:?}, {:?}\n",
+            clock.role(),
+            clock.term(),
+            world.silent(node),
+            world.counts(node)
+        ))
+    };
+    (0..3).filter_map(node).collect()
+}
+
+fn holds(world: &World, seed: u64) {
+    world.assert_alone(&format!("seed {seed}; {}", tell(world)));
+}
+
+pub(super) fn nodes_join_one_by_one_and_never_meet() {
+    for seed in seeds() {
+        let mut world = World::new(seed);
+        world.stalls = 50;
+        for node in [0, 2, 1] {
+            world.start(node);
+            world.run(SECOND);
+        }
+        world.run(4 * SECOND);
+        assert!(world.agrees(), "seed {seed}: {}", tell(&world));
+        holds(&world, seed);
+        let counts = world.counts(2);
+        assert!(counts.late > 0 && counts.used > 500, "seed {seed}: {counts:?}");
+        // A master's Syncs leave in its window alone; each cycle has one for each other node.
+        let first = world.counts(0).syncs;
+        assert!(first.sent > 900 && first.replacements_sent == 0, "seed {seed}: {first:?}");
+    }
+}
+
+pub(super) fn a_master_dies_and_no_slot_is_lost() {
+    for seed in seeds() {
+        let mut world = agreed(seed);
+        assert_eq!(world.counts(1).syncs.replacements_sent, 0, "seed {seed}: the master was heard each time");
+        let before = [world.counts(1), world.counts(2)];
+        let (died, term) = (world.now, world.clock(1).term());
+        world.kill(0);
+        let replaced = |world: &World| world.counts(1).syncs.replacements_sent > 0;
+        assert!(world.run_until(CYCLE + MS, replaced), "seed {seed}: no replacement");
+        assert_eq!(world.clock(2).term(), term, "the role has not changed yet");
+        assert!(world.run_until(5 * CYCLE, |world| world.clock(1).role() == Role::Master), "seed {seed}: no takeover");
+        // The last Sync came up to a cycle before.
+        assert!(world.now - died >= 5 * CYCLE / 2, "seed {seed}: too soon");
+        world.run(SECOND);
+        assert!(world.agrees(), "seed {seed}: {}", tell(&world));
+        for (node, before) in [(1, before[0]), (2, before[1])] {
+            let counts = world.counts(node);
+            let lost = (counts.silent - before.silent, counts.skipped - before.skipped, counts.late - before.late);
+            assert_eq!(lost, (0, 0, 0), "seed {seed}: node {node}: {}", tell(&world));
+        }
+        let heard = world.counts(2).syncs.replacements_heard;
+        assert!((1..=4).contains(&heard), "seed {seed}: {heard} replacements heard");
+        // Who comes back listens first, and is a slave.
+        world.start(0);
+        world.run(SECOND);
+        assert!(world.agrees() && world.clock(1).role() == Role::Master, "seed {seed}: {}", tell(&world));
+        holds(&world, seed);
+    }
+}
+
+pub(super) fn two_masters_become_one() {
+    for seed in seeds() {
+        let mut world = agreed(seed);
+        for other in [0, 2] {
+            (world.cut[1][other], world.cut[other][1]) = (true, true);
+        }
+        // 0.4 ms apart in the end.
+        world.warms(1, 20_000);
+        world.run(20 * SECOND);
+        let masters = |world: &World| (0..2).filter(|node| world.clock(*node).role() == Role::Master).count();
+        assert_eq!(masters(&world), 2, "seed {seed}: both sides have one");
+        world.cut = [[false; 3]; 3];
+        assert!(world.run_until(3 * CYCLE, |world| masters(world) == 1), "seed {seed}: {}", tell(&world));
+        world.run(CYCLE);
+        world.collisions.clear();
+        world.run(10 * SECOND);
+        assert!(world.agrees(), "seed {seed}: {}", tell(&world));
+        // Whoever yields is silent until it has measured.
+        holds(&world, seed);
+    }
+}
+
+#[test]
+fn a_node_that_hears_nobody_holds_over_then_falls_silent() {
+    for seed in seeds() {
+        let mut world = agreed(seed);
+        // The longer it has measured, the surer it is of the rate.
+        world.run(10 * SECOND);
+        (world.cut[0][2], world.cut[1][2]) = (true, true);
+        let silent = |world: &World| matches!(world.silent(2), Some(Silent::BoundTooLarge { .. }));
+        assert!(!world.run_until(2 * SECOND, silent), "seed {seed}: it holds over");
+        assert!(world.run_until(200 * SECOND, silent), "seed {seed}: it never falls silent");
+        let used = world.counts(2).used;
+        world.run(SECOND);
+        assert_eq!(world.counts(2).used, used, "seed {seed}");
+        world.cut = [[false; 3]; 3];
+        assert!(world.run_until(SECOND, |world| world.silent(2).is_none()), "seed {seed}: {}", tell(&world));
+        holds(&world, seed);
+    }
+}
+
+#[test]
+fn a_master_that_stands_still_is_replaced_and_follows() {
+    for seed in seeds() {
+        let mut world = agreed(seed);
+        world.nodes[0].frozen_until = world.now + 100 * MS;
+        world.run(2 * SECOND);
+        assert!(world.agrees() && world.clock(1).role() == Role::Master, "seed {seed}: {}", tell(&world));
+        holds(&world, seed);
+    }
+}
+
+#[test]
+fn in_quiet_times_frames_start_where_slots_do() {
+    let mut world = agreed(3);
+    let begins = world.wire.len();
+    world.run(2 * SECOND);
+    let counts = world.counts(2);
+    assert!(counts.used > 400 && world.wire[begins..].iter().any(|frame| frame.from == 2 && !frame.is_time));
+    let lead = world.nodes[2].discipline.lead_ns();
+    assert!(lead.1 >= 3 * US && lead.1 <= lead.0, "{lead:?}");
+    holds(&world, 3);
+}

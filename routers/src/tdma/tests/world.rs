@@ -1,0 +1,344 @@
+//! A few nodes in time slots on one wire, in virtual time from a seed. Each sends as much as fits in its slots; it knows what was on the
+//! wire when, and whether two were at once.
+
+use crate::frame::{FrameHead, NodeIndex};
+use crate::tdma::{Carries, Counts, Discipline, Next, Planned, Silent, Table, Verdict};
+use crate::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rohrpost_config::{Tdma, TimeSlot};
+use rohrpost_mailbox::TimeRecord;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+pub(super) const US: u64 = 1_000;
+pub(super) const MS: u64 = 1_000_000;
+pub(super) const SECOND: u64 = 1_000 * MS;
+pub(super) const CYCLE: u64 = 5 * MS;
+const WALL_NS: u64 = 1_790_000_000 * SECOND;
+/// Heads of IP and UDP.
+pub(super) const HEADS: usize = 28;
+const DATAGRAM_BYTES: usize = 600;
+
+/// Three nodes, of which the first two may be master, with a slot in each cycle; node 2 has another in every third.
+pub(super) fn tdma() -> Tdma {
+    let slot = |node, offset_us, length_us, period, phase| TimeSlot {
+        node,
+        offset: Duration::from_micros(offset_us),
+        length: Duration::from_micros(length_us),
+        period,
+        phase,
+        line: 0,
+    };
+    Tdma {
+        cycle: Duration::from_nanos(CYCLE),
+        synchronisation: Duration::from_micros(300),
+        guard: Duration::from_micros(150),
+        link_bytes_s: 12_500_000,
+        slots: vec![
+            slot(0, 600, 500, 1, 0),
+            slot(1, 1_100, 500, 1, 0),
+            slot(2, 1_600, 500, 1, 0),
+            slot(2, 3_000, 400, 3, 1),
+        ],
+        tunnel: None,
+        line: 0,
+    }
+}
+
+pub(super) const MASTERS: [NodeIndex; 2] = [0, 1];
+
+pub(super) fn table(own: NodeIndex) -> Table {
+    Table::new(&tdma(), &MASTERS, own, 3, HEADS)
+}
+
+/// A frame that was on the wire, in true time; its gap is counted.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct OnWire {
+    pub(super) from: NodeIndex,
+    pub(super) begin: u64,
+    pub(super) end: u64,
+    pub(super) is_time: bool,
+}
+
+struct Letter {
+    arrives: u64,
+    bytes: [u8; TIME_BYTES],
+}
+
+pub(super) struct One {
+    pub(super) clock: Option<Clock>,
+    pub(super) discipline: Discipline,
+    offset_ns: u64,
+    rate_ppb: i64,
+    page: Option<TimeRecord>,
+    /// When it acts next, true time, and for which window.
+    wakes: u64,
+    planned: Option<Planned>,
+    came: VecDeque<Letter>,
+    /// It stands still until then.
+    pub(super) frozen_until: u64,
+}
+
+impl One {
+    pub(super) fn local_ns(&self, true_ns: u64) -> u64 {
+        let fast = i128::from(true_ns) * i128::from(self.rate_ppb) / 1_000_000_000;
+        (i128::from(true_ns) + fast) as u64 + self.offset_ns
+    }
+
+    /// The first true moment at which it shows this.
+    fn true_ns(&self, local_ns: u64) -> u64 {
+        let even = i128::from(local_ns.saturating_sub(self.offset_ns));
+        let mut at = (even * 1_000_000_000 / (1_000_000_000 + i128::from(self.rate_ppb)) - 2).max(0) as u64;
+        while self.local_ns(at) < local_ns {
+            at += 1;
+        }
+        at
+    }
+}
+
+pub(super) struct World {
+    pub(super) now: u64,
+    pub(super) nodes: Vec<One>,
+    pub(super) wire: Vec<OnWire>,
+    pub(super) cut: [[bool; 3]; 3],
+    /// Two that were on the wire at once.
+    pub(super) collisions: Vec<(OnWire, OnWire)>,
+    /// Moments at which some node sent packages by a time that may be too far off.
+    pub(super) unsure: u32,
+    /// One wake-up in so many comes up to 3 ms late; 0: none does.
+    pub(super) stalls: u32,
+    /// What is stamped waits until the wire is free.
+    pub(super) spaced: bool,
+    random: ChaCha8Rng,
+}
+
+impl World {
+    pub(super) fn new(seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let nodes = (0..3).map(|own| One {
+            clock: None,
+            discipline: Discipline::new(table(own), 0),
+            offset_ns: random.random_range(SECOND..100 * SECOND),
+            rate_ppb: random.random_range(-80_000..=80_000),
+            page: None,
+            wakes: u64::MAX,
+            planned: None,
+            came: VecDeque::new(),
+            frozen_until: 0,
+        });
+        let nodes = nodes.collect();
+        let (wire, collisions) = (Vec::new(), Vec::new());
+        Self {
+            now: SECOND,
+            nodes,
+            wire,
+            cut: [[false; 3]; 3],
+            collisions,
+            unsure: 0,
+            stalls: 0,
+            spaced: seed.is_multiple_of(2),
+            random,
+        }
+    }
+
+    pub(super) fn start(&mut self, node: NodeIndex) {
+        let settings = TimeSettings {
+            system: 1,
+            own: node,
+            nodes: 3,
+            masters: MASTERS.to_vec(),
+            interval: Duration::from_nanos(CYCLE),
+            digest: 7,
+            incarnation: self.random.random_range(1..u64::MAX),
+        };
+        let wall_ns = WALL_NS + self.random.random_range(0..SECOND) + self.now;
+        let one = &mut self.nodes[usize::from(node)];
+        let table = table(node);
+        let clock = Clock::new(settings, one.local_ns(self.now), wall_ns, one.page).in_slots(table.for_clock());
+        one.clock = Some(clock);
+        one.discipline = Discipline::new(table, 0);
+        (one.wakes, one.planned) = (self.now, None);
+        one.came.clear();
+    }
+
+    pub(super) fn start_all(&mut self) {
+        (0..3).for_each(|node| self.start(node));
+    }
+
+    pub(super) fn kill(&mut self, node: NodeIndex) {
+        let one = &mut self.nodes[usize::from(node)];
+        one.page = one.clock.take().map(|clock| *clock.record());
+    }
+
+    /// From now on a node's clock is faster by so much.
+    pub(super) fn warms(&mut self, node: NodeIndex, by_ppb: i64) {
+        let now = self.now;
+        let one = &mut self.nodes[usize::from(node)];
+        let shows_ns = one.local_ns(now);
+        one.rate_ppb += by_ppb;
+        one.offset_ns -= one.local_ns(now) - shows_ns;
+    }
+
+    pub(super) fn clock(&self, node: NodeIndex) -> &Clock {
+        self.nodes[usize::from(node)].clock.as_ref().unwrap()
+    }
+
+    pub(super) fn counts(&self, node: NodeIndex) -> Counts {
+        self.nodes[usize::from(node)].discipline.counts(self.clock(node))
+    }
+
+    pub(super) fn silent(&self, node: NodeIndex) -> Option<Silent> {
+        self.nodes[usize::from(node)].discipline.silent()
+    }
+
+    /// All that live send, and by one master.
+    pub(super) fn agrees(&self) -> bool {
+        let alive = || (0..3).filter(|node| self.nodes[usize::from(*node)].clock.is_some());
+        let masters = alive().filter(|node| self.clock(*node).role() == Role::Master).count();
+        let term = |node| self.clock(node).reading(0).term;
+        let first = alive().next().map(term);
+        masters == 1 && alive().all(|node| self.silent(node).is_none() && Some(term(node)) == first)
+    }
+
+    /// Nobody met anybody on the wire since it was emptied last, and nobody sent who was not sure.
+    pub(super) fn assert_alone(&self, told: &str) {
+        let (met, first) = (self.collisions.len(), self.collisions.first());
+        assert!(met == 0 && self.unsure == 0, "{met} met, {} unsure: {first:?}; {told}", self.unsure);
+    }
+
+    pub(super) fn run_until(&mut self, within: u64, until: impl Fn(&Self) -> bool) -> bool {
+        let end = self.now + within;
+        while self.now < end && !until(self) {
+            self.step();
+        }
+        until(self)
+    }
+
+    pub(super) fn run(&mut self, for_ns: u64) {
+        self.run_until(for_ns, |_| false);
+    }
+
+    fn step(&mut self) {
+        let alive = self.nodes.iter().enumerate().filter(|(_, one)| one.clock.is_some());
+        let Some((node, acts)) =
+            alive.map(|(node, one)| (node, one.wakes.max(one.frozen_until))).min_by_key(|next| next.1)
+        else {
+            self.now += MS;
+            return;
+        };
+        self.now = self.now.max(acts);
+        self.act(node as NodeIndex);
+    }
+
+    /// What the thread that sends does when it wakes up.
+    fn act(&mut self, node: NodeIndex) {
+        self.read(node);
+        let (now, planned) = (self.now, self.nodes[usize::from(node)].planned.take());
+        let one = &mut self.nodes[usize::from(node)];
+        let local_ns = one.local_ns(now);
+        let Some(clock) = &mut one.clock else { return };
+        if let Some(planned) = planned
+            && let Verdict::Send(permit) = one.discipline.judge(&planned, local_ns, clock)
+        {
+            self.send(node, permit);
+        }
+        let at = self.now;
+        let one = &mut self.nodes[usize::from(node)];
+        let local_ns = one.local_ns(at);
+        let Some(clock) = &mut one.clock else { return };
+        let until_ns = match clock.poll_in(local_ns, crate::time::Allowed::Nothing, &mut [0; TIME_BYTES]) {
+            Step::Wait { until_ns } => until_ns,
+            Step::Send { .. } => panic!("a clock in time slots sends when it may not"),
+        };
+        let (next, clock_ns) = (one.discipline.next(local_ns, clock), until_ns.max(local_ns + 10_000));
+        let (wakes_ns, planned) = match next {
+            // Who has woken up for a window spins until it is there.
+            Next::Window(planned) if planned.call_ns <= clock_ns + 100 * US => (planned.call_ns, Some(planned)),
+            Next::Window(_) => (clock_ns, None),
+            Next::Silent { until_ns, .. } => (until_ns.min(clock_ns), None),
+        };
+        let late = self.random.random_range(0..12 * US);
+        let stalls = self.stalls > 0 && self.random.random_ratio(1, self.stalls.max(1));
+        let late = if stalls { self.random.random_range(0..3 * MS) } else { late };
+        let one = &mut self.nodes[usize::from(node)];
+        one.wakes = one.true_ns(wakes_ns).max(at + 1) + late;
+        one.planned = planned;
+    }
+
+    /// Takes the datagrams of time that came, and their stamps.
+    fn read(&mut self, node: NodeIndex) {
+        let now = self.now;
+        let one = &mut self.nodes[usize::from(node)];
+        while let Some(letter) = one.came.pop_front_if(|letter| letter.arrives <= now) {
+            let came = Stamp { ns: one.local_ns(letter.arrives), doubt_ns: 100, by_kernel: true };
+            let (head, rest) = FrameHead::parse(&letter.bytes).unwrap();
+            let local_ns = one.local_ns(now);
+            let Some(clock) = &mut one.clock else { continue };
+            let _ = clock.handle(local_ns, came, &head, rest);
+        }
+    }
+
+    fn send(&mut self, node: NodeIndex, mut permit: crate::tdma::Permit) {
+        let (mut free, spaced) = (0, self.spaced);
+        loop {
+            let one = &mut self.nodes[usize::from(node)];
+            let local_ns = one.local_ns(self.now);
+            let Some(clock) = &mut one.clock else { return };
+            let mut bytes = [0; TIME_BYTES];
+            if !permit.fits(local_ns, TIME_BYTES) {
+                break;
+            }
+            let (to, stamp) =
+                match clock.poll_in(local_ns, if spaced { permit.spaced() } else { permit.allowed() }, &mut bytes) {
+                    Step::Send { to, stamp } => (to, stamp),
+                    Step::Wait { until_ns } if until_ns > local_ns && until_ns < permit.end_ns => {
+                        self.now = one.true_ns(until_ns);
+                        continue;
+                    }
+                    Step::Wait { .. } => break,
+                };
+            permit.takes(local_ns, TIME_BYTES);
+            let frame = self.put(node, TIME_BYTES, &mut free, true);
+            let one = &mut self.nodes[usize::from(node)];
+            let left = Stamp { ns: one.local_ns(frame.begin), doubt_ns: 100, by_kernel: true };
+            if let (Some(id), Some(clock)) = (stamp, &mut one.clock) {
+                clock.sent(id, left);
+            }
+            one.discipline.left(local_ns, left);
+            let arrives = frame.end + self.random.random_range(5 * US..25 * US);
+            if !self.cut[usize::from(node)][usize::from(to)] {
+                self.nodes[usize::from(to)].came.push_back(Letter { arrives, bytes });
+            }
+        }
+        while permit.carries == Carries::All {
+            let local_ns = self.nodes[usize::from(node)].local_ns(self.now);
+            if !permit.fits(local_ns, DATAGRAM_BYTES) {
+                break;
+            }
+            permit.takes(local_ns, DATAGRAM_BYTES);
+            self.put(node, DATAGRAM_BYTES, &mut free, false);
+        }
+        self.nodes[usize::from(node)].discipline.close(&permit);
+    }
+
+    /// Hands a datagram to the wire, which it reaches some µs later; and looks who else is there.
+    fn put(&mut self, from: NodeIndex, datagram_bytes: usize, free: &mut u64, is_time: bool) -> OnWire {
+        let reaches = self.now + self.random.random_range(4 * US..20 * US);
+        let begin = reaches.max(*free);
+        let end = begin + table(from).wire().ns(datagram_bytes);
+        *free = end;
+        self.now += 2 * US;
+        let frame = OnWire { from, begin, end, is_time };
+        let recent = self.wire.iter().rev().take(200);
+        let met = recent.copied().find(|other| other.from != from && other.begin < end && begin < other.end);
+        self.collisions.extend(met.map(|other| (other, frame)));
+        self.wire.push(frame);
+        let one = &self.nodes[usize::from(from)];
+        let bound_ns = one.clock.as_ref().and_then(Clock::reckoning).map(|own| own.bound_ns(one.local_ns(self.now)));
+        if !is_time && bound_ns.is_none_or(|bound_ns| bound_ns > 75 * US) {
+            self.unsure += 1;
+        }
+        frame
+    }
+}

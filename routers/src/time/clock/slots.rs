@@ -1,0 +1,301 @@
+//! A clock in time slots: what it may send is asked of it window by window, and the interval is the cycle.
+//!
+//! Syncs leave in the master's synchronisation window alone. Questions wait for a slot of the slave, answers for the master's next window.
+//! So from a Sync to the Request after it may be a cycle or more, in which both clocks drift: the sample of the exchange says so.
+
+use super::{Clock, Draft};
+use crate::broken::broken;
+use crate::frame::{FrameHead, NodeIndex};
+use crate::time::coarse::Coarse;
+use crate::time::election::State;
+use crate::time::message::Sync;
+use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES};
+use rohrpost_mailbox::TimeRecord;
+
+/// What of time may leave now.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Allowed {
+    /// Nothing: only what the passing of time does, with roles, page and bound.
+    Nothing,
+    /// It is a slot of this node: what asks and answers.
+    Slot {
+        /// What is stamped waits until then, local ns: when the wire has carried what was handed over before. Else it might stand in the
+        /// queue of a network card after its stamp, and the way seem longer than it is. 0: it does not wait.
+        free_ns: u64,
+    },
+    /// It is the window of this node's synchronisation.
+    Synchronisation {
+        /// Of this cycle.
+        cycle: u64,
+        /// When the window begins, system ns.
+        nominal_ns: u64,
+        /// As in a slot.
+        free_ns: u64,
+    },
+}
+
+impl Allowed {
+    fn free_ns(self) -> u64 {
+        match self {
+            Self::Nothing => 0,
+            Self::Slot { free_ns } | Self::Synchronisation { free_ns, .. } => free_ns,
+        }
+    }
+}
+
+/// What a clock in time slots remembers besides.
+#[derive(Debug)]
+pub(super) struct Slots {
+    settings: InSlots,
+    coarse: Coarse,
+    counts: SyncCounts,
+    /// The page goes by something else than what others go by now: a master that is not measured yet.
+    pub(super) unsure: bool,
+    /// What the master was off an earlier term when the page was made, ns: all its followers are so.
+    master_error_ns: u64,
+    /// The last cycles of which a Sync of the master came, and of which any did.
+    heard_cycle: u64,
+    lives_cycle: u64,
+    /// The cycle that is being synchronised, and who is next; whether the way to it is warm.
+    synced_cycle: u64,
+    next: usize,
+    is_warm: bool,
+    /// When this node was awake last, local ns.
+    advanced_ns: u64,
+}
+
+impl Slots {
+    /// The page goes by the master's time, which may be so far off that of an earlier term.
+    pub(super) fn goes_by(&mut self, master_error_ns: u64) {
+        (self.unsure, self.master_error_ns) = (false, master_error_ns);
+    }
+}
+
+/// What goes in a window.
+impl Clock {
+    /// From now on it sends only what it is asked for with [`Clock::poll_in`], and goes by the rules of time slots. The interval is the cycle.
+    /// For a clock that is new: it listens first, whatever its page says.
+    pub fn in_slots(mut self, settings: InSlots) -> Self {
+        self.election.asks_after(JOINING_SYNCS.into());
+        self.slots = Some(Box::new(Slots {
+            settings,
+            coarse: Coarse::default(),
+            counts: SyncCounts::default(),
+            unsure: true,
+            master_error_ns: 0,
+            heard_cycle: 0,
+            lives_cycle: 0,
+            synced_cycle: 0,
+            next: 0,
+            is_warm: false,
+            advanced_ns: 0,
+        }));
+        self.forget();
+        self
+    }
+
+    /// As [`Clock::poll`], of a clock in time slots: what may leave now. All that came is to be handed over before: a backup master
+    /// sends when it has not heard the master's Sync of this cycle. It may have to wait until the wire is free, within the window: until
+    /// then nothing else should be handed over. What has to wait for another window is not waited for.
+    pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
+        self.advance(now_ns);
+        let is_slot = matches!(allowed, Allowed::Slot { .. });
+        if is_slot && self.drafts.is_empty() && self.election.state() == State::Listening {
+            self.draft_hello(now_ns);
+        }
+        while let Some((to, draft)) = self.next_in(now_ns, allowed) {
+            if draft.is_stamped() && now_ns < allowed.free_ns() {
+                self.put_back(to, draft);
+                return Step::Wait { until_ns: allowed.free_ns() };
+            }
+            if let Some(stamp) = self.write(now_ns, to, draft, datagram) {
+                return Step::Send { to, stamp };
+            }
+        }
+        Step::Wait { until_ns: self.deadline_ns(now_ns) }
+    }
+
+    /// In time slots this node is awake at least once in a cycle.
+    pub(super) fn stood_still(&mut self, now_ns: u64) {
+        let Some(slots) = &mut self.slots else { return };
+        let before_ns = std::mem::replace(&mut slots.advanced_ns, now_ns);
+        if before_ns != 0 && now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
+            self.election.awakes(now_ns);
+        }
+    }
+
+    fn next_in(&mut self, now_ns: u64, allowed: Allowed) -> Option<(NodeIndex, Draft)> {
+        let replies_wait = self.slots.as_ref()?.settings.replies_in_synchronisation;
+        let is_reply = |draft: &Draft| matches!(draft, Draft::Reply { .. });
+        match allowed {
+            Allowed::Nothing => None,
+            Allowed::Synchronisation { cycle, nominal_ns, .. } => {
+                self.next_sync(now_ns, cycle, nominal_ns).or_else(|| self.take_draft(is_reply))
+            }
+            Allowed::Slot { .. } if broken!(SyncInForeignWindow) => {
+                let cycle = self.line.at(now_ns).ns / self.interval_ns;
+                let sync = self.next_sync(now_ns, cycle, cycle * self.interval_ns);
+                sync.or_else(|| self.take_draft(|_| true))
+            }
+            Allowed::Slot { .. } => self.take_draft(|draft| !(replies_wait && is_reply(draft))),
+        }
+    }
+
+    /// It was next, and is again.
+    fn put_back(&mut self, to: NodeIndex, draft: Draft) {
+        match (draft, &mut self.slots) {
+            (Draft::Sync { .. } | Draft::Replacement { .. }, Some(slots)) => {
+                (slots.next, slots.is_warm) = (slots.next - 1, true)
+            }
+            _ => self.drafts.push_front((to, draft)),
+        }
+    }
+
+    fn take_draft(&mut self, may_leave: impl Fn(&Draft) -> bool) -> Option<(NodeIndex, Draft)> {
+        let at = self.drafts.iter().position(|(_, draft)| may_leave(draft))?;
+        self.drafts.remove(at)
+    }
+
+    /// The next Sync of a cycle, or what goes before it; none when everyone has got one.
+    fn next_sync(&mut self, now_ns: u64, cycle: u64, nominal_ns: u64) -> Option<(NodeIndex, Draft)> {
+        let is_master = matches!(self.election.state(), State::Master(_));
+        if self.slots.as_ref()?.synced_cycle != cycle {
+            if !self.synchronises(cycle) {
+                return None;
+            }
+            let slots = self.slots.as_mut()?;
+            (slots.synced_cycle, slots.next, slots.is_warm) = (cycle, 0, false);
+            *(if is_master { &mut slots.counts.sent } else { &mut slots.counts.replacements_sent }) += 1;
+        }
+        let slots = self.slots.as_ref()?;
+        let to = self.receiver(cycle, slots.next)?;
+        let warms = slots.settings.warm_ups && is_master && !slots.is_warm;
+        let warms = warms && self.answers(&self.slaves[usize::from(to)], now_ns);
+        let slots = self.slots.as_mut()?;
+        slots.is_warm = warms;
+        if warms {
+            return Some((to, Draft::WarmUp));
+        }
+        slots.next += 1;
+        Some((to, if is_master { Draft::Sync { nominal_ns } } else { Draft::Replacement { nominal_ns } }))
+    }
+
+    /// Who gets the Sync at this place of a cycle: each time another one first, since the first finds the wire empty.
+    fn receiver(&self, cycle: u64, place: usize) -> Option<NodeIndex> {
+        let (nodes, own) = (u64::from(self.settings.nodes), u64::from(self.settings.own));
+        let others = nodes.saturating_sub(1);
+        // Counted from this node on, without it.
+        let after = (place as u64) < others;
+        after.then(|| ((own + 1 + (place as u64 + cycle % others) % others) % nodes) as NodeIndex)
+    }
+
+    pub(super) fn write_replacement(&mut self, now_ns: u64, nominal_ns: u64) -> Option<Sync> {
+        let State::Slave(master) = self.election.state() else { return None };
+        self.last_id += 1;
+        Some(Sync {
+            id: self.last_id,
+            cycle: nominal_ns / self.interval_ns,
+            nominal_ns,
+            sent_ns: self.line.at(now_ns).ns,
+            error_ns: self.line.error_ns(now_ns),
+            epoch: master.epoch,
+            term: master.term,
+            began: master.began,
+            followed: false,
+            replacement: true,
+        })
+    }
+}
+
+/// What came, as far as slots are concerned.
+impl Clock {
+    /// A Sync of a master that this node heard, or a later one: whether the present master has not fallen silent, so that the two are
+    /// masters at once. Then their times may be two.
+    pub(super) fn is_contested(&self, received_ns: u64) -> bool {
+        match self.election.state() {
+            State::Listening => false,
+            State::Slave(master) => received_ns.saturating_sub(master.heard_ns) < 3 * self.interval_ns,
+            State::Master(_) => true,
+        }
+    }
+
+    /// A Sync was taken.
+    pub(super) fn heard_in_slots(&mut self, received: Stamp, sync: &Sync, contested: bool, turned: bool) {
+        let Some(slots) = &mut self.slots else { return };
+        if turned {
+            slots.coarse.clear();
+            slots.heard_cycle = 0;
+        }
+        // A master that had no time begins another: to go on by the old one is to send in the slots of those who follow it.
+        let off_ns = sync.sent_ns.abs_diff(self.line.at(received.ns).ns);
+        let is_other = sync.epoch != self.line.record().epoch || off_ns > 2 * slots.settings.delay_max_ns;
+        slots.unsure |= (contested || (turned && is_other)) && !broken!(KeepsOwnTime);
+        slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
+        if slots.heard_cycle != 0 {
+            slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
+        }
+        (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
+        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+    }
+
+    /// Another sent in the master's place: the cycle lives. That the master was not heard remains as it is.
+    pub(super) fn replaced(&mut self, received: Stamp, head: &FrameHead, sync: &Sync) -> Result<(), Ignored> {
+        let (State::Slave(master), Some(slots)) = (self.election.state(), &mut self.slots) else {
+            return Err(Ignored::Late);
+        };
+        if sync.term != master.term || !self.election.stands_behind(head.from, sync.term) {
+            return Err(Ignored::Late);
+        }
+        self.election.replaced(received.ns);
+        slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
+        slots.lives_cycle = sync.cycle;
+        if broken!(ReplacementCalibrates) {
+            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+        }
+        Ok(())
+    }
+}
+
+/// What a node in time slots goes by.
+impl Clock {
+    /// By what a node in time slots goes. None if it has no time, or one that the present master has not confirmed.
+    pub fn reckoning(&self) -> Option<Reckoning> {
+        let slots = self.slots.as_ref().filter(|slots| !slots.unsure && self.line.is_synchronised())?;
+        let record = *self.line.record();
+        let error_ns = record.error_ns.saturating_sub(slots.master_error_ns);
+        Some(Reckoning::new(TimeRecord { error_ns, ..record }))
+    }
+
+    /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.
+    pub fn coarse(&self, now_ns: u64) -> Option<Reckoning> {
+        let slots = self.slots.as_ref()?;
+        slots.coarse.reckoning(now_ns, slots.settings.delay_max_ns)
+    }
+
+    /// How many Syncs of a master count for [`Clock::coarse`]; none if no master is heard.
+    pub fn joining(&self) -> Option<u8> {
+        let slots = self.slots.as_ref()?;
+        matches!(self.election.state(), State::Slave(_)).then(|| slots.coarse.heard())
+    }
+
+    /// Whether this node may have to send in its synchronisation windows.
+    pub fn may_synchronise(&self) -> bool {
+        match self.election.state() {
+            State::Master(_) => true,
+            State::Slave(master) => self.election.stands_behind(self.settings.own, master.term),
+            State::Listening => false,
+        }
+    }
+
+    /// Whether it has to, in that of this cycle: as the master, or in place of one whose Sync has not come.
+    pub fn synchronises(&self, cycle: u64) -> bool {
+        let is_master = matches!(self.election.state(), State::Master(_));
+        let is_missing = self.slots.as_ref().is_some_and(|slots| slots.lives_cycle < cycle);
+        is_master || ((is_missing || broken!(ReplacesHeard)) && self.may_synchronise())
+    }
+
+    /// What was sent and heard of synchronisation in time slots.
+    pub fn sync_counts(&self) -> SyncCounts {
+        self.slots.as_ref().map(|slots| slots.counts).unwrap_or_default()
+    }
+}

@@ -1,0 +1,70 @@
+//! The time of a node that cannot ask yet: by the Sync of the last eight that took the least time.
+
+use super::line::EVEN_PPB;
+use super::{RATE_MAX_PPB, Reckoning};
+use rohrpost_mailbox::{TimeRecord, TimeSource};
+
+/// So many Syncs a node hears before it sends anything.
+pub const JOINING_SYNCS: u8 = 8;
+const SYNCS: usize = JOINING_SYNCS as usize;
+
+/// When a Sync came, and what it said.
+#[derive(Clone, Copy, Debug, Default)]
+struct Came {
+    local_ns: u64,
+    system_ns: u64,
+}
+
+/// The last Syncs of one master.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Coarse {
+    syncs: [Came; SYNCS],
+    epoch: u64,
+    count: u8,
+    next: usize,
+}
+
+impl Coarse {
+    pub(super) fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    pub(super) fn heard(&self) -> u8 {
+        self.count
+    }
+
+    /// A Sync that said `system_ns` when it was handed over came at `local_ns`.
+    pub(super) fn add(&mut self, epoch: u64, system_ns: u64, local_ns: u64) {
+        if epoch != self.epoch {
+            *self = Self { epoch, ..Self::default() };
+        }
+        self.syncs[self.next] = Came { local_ns, system_ns };
+        self.next = (self.next + 1) % SYNCS;
+        self.count = (self.count + 1).min(JOINING_SYNCS);
+    }
+
+    /// The way is taken to last from nothing to `delay_max_ns`: that is an assumption.
+    pub(super) fn reckoning(&self, now_ns: u64, delay_max_ns: u64) -> Option<Reckoning> {
+        if self.count < JOINING_SYNCS {
+            return None;
+        }
+        let best = self.syncs.iter().max_by_key(|came| came.score(now_ns))?;
+        Some(Reckoning::new(TimeRecord {
+            epoch: self.epoch,
+            source: TimeSource::Master,
+            monotonic_ns: best.local_ns,
+            system_ns: best.system_ns,
+            pace_ppb: EVEN_PPB,
+            error_ns: delay_max_ns,
+            drift_ns_s: RATE_MAX_PPB.unsigned_abs(),
+        }))
+    }
+}
+
+impl Came {
+    /// What took long says that it is earlier than it is; what is old may have drifted.
+    fn score(&self, now_ns: u64) -> i128 {
+        let age_ns = i128::from(now_ns.saturating_sub(self.local_ns));
+        i128::from(self.system_ns) - i128::from(self.local_ns) - age_ns * i128::from(RATE_MAX_PPB) / 1_000_000_000
+    }
+}

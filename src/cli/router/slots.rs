@@ -1,0 +1,46 @@
+//! How it keeps its time slots, as a router publishes it.
+
+use rohrpost::interfaces::{SlotState, SlotUse};
+use rohrpost_routers::shell::Shell;
+use rohrpost_routers::shell::slots::{State, Used};
+use rohrpost_routers::tdma::Kind;
+
+/// How it stands now.
+pub(super) fn of(shell: &Shell, slots: &State) -> SlotState {
+    let (settings, seen) = (shell.settings(), slots.snapshot());
+    let (counts, syncs) = (seen.counts, seen.counts.syncs);
+    SlotState {
+        node: settings.nodes.get(usize::from(settings.own)).map(|node| node.name.clone()).unwrap_or_default(),
+        used: counts.used,
+        empty: counts.empty,
+        late: counts.late,
+        skipped: counts.skipped,
+        silent: counts.silent,
+        why_silent: seen.silent.map(|silent| silent.to_string()).unwrap_or_default(),
+        datagrams: counts.datagrams,
+        wire_bytes: counts.wire_bytes,
+        synchronisations_sent: syncs.sent,
+        replacements_sent: syncs.replacements_sent,
+        synchronisations_heard: syncs.heard,
+        replacements_heard: syncs.replacements_heard,
+        synchronisations_missed: syncs.missed,
+        roles: counts.roles,
+        lead_ns: seen.lead_ns.0,
+        scheduled: seen.granted.word().into(),
+        last: seen.windows.iter().flatten().map(used).collect(),
+    }
+}
+
+fn used(used: &Used) -> SlotUse {
+    SlotUse {
+        slot: match used.window.kind {
+            Kind::Slot { index } => Some(index),
+            Kind::Synchronisation { .. } => None,
+        },
+        begin_ns: used.window.begin_ns,
+        end_ns: used.window.end_ns,
+        off_ns: used.off_ns,
+        by_kernel: used.by_kernel,
+        datagrams: used.datagrams,
+    }
+}
