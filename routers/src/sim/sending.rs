@@ -161,7 +161,7 @@ impl Book {
     fn levels(&self, datagram: &[u8]) -> Option<(usize, usize)> {
         match Frame::parse(datagram) {
             Ok((_, Frame::Packages(packages))) => {
-                let levels = || packages.clone().map(|(head, _)| self.level(head.priority.0));
+                let levels = || packages.map(|(head, _)| self.level(head.priority.0));
                 Some((levels().min()?, levels().max()?))
             }
             Ok((_, Frame::Fragment(part))) => {
