@@ -60,8 +60,7 @@ const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 6] = [
 ];
 /// Mistakes that cannot show here, since each has something else before it; the tests of `fragment` and `tdma` see them. Heads in this
 /// simulation are never the same twice, copies of a part are dropped as datagrams, and who sends in a master's place is hardly off its time
-/// and harms nobody. The simulated thread asks anew when it wakes late, so that the late gate has nothing to do. Who waits
-/// for the pace though it is urgent breaks no promise but that of speed.
+/// and harms nobody. The late gate is tried in `tdma`. Who waits for the pace though it is urgent breaks no promise but that of speed.
 const UNSEEN: [Mistake; 6] = [
     Mistake::Packages(Broken::MixesPackages),
     Mistake::Packages(Broken::CountsPartsTwice),

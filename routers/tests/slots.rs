@@ -72,19 +72,20 @@ fn installation(plan: &Plan) -> Installation {
          router = { id = 250, text = \"Carries packages\" }\ntool = { id = 16, text = \"Programs run by hand\" }\n",
     );
     for class in [10, 40, 90, 140, 200] {
-        writeln!(text, "c{class} = {{ id = {class}, text = \"Some module\" }}").unwrap();
+        writeln!(text, "c{class} = {{ id = {class}, text = \"Some module\" }}").expect("a string takes it");
     }
     let masters: Vec<_> = plan.masters.iter().map(|node| format!("\"n{node}\"")).collect();
-    writeln!(text, "[time]\nsource = \"master\"\nmasters = [{}]", masters.join(", ")).unwrap();
+    writeln!(text, "[time]\nsource = \"master\"\nmasters = [{}]", masters.join(", ")).expect("a string takes it");
     for node in 0..plan.nodes.len() {
         let tools = (16 * node, 16 * node + 15);
         writeln!(text, "[nodes.n{node}]\naddress = \"10.77.0.{}\"\ntools = [{}, {}]", node + 1, tools.0, tools.1)
-            .unwrap();
+            .expect("a string takes it");
     }
     for (node, its) in plan.nodes.iter().enumerate() {
         for module in &its.modules {
             let name = format!("c{}.{node}", module.class().0);
-            writeln!(text, "[[module]]\nname = \"{name}\"\nnode = \"n{node}\"\nprogram = \"./it\"").unwrap();
+            writeln!(text, "[[module]]\nname = \"{name}\"\nnode = \"n{node}\"\nprogram = \"./it\"")
+                .expect("a string takes it");
         }
     }
     let mut installation =

@@ -24,6 +24,7 @@ pub struct Slotted {
     packages: Packages,
     time: Ticking,
     discipline: Discipline,
+    planned: Option<Planned>,
     /// Datagrams that left each socket.
     sent: [u64; PORTS],
     /// First datagrams of windows: socket, how many went before, and when they were handed over.
@@ -34,10 +35,10 @@ impl Slotted {
     /// A life that begins now, of these two.
     pub fn new(packages: Packages, time: Ticking, table: Table) -> Self {
         let (time, discipline) = (time.in_slots(&table), Discipline::new(table, SPIN_NS));
-        Self { packages, time, discipline, sent: [0; PORTS], firsts: VecDeque::new() }
+        Self { packages, time, discipline, planned: None, sent: [0; PORTS], firsts: VecDeque::new() }
     }
 
-    /// The next window, if it is not over yet.
+    /// It is time for a window.
     fn window(&mut self, io: &mut Io<'_>, planned: &Planned) {
         let verdict = self.discipline.judge(planned, io.now.monotonic_ns, self.time.clock());
         io.line(|| format!("{:?}: {verdict:?}", planned.window));
@@ -68,6 +69,10 @@ impl Slotted {
         }
         for sent in &io.sent[before..] {
             self.sent[sent.port] += 1;
+            if self.time.replaces_in_vain(sent) {
+                let text = format!("node {} sends in the place of a master that it has heard", io.node);
+                io.book.broken(io.now, Promise::OneMaster, text);
+            }
             if !is_sure && !asks(sent) {
                 let text = format!("node {} is not sure of the time, and sends more than questions", io.node);
                 io.book.broken(io.now, Promise::SilentWhenUnsure, text);
@@ -105,13 +110,27 @@ impl Layer for Slotted {
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
         let idle_ns = self.packages.tidy(io).min(self.time.poll_in(io, None));
+        let now_ns = io.now.monotonic_ns;
         let until_ns = loop {
-            let now_ns = io.now.monotonic_ns;
-            match self.discipline.next(now_ns, self.time.clock()) {
-                Next::Silent { until_ns, .. } => break until_ns,
-                Next::Window(planned) if now_ns < planned.wake_ns => break planned.wake_ns,
-                Next::Window(planned) if now_ns < planned.call_ns => break planned.call_ns,
-                Next::Window(planned) => self.window(io, &planned),
+            // Once awake for a window, the thread spins until its call.
+            match self.planned.filter(|planned| planned.wake_ns <= now_ns) {
+                Some(planned) if now_ns < planned.call_ns => break planned.call_ns,
+                Some(planned) => {
+                    self.planned = None;
+                    self.window(io, &planned);
+                }
+                None => match self.discipline.next(now_ns, self.time.clock()) {
+                    Next::Silent { until_ns, .. } => {
+                        self.planned = None;
+                        break until_ns;
+                    }
+                    Next::Window(planned) => {
+                        self.planned = Some(planned);
+                        if now_ns < planned.wake_ns {
+                            break planned.wake_ns;
+                        }
+                    }
+                },
             }
         };
         until_ns.min(idle_ns)

@@ -6,7 +6,8 @@ use super::plan::{Plan, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::tdma::{Permit, Table};
-use crate::time::{Allowed, Clock, Role, SentId, Stamp, Step, TIME_BYTES, TimeSettings};
+use crate::time::message::Message;
+use crate::time::{Allowed, Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -36,6 +37,8 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> TimeSettings {
 pub struct Ticking {
     clock: Clock,
     has_stamps: bool,
+    /// Term and cycle of the Sync that was heard last.
+    heard: (Term, u64),
     /// Which datagrams of this layer are to be stamped, by how many went before.
     awaited: VecDeque<(u64, SentId)>,
     sent: u64,
@@ -45,7 +48,7 @@ impl Ticking {
     /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
     pub fn new(settings: TimeSettings, now: Now, page: Option<TimeRecord>, has_stamps: bool) -> Self {
         let clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, page);
-        Self { clock, has_stamps, awaited: VecDeque::new(), sent: 0 }
+        Self { clock, has_stamps, heard: (Term::NONE, 0), awaited: VecDeque::new(), sent: 0 }
     }
 
     /// The same with time slots; all of its datagrams leave in windows.
@@ -76,6 +79,15 @@ impl Ticking {
                 }
                 (Step::Wait { until_ns }, _) => return until_ns,
             }
+        }
+    }
+
+    /// Whether a datagram is a Sync in the place of a master whose own of this cycle has come.
+    pub(super) fn replaces_in_vain(&self, sent: &Sent) -> bool {
+        let Ok((head, rest)) = FrameHead::parse(&sent.bytes) else { return false };
+        match Message::parse(head.kind, rest) {
+            Ok(Message::Sync(sync)) => sync.replacement && self.heard == (sync.term, sync.cycle),
+            _ => false,
         }
     }
 
@@ -110,6 +122,9 @@ impl Layer for Ticking {
         let taken = self.clock.handle(io.now.monotonic_ns, stamp, &head, rest);
         io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));
         io.book.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
+        if let (Ok(()), Ok(Message::Sync(sync))) = (taken, Message::parse(head.kind, rest)) {
+            self.heard = if sync.replacement { self.heard } else { (sync.term, sync.cycle) };
+        }
         self.look(io);
     }
 
