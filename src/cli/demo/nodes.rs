@@ -90,7 +90,7 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     if !kept.is_empty() {
         text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
         text += &slots::kept(&kept);
-        text += "\nFlows; seen: how old data were when they came to the mailbox:\n\n";
+        text += "\nFlows; seen: how old data were when they came to the mailbox (a slot that was late or skipped costs a cycle):\n\n";
         text += &slots::flows(installation, &links);
     }
     text += &format!("\n{balance}\n{clocks}");
