@@ -40,7 +40,8 @@ impl Granted {
             }
             Err(error) => {
                 tracing::warn!(
-                    "time slots are kept by an ordinary thread, and missed whenever others work: {refused}; SCHED_FIFO: {error}, which a                      limit `rtprio` of {FIFO} for this user (limits.conf) allows"
+                    "time slots are kept by an ordinary thread, and missed whenever others work: {refused}; SCHED_FIFO: {error}, \
+                     which a limit `rtprio` of {FIFO} for this user (limits.conf) allows"
                 );
                 Self::Ordinary
             }
