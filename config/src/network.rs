@@ -42,7 +42,7 @@ const HEADS_V6: usize = 40 + 8;
 /// Most that UDP over IPv4 carries, in bytes.
 const PAYLOAD_MAX: usize = 65_507;
 const RATE: u64 = 100 << 20;
-/// A largest package at the least takes a second, half of what a package may wait.
+/// A largest package at the least takes a second, two thirds of what a package may wait.
 const RATES: RangeInclusive<u64> = 64 << 10..=64 << 30;
 const QUOTA: u64 = 256 << 10;
 /// Two largest packages, so that a sender's second one does not push the first out.

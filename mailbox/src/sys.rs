@@ -33,7 +33,9 @@ pub struct Reservation {
 pub enum ReservationError {
     /// The user has no right to.
     #[error(
-        "SCHED_DEADLINE needs CAP_SYS_NICE, which no limit of users brings: `setcap cap_sys_nice+ep` on the program,          `AmbientCapabilities=CAP_SYS_NICE` in its unit, or `--cap-add=SYS_NICE` for its container; nor is it given to who is bound to          some of the processors"
+        "SCHED_DEADLINE needs CAP_SYS_NICE, which no limit of users brings: `setcap cap_sys_nice+ep` on the program, \
+         `AmbientCapabilities=CAP_SYS_NICE` in its unit, or `--cap-add=SYS_NICE` for its container; nor is it given to who is bound to some of the \
+         processors"
     )]
     NotAllowed,
     /// Others have reserved too much.

@@ -91,11 +91,17 @@ pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, ot
 }
 
 /// Waits until this mailbox has a package that is more important than `priority`, `other` says that there is something else to do, or the
-/// deadline has passed. Others may wait there all the while: for who cannot use them yet. May return early for no reason.
+/// deadline has passed. Others may wait there all the while: for who cannot use them yet. May return early for no reason. Says how long it
+/// slept.
 ///
 /// Each package that comes meanwhile rings, whatever its priority: so this is for who is ready for the next one soon.
-pub fn wait_above(receiver: &mut Receiver, priority: Priority, waiting: impl Into<Waiting>, other: impl Fn() -> bool) {
-    let waiting = waiting.into();
+pub fn wait_above(
+    receiver: &mut Receiver,
+    priority: Priority,
+    waiting: impl Into<Waiting>,
+    other: impl Fn() -> bool,
+) -> Duration {
+    let (waiting, mut slept) = (waiting.into(), Duration::ZERO);
     let participant = receiver.participant().clone();
     let entry = participant.entry();
     loop {
@@ -107,10 +113,11 @@ pub fn wait_above(receiver: &mut Receiver, priority: Priority, waiting: impl Int
             break;
         }
         if !receiver.has_unseen() {
-            crate::doorbell::sleep(&entry.bell, seen, waiting.left());
+            slept += timed(|| _ = crate::doorbell::sleep(&entry.bell, seen, waiting.left()));
         }
     }
     receiver.awake();
+    slept
 }
 
 /// How long this takes.

@@ -271,16 +271,14 @@ impl Robot {
     }
 
     pub(crate) fn wait_on(&self, launch: &mut Running) {
-        let names: Vec<String> = self
-            .installation
-            .modules_on(&self.node_name)
-            .filter(|module| module.start == rohrpost::config::Start::On)
-            .map(|module| self.installation.classes.format(module.name))
-            .collect();
-        for name in &names {
-            wait(format!("{name} is not on"), || {
+        let mut on = 0;
+        for module in self.installation.modules_on(&self.node_name) {
+            let is_on = module.start == rohrpost::config::Start::On;
+            on += u64::from(is_on);
+            let (name, state) = (self.installation.classes.format(module.name), if is_on { "on" } else { "off" });
+            wait(format!("{name} is not {state}"), || {
                 launch.assert_runs();
-                (self.state(name) == "on").then_some(())
+                (self.state(&name) == state).then_some(())
             });
         }
         // Launch takes the first place of a tool. Until it has heard from each module, a stop is a start that failed.
@@ -288,7 +286,7 @@ impl Robot {
         let replies = Name::new(1, 16, *tools.start(), local::REPLIES);
         wait("launch has heard from all", || {
             let heard = self.node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
-            (heard >= names.len() as u64).then_some(())
+            (heard >= on).then_some(())
         });
     }
 

@@ -222,16 +222,17 @@ impl Launch {
         self.note(note);
     }
 
-    /// Answers tools, and removes what those leave that have ended, or were told to stay so.
+    /// Removes what those leave that have ended, or were told to stay so, and answers tools: whoever is told that a module is stopped finds
+    /// no mailbox of it.
     fn serve(&mut self, ending: bool) {
-        let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
-        let orders =
-            Orders { children, installation, node, node_name: &self.node_name, looks: &mut self.looks, ending };
-        self.counter.serve(orders, &mut self.tool.link);
         // At the end all goes at once, with the node.
         if !ending {
             (0..self.children.len()).for_each(|index| self.remove_left_mailboxes(index));
         }
+        let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
+        let orders =
+            Orders { children, installation, node, node_name: &self.node_name, looks: &mut self.looks, ending };
+        self.counter.serve(orders, &mut self.tool.link);
     }
 
     /// A module is not started again: its mailboxes go. While somebody else holds the registry, that is tried again later.

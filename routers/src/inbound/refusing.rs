@@ -18,6 +18,7 @@ pub(super) struct Refusing {
     /// Not before this time again, ns.
     not_before_ns: u64,
     told: Option<(IpAddr, Mismatch)>,
+    told_ns: u64,
     last_ns: u64,
 }
 
@@ -57,8 +58,10 @@ impl Inbound {
         }
         let is_over = refusing.last_ns + OVER_NS < now_ns;
         refusing.last_ns = now_ns;
-        if is_over || refusing.told != Some((source, mismatch)) {
-            refusing.told = Some((source, mismatch));
+        // Two that take turns are not told of each time.
+        let is_other = refusing.told != Some((source, mismatch)) && refusing.told_ns + OVER_NS < now_ns;
+        if is_over || is_other {
+            (refusing.told, refusing.told_ns) = (Some((source, mismatch)), now_ns);
             deliver.event(Event::Refused { source, peer, mismatch });
         }
     }

@@ -167,9 +167,10 @@ impl Outbound {
         if taken { Accepted::Waits } else { Accepted::Lost }
     }
 
-    /// Whether what waits fills a datagram and the next: then more is of use only if it is more important.
+    /// Whether so much waits that more is of use only if it is more important: it fills datagrams, and half of what one sender may have.
     pub fn has_plenty(&self) -> bool {
-        self.queue.used_bytes() >= 2 * self.datagram_bytes as u64
+        let enough = (2 * self.datagram_bytes).max(self.settings.network.quota_bytes / 2);
+        self.queue.used_bytes() >= enough as u64
     }
 
     /// What waits has at most this priority: only what is above it may leave before what waits.

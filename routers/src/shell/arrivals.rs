@@ -14,6 +14,7 @@ use crate::stats::Cause;
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
+use std::time::Duration;
 
 /// Room for the largest that UDP carries.
 const DATAGRAM_BYTES: usize = 1 << 16;
@@ -37,7 +38,9 @@ impl Arrivals {
         let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
         let (mut awake, mut ring_ns) = (Awake::default(), 0);
         loop {
+            let began_ns = monotonic_ns();
             let (received, now_ns) = (self.socket.receive(&mut datagram), monotonic_ns());
+            awake.slept(Duration::from_nanos(now_ns.saturating_sub(began_ns)));
             match received {
                 Received::Closed => return,
                 Received::Nothing => {}

@@ -52,11 +52,13 @@ impl Departures {
             let now_ns = monotonic_ns();
             match self.outbound.poll(now_ns, &mut self.datagram, &mut self.answers) {
                 Output::Send { to, bytes } => self.send(to, bytes),
-                Output::Wait { until_ns } if more => self.rest(now_ns, until_ns),
+                // All that was taken has left, or is lost.
+                Output::Wait { .. } if more && self.stats.waiting_bytes.get() == 0 => {}
+                Output::Wait { until_ns } if more => awake.slept(self.rest(now_ns, until_ns)),
                 Output::Wait { until_ns } => {
                     let delivery_ns = self.wire.deliver(now_ns);
                     let waits = self.stats.waiting_bytes.get() > 0 || delivery_ns < u64::MAX;
-                    self.sleep(now_ns, until_ns.min(delivery_ns), waits);
+                    awake.slept(self.sleep(now_ns, until_ns.min(delivery_ns), waits));
                 }
             }
             awake.pause_if_long(now_ns);
@@ -95,19 +97,19 @@ impl Departures {
     }
 
     /// The pace holds the wire, and the mailbox holds more. Only what may leave before all that waits is worth waking up for.
-    fn rest(&mut self, now_ns: u64, until_ns: u64) {
+    fn rest(&mut self, now_ns: u64, until_ns: u64) -> Duration {
         let until_ns = until_ns.min(self.wire.deliver(now_ns));
         let deadline = Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns));
-        wait_above(&mut self.transit, self.outbound.waits_up_to(), Some(deadline), || self.shared.ends());
+        wait_above(&mut self.transit, self.outbound.waits_up_to(), Some(deadline), || self.shared.ends())
     }
 
     /// Sleeps until a package comes, or until then. If something `waits` to leave, that is exact, and costs a timer of the kernel; else
     /// the thread that receives rings, within its own patience.
-    fn sleep(&mut self, now_ns: u64, until_ns: u64, waits: bool) {
+    fn sleep(&mut self, now_ns: u64, until_ns: u64, waits: bool) -> Duration {
         let deadline = waits.then(|| Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns)));
         // Before the look at the mailbox: who rings because of this time changes the bell that is slept on.
         self.shared.departures_due_ns.store(until_ns, Ordering::Release);
-        wait_any(&mut [&mut self.transit], deadline, || self.shared.ends());
+        wait_any(&mut [&mut self.transit], deadline, || self.shared.ends())
     }
 }
 

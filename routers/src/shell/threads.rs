@@ -15,6 +15,8 @@ pub(super) const ARRIVALS_FIFO: u8 = DEPARTURES_FIFO + 1;
 /// which ends real-time processes that work without pause (RLIMIT_RTTIME), has no reason to.
 const AWAKE_MAX_NS: u64 = 2_000_000;
 const PAUSE_NS: u64 = 50_000;
+/// Who was away for so long has slept, and others had the processor.
+const SLEPT_NS: u64 = 10_000;
 
 /// What both threads see.
 pub(super) struct Shared {
@@ -56,20 +58,24 @@ impl Shared {
 /// Sees to it that a thread sleeps now and then.
 #[derive(Default)]
 pub(super) struct Awake {
-    since_ns: u64,
-    last_ns: u64,
+    /// Since when; none: since the next look.
+    since_ns: Option<u64>,
 }
 
 impl Awake {
-    /// Called again and again, with the time; pauses if the thread has not slept for long. Between two calls that are far apart it
-    /// has slept.
-    pub(super) fn pause_if_long(&mut self, now_ns: u64) {
-        if now_ns.saturating_sub(self.last_ns) > PAUSE_NS {
-            self.since_ns = now_ns;
+    /// The thread was away for so long; what is very short was no sleep.
+    pub(super) fn slept(&mut self, time: Duration) {
+        if time.as_nanos() > SLEPT_NS.into() {
+            self.since_ns = None;
         }
-        self.last_ns = now_ns;
-        if now_ns.saturating_sub(self.since_ns) > AWAKE_MAX_NS {
+    }
+
+    /// Called again and again, with the time; pauses if the thread has not slept for long.
+    pub(super) fn pause_if_long(&mut self, now_ns: u64) {
+        let since_ns = *self.since_ns.get_or_insert(now_ns);
+        if now_ns.saturating_sub(since_ns) > AWAKE_MAX_NS {
             std::thread::sleep(Duration::from_nanos(PAUSE_NS));
+            self.since_ns = None;
         }
     }
 }

@@ -42,4 +42,4 @@ pub use table::{Kind, Owner, Table, TimeShare, Window};
 pub use wire::Wire;
 
 /// A window whose wake-up comes so much after its beginning is not used.
-pub const LATE_NS: u64 = 50_000;
+pub const LATE_NS: u64 = rohrpost_config::LATE.as_nanos() as u64;

@@ -73,7 +73,7 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
         stopped = round.stop.within(wait);
     }
     round.close();
-    Ok(if well || stopped { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if well || (stopped && rounds.watch) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Asks the routers of all nodes that are meant.

@@ -72,7 +72,7 @@ impl LocalClock {
         steady
     }
 
-    /// A stamp of the kernel. None if CLOCK_REALTIME was set since the last comparison, or if it is not of the last second.
+    /// A stamp of the kernel. None if CLOCK_REALTIME was set since the last comparison, or if it is not of the last ten seconds.
     pub(super) fn stamp(&mut self, realtime_ns: u64) -> Option<Stamp> {
         if !self.compare() {
             return None;

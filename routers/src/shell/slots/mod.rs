@@ -41,6 +41,8 @@ const SPIN_CYCLES: u64 = 20;
 const QUIET_NS: u64 = 20_000;
 /// The mailbox is looked into this often: it has room for a burst of 64 packages.
 const NAP_NS: u64 = 1_000_000;
+/// A datagram that was made and missed its slot waits for another at most so long.
+const HELD_NS_MAX: u64 = 100_000_000;
 /// Packages taken from the mailbox at a time: all that it may hold.
 const BURST: usize = 64;
 /// Packages taken between two datagrams of a slot: what came just now, and is perhaps more important.
@@ -79,7 +81,7 @@ pub(super) struct Slots {
     /// Room for the largest datagram.
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
-    held: Option<(NodeIndex, usize)>,
+    held: Option<(NodeIndex, usize, u64)>,
     /// When the socket of time was read last, local ns.
     looked_ns: u64,
     /// The first datagram of the last window, if the kernel stamps it.
@@ -178,6 +180,7 @@ impl Slots {
     /// Between windows: makes room in the mailbox. Whoever is `silent` waits for datagrams of time; others read them once a cycle at least.
     fn between(&mut self, silent: bool) {
         let now_ns = monotonic_ns();
+        self.drop_if_old();
         self.outbound.tidy(now_ns, &mut self.answers);
         self.take(BURST);
         self.wire.deliver(now_ns);
@@ -294,9 +297,18 @@ impl Slots {
         }
     }
 
+    /// What was made and found no slot for so long is lost: whoever sent it counts on that nothing arrives that is much older than it may be.
+    fn drop_if_old(&mut self) {
+        let now_ns = monotonic_ns();
+        if let Some((_, bytes, _)) = self.held.take_if(|(.., made_ns)| now_ns.saturating_sub(*made_ns) > HELD_NS_MAX) {
+            self.outbound.unsent(&self.datagram[..bytes], &[], &mut self.answers);
+        }
+    }
+
     fn send_packages(&mut self, permit: &mut Permit) {
         loop {
-            let next = self.held.take().or_else(|| {
+            self.drop_if_old();
+            let next = self.held.take().map(|(to, bytes, _)| (to, bytes)).or_else(|| {
                 self.take(FEW);
                 let room_bytes = permit.room_bytes(self.works.now_ns())?;
                 self.outbound.poll_slot(monotonic_ns(), room_bytes, &mut self.datagram, &mut self.answers)
@@ -305,7 +317,7 @@ impl Slots {
             let now_ns = self.works.now_ns();
             if !permit.fits(now_ns, bytes) {
                 // The thread stood still, and it is made: it goes first in the next slot.
-                self.held = Some((to, bytes));
+                self.held = Some((to, bytes, monotonic_ns()));
                 self.snapshot.held += 1;
                 return;
             }
