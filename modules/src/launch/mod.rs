@@ -191,8 +191,12 @@ impl Launch {
         for index in 0..self.children.len() {
             self.switch_on(index);
             while self.switching[index].is_some() {
-                self.turn(0..self.children.len(), Duration::MAX, index)?;
+                let turned = self.turn(0..self.children.len(), Duration::MAX, index);
                 self.switch_on(index);
+                // Who is told to stop when the last answer has come has started, and stops as such.
+                if self.switching[index].is_some() {
+                    turned?;
+                }
             }
         }
         Ok(())
