@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, OTHER, PATIENCE, label, shape, tell};
-use rohrpost_mailbox::wait_any;
+use rohrpost_mailbox::{wait_above, wait_any};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -41,6 +41,35 @@ fn no_wake_up_is_ever_lost_between_two_processes() {
         assert_eq!((package.head().id, package.body()), (id, &id.to_le_bytes()[..]));
     }
     echo.finish();
+}
+
+#[test]
+fn only_what_is_more_important_ends_a_wait_for_it() {
+    let ground = Ground::new();
+    let mut receiver = ground.join().receiver(MAILBOX, shape(8)).unwrap();
+    let (mut low, mut high) = (ground.sender(), ground.sender());
+    let rounds = std::sync::Barrier::new(2);
+    std::thread::scope(|threads| {
+        threads.spawn(|| {
+            for id in 0..ROUNDS {
+                rounds.wait();
+                low.send(&label(LOW, id), &[]).unwrap();
+                high.send(&label(HIGH, id), &[]).unwrap();
+            }
+        });
+        for id in 0..ROUNDS {
+            rounds.wait();
+            let began = Instant::now();
+            wait_above(&mut receiver, LOW, PATIENCE, || false);
+            assert!(began.elapsed() < PATIENCE, "a wake-up was lost");
+            for priority in [HIGH, LOW] {
+                let package = receiver.try_receive().unwrap();
+                assert_eq!((package.head().priority, package.head().id), (priority, id));
+            }
+        }
+    });
+    assert!(wait_above(&mut receiver, LOW, Duration::from_millis(5), || false) >= Duration::from_millis(4));
+    assert_eq!(wait_above(&mut receiver, LOW, PATIENCE, || true), Duration::ZERO, "something else is to be done");
 }
 
 #[test]

@@ -166,6 +166,15 @@ fn a_hundred_networks_keep_their_promises() {
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED);
 }
 
+/// Each of these has shown a bug that a hundred networks seldom show.
+#[test]
+fn networks_that_broke_a_promise_once_keep_it() {
+    for seed in [2917, 8011, 8247, 8335] {
+        let outcome = run(Plan::new(seed), guard, false);
+        assert!(outcome.problems.is_empty(), "{}", told(NETWORKS, seed, &outcome.problems[0]));
+    }
+}
+
 #[test]
 fn networks_with_time_slots_keep_their_promises() {
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {

@@ -2,8 +2,8 @@
 
 mod account;
 mod copy;
+mod flows;
 mod nodes;
-mod slots;
 
 use super::launch::{View, end};
 use super::speech::Speech;

@@ -29,6 +29,7 @@ mod router;
 mod run;
 mod send;
 mod sight;
+mod slots;
 mod speech;
 mod status;
 mod summary;

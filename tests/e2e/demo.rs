@@ -57,6 +57,29 @@ fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_f
     place.assert_empty();
 }
 
+/// The same robot, each node in its own time slots.
+#[test]
+fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
+    let place = Place::new();
+    let said = place.say(&["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet"]);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let said = said.out;
+    assert!(said.contains("the accounts balance\n") && number(&said, " scans mapped (") > 5, "{said}");
+    let slots = said.split("In time slots").nth(1).unwrap();
+    for node in ["base", "brain", "desk"] {
+        let row =
+            slots.lines().find_map(|line| line.strip_prefix(node)).unwrap_or_else(|| panic!("no {node}:\n{said}"));
+        assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
+    }
+    assert!(slots.lines().any(|line| line.starts_with("laser.0 → pilot.0") && line.contains("10.00 ms")), "{said}");
+    place.assert_empty();
+    let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
+    assert!(said.contains("say --nodes 3"), "{said}");
+}
+
 #[test]
 fn it_ends_by_itself_after_the_time_that_was_given() {
     let place = Place::new();

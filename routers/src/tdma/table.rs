@@ -135,11 +135,6 @@ impl Table {
         self.cycle_ns
     }
 
-    /// The end of each window that is kept free, ns.
-    pub fn guard_ns(&self) -> u64 {
-        self.guard_ns
-    }
-
     /// A node may send while its clock is off by so much at most, ns: with another that is off as much the other way, it is the guard.
     pub fn allowance_ns(&self) -> u64 {
         self.guard_ns / 2

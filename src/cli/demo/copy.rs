@@ -15,6 +15,9 @@ const BUILDING: &str = include_str!("../../../config/building.map");
 
 /// What runs. A copy is written into `temporary`.
 pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<Installation, Failure> {
+    if arguments.tdma && arguments.nodes == Some(1) {
+        return Err("one node alone has no time slots; say --nodes 3".into());
+    }
     let (name, text) = match (&arguments.log, arguments.nodes) {
         (Some(_), _) => ("demo-log.toml", LOG),
         (None, Some(2..)) if arguments.tdma => ("demo-tdma.toml", TDMA),

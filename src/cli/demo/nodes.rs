@@ -1,8 +1,9 @@
 //! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
 
 use super::account::{self, Balance};
-use super::{Arguments, FIRST_FUNCTION, copy, drawn, slots};
+use super::{Arguments, FIRST_FUNCTION, copy, drawn, flows};
 use crate::cli::launch::{Nodes, lab};
+use crate::cli::slots;
 use crate::cli::speech::Speech;
 use crate::cli::summary::print_classes;
 use crate::cli::{Failure, say};
@@ -91,7 +92,7 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
         text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
         text += &slots::kept(&kept);
         text += "\nFlows; seen: how old data were when they came to the mailbox (a slot that was late or skipped costs a cycle):\n\n";
-        text += &slots::flows(installation, &links);
+        text += &flows::table_of(installation, &links);
     }
     text += &format!("\n{balance}\n{clocks}");
     text += &map;

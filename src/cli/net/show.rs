@@ -1,11 +1,12 @@
 //! `rohrpost net`, for people.
 
 use super::Told;
+use crate::cli::slots::kept;
 use crate::cli::table::{table, time};
 use crate::cli::target::Running;
 use crate::cli::units::{bytes, fine};
 use rohrpost::Class;
-use rohrpost::interfaces::{ClockRole, ClockState, LinkState, PeerLink, SlotState};
+use rohrpost::interfaces::{ClockRole, ClockState, LinkState, PeerLink};
 use std::time::Duration;
 
 /// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
@@ -22,7 +23,8 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
             parts.push(format!("node {} and node {} refuse each other: {}\n", told.node, peer.node, peer.why));
         }
     }
-    parts.extend([strangers(all), failures(all), waiting(all), losses(running, all), clocks(all), slots(all)]);
+    let slots = all.iter().filter_map(|told| told.slots.as_ref());
+    parts.extend([strangers(all), failures(all), waiting(all), losses(running, all), clocks(all), kept(slots)]);
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
 }
@@ -167,46 +169,4 @@ fn clocks(all: &[Told]) -> String {
         ]
     });
     table(["node", "time", ">error", ">offset", ">rate", ">there and back"], rows)
-}
-
-/// How the nodes keep their time slots, and why those are silent that are.
-fn slots(all: &[Told]) -> String {
-    let slots: Vec<&SlotState> = all.iter().filter_map(|told| told.slots.as_ref()).collect();
-    if slots.is_empty() {
-        return String::new();
-    }
-    let rows = slots.iter().map(|slots| {
-        let off_ns = slots.last.iter().map(|used| used.off_ns.unsigned_abs()).max();
-        [
-            slots.node.clone(),
-            slots.used.to_string(),
-            slots.empty.to_string(),
-            slots.late.to_string(),
-            slots.skipped.to_string(),
-            slots.silent.to_string(),
-            bytes(slots.wire_bytes as f64),
-            (slots.synchronisations_sent + slots.replacements_sent).to_string(),
-            slots.synchronisations_heard.to_string(),
-            slots.synchronisations_missed.to_string(),
-            off_ns.map_or("-".into(), |ns| fine(ns as f64 * 1e-9)),
-            slots.scheduled.clone(),
-        ]
-    });
-    let heads = [
-        "node",
-        ">slots used",
-        ">empty",
-        ">late",
-        ">skipped",
-        ">silent",
-        ">sent",
-        ">syncs sent",
-        ">heard",
-        ">missed",
-        ">off of late",
-        "scheduled",
-    ];
-    let silent = slots.iter().filter(|slots| !slots.why_silent.is_empty());
-    let silent = silent.map(|slots| format!("node {} is silent: {}\n", slots.node, slots.why_silent));
-    table(heads, rows) + &silent.collect::<String>()
 }

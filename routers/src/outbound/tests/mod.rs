@@ -284,6 +284,21 @@ fn check_advance() {
 }
 
 #[test]
+fn plenty_is_what_fills_datagrams_and_half_a_quota_and_not_a_dozen_small_packages() {
+    let mut end = End::new(0, |settings| settings.network.rate_bytes_s = 70_000);
+    end.hears(1, START);
+    let quota_bytes = end.settings.network.quota_bytes as u64;
+    let mut count = 0;
+    while !end.outbound.has_plenty() {
+        end.send(START, to(1, 90), b"small", false);
+        count += 1;
+    }
+    assert!(count > 100, "a datagram of small ones has company: {count}");
+    assert!(end.stats.waiting_bytes.get() <= quota_bytes, "before anything is lost");
+    assert_eq!(end.log.lost.len(), 0);
+}
+
+#[test]
 fn what_is_more_important_than_a_flood_does_not_wait_for_the_pace() {
     check_advance();
 }
