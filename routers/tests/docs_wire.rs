@@ -96,8 +96,16 @@ fn time_has_the_documented_bytes() {
         followed: true,
         replacement: false,
     });
-    let request =
-        Message::Request(Request { id: 99, error_ns: 20_000, epoch, term, eager: false, far: false, timed: true });
+    let request = Message::Request(Request {
+        id: 99,
+        sent_ns: 0,
+        error_ns: 20_000,
+        epoch,
+        term,
+        eager: false,
+        far: false,
+        timed: true,
+    });
     let reply = Message::Reply(Reply {
         id: 99,
         sync_ns: NOMINAL_NS + 9_000,

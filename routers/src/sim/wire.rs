@@ -21,6 +21,8 @@ pub struct Transmission {
     pub node: usize,
     /// The term whose time it keeps; none: it asks what time it is.
     pub term: Term,
+    /// It only says that it began a time.
+    pub begins: bool,
     /// First and last bit, true ns.
     pub begin_ns: u64,
     /// See `begin_ns`.
@@ -36,6 +38,8 @@ pub struct Wire {
     began_ns: Vec<u64>,
     /// The term that each goes by.
     terms: Vec<Term>,
+    /// Whether each only says that it began a time.
+    begins: Vec<bool>,
     /// What each reckons by.
     reckonings: Vec<Option<Reckoning>>,
     recent: VecDeque<Transmission>,
@@ -48,6 +52,7 @@ impl Wire {
             free_ns: vec![0; nodes],
             began_ns: vec![0; nodes],
             terms: vec![Term::NONE; nodes],
+            begins: vec![false; nodes],
             reckonings: vec![None; nodes],
             recent: VecDeque::with_capacity(RECENT_MAX),
         }
@@ -58,9 +63,9 @@ impl Wire {
         (self.began_ns[node], self.terms[node]) = (true_ns, Term::NONE);
     }
 
-    /// From now on a node sends by the time of this term; none: by what it has heard only.
-    pub fn goes_by(&mut self, node: usize, term: Term, reckoning: Option<Reckoning>) {
-        (self.terms[node], self.reckonings[node]) = (term, reckoning);
+    /// From now on a node sends by the time of this term; none: by what it has heard only. `begins`: it sends only to say that it began one.
+    pub fn goes_by(&mut self, node: usize, term: Term, reckoning: Option<Reckoning>, begins: bool) {
+        (self.terms[node], self.reckonings[node], self.begins[node]) = (term, reckoning, begins);
     }
 
     /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its node.
@@ -92,8 +97,10 @@ impl Wire {
         let end_ns = begin_ns + slots.takes_ns(bytes);
         self.free_ns[node] = end_ns;
         let term = self.terms[node];
-        let own = Transmission { node, term, begin_ns, end_ns };
-        let meets = self.recent.iter().find(|other| other.node != node && own.meets(other));
+        let own = Transmission { node, term, begins: self.begins[node], begin_ns, end_ns };
+        // Of two that begin a time neither can know of the other before it has heard its first frame.
+        let counts = |other: &&Transmission| other.node != node && !(own.begins && other.begins);
+        let meets = self.recent.iter().filter(counts).find(|other| own.meets(other));
         if let Some(other) = meets {
             // Who goes by what it hears relies on links that are as good as they should be.
             let is_coarse = term.is_none() || other.term.is_none();

@@ -48,6 +48,9 @@ pub enum Silent {
         /// Syncs that count, so far.
         heard: u8,
     },
+    /// It began a time, and waits whether another did so, too.
+    #[error("begins a time: in the first {JOINING_SYNCS} cycles it sends nothing but Syncs")]
+    Beginning,
     /// Its time may be too far off: no master was heard for too long, or the network is too slow for such a guard.
     #[error("its clock may be {bound_ns} ns off, and {allowance_ns} ns are allowed: half of the guard")]
     BoundTooLarge {
@@ -157,8 +160,8 @@ impl Discipline {
         let sure = self.reckon(now_ns, clock);
         let basis = sure.as_ref().ok().map(|(reckoning, _)| *reckoning);
         self.pass(now_ns, basis.or_else(|| clock.reckoning()).or_else(|| clock.coarse(now_ns)), sure.is_ok());
-        let asks_only = matches!(sure, Ok((_, Carries::Time)));
-        self.silent = asks_only.then(|| self.why_silent(now_ns, clock));
+        let time_only = matches!(sure, Ok((_, Carries::Time)));
+        self.silent = time_only.then(|| self.why_silent(now_ns, clock));
         let planned = sure.and_then(|(reckoning, carries)| {
             let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
             let window = self.next_window(from_ns, clock, carries);
@@ -213,12 +216,14 @@ impl Discipline {
         let is_sure = |reckoning: &Reckoning| reckoning.bound_ns(now_ns) <= allowance_ns;
         let own = clock.reckoning().filter(|own| is_sure(own) || broken!(SendsWhenUnsure));
         let coarse = || clock.coarse(now_ns).filter(is_sure).map(|coarse| (coarse, Carries::Time));
-        own.map(|own| (own, Carries::All)).or_else(coarse).ok_or_else(|| self.why_silent(now_ns, clock))
+        let carries = if clock.is_beginning() { Carries::Time } else { Carries::All };
+        own.map(|own| (own, carries)).or_else(coarse).ok_or_else(|| self.why_silent(now_ns, clock))
     }
 
     /// Why this node does not go by its own time.
     fn why_silent(&self, now_ns: u64, clock: &Clock) -> Silent {
         match (clock.reckoning(), clock.joining()) {
+            _ if clock.is_beginning() => Silent::Beginning,
             (Some(own), _) => {
                 Silent::BoundTooLarge { bound_ns: own.bound_ns(now_ns), allowance_ns: self.table.allowance_ns() }
             }
@@ -253,7 +258,9 @@ impl Discipline {
 
     /// Own synchronisation windows matter only to who may have to send in them.
     fn next_window(&self, from_ns: u64, clock: &Clock, carries: Carries) -> Option<Window> {
-        if carries == Carries::All && clock.may_synchronise() {
+        if clock.is_beginning() {
+            self.table.next_synchronisation(from_ns)
+        } else if carries == Carries::All && clock.may_synchronise() {
             self.table.next_window(from_ns)
         } else {
             self.table.next_slot(from_ns)
@@ -284,11 +291,12 @@ impl Discipline {
         if bound_ns > allowance_ns && !broken!(SendsWhenUnsure) {
             return Verdict::Silent(Silent::BoundTooLarge { bound_ns, allowance_ns });
         }
+        let goes_by_own = carries == Carries::All || clock.is_beginning();
+        let synchronises = goes_by_own && clock.synchronises(window.cycle);
         let carries = match window.kind {
+            Kind::Slot { .. } if clock.is_beginning() => return Verdict::Silent(Silent::Beginning),
             Kind::Slot { .. } => carries,
-            Kind::Synchronisation { .. } if clock.synchronises(window.cycle) && carries == Carries::All => {
-                Carries::Time
-            }
+            Kind::Synchronisation { .. } if synchronises => Carries::Time,
             Kind::Synchronisation { .. } => return Verdict::Idle,
         };
         let Planned { begin_ns, end_ns, .. } = planned;

@@ -227,6 +227,7 @@ impl Table {
             warm_ups: share.warm_ups,
             replies_in_synchronisation: share.replies_in_synchronisation,
             delay_max_ns: self.guard_ns / 4,
+            allowance_ns: self.allowance_ns(),
         }
     }
 

@@ -5,7 +5,7 @@ mod slave;
 mod slots;
 
 use super::broken::Broken;
-use super::election::{Election, State};
+use super::election::{Election, Origin, State};
 use super::history::{History, RATE_MAX};
 use super::line::{EVEN_PPB, Line};
 use super::message::{Message, Request};
@@ -306,8 +306,18 @@ impl Clock {
             self.forget();
             self.hello_ns = now_ns;
         }
-        if let Some(term) = self.election.takes_over(now_ns, self.line.is_synchronised()) {
-            self.reign(now_ns, term);
+        let origin = self.origin(now_ns);
+        if let Some(term) = self.election.takes_over(now_ns, origin) {
+            self.reign(now_ns, term, origin);
+        }
+    }
+
+    /// By what time this node would reign.
+    fn origin(&self, now_ns: u64) -> Origin {
+        match &self.slots {
+            Some(slots) => self.origin_in_slots(slots, now_ns),
+            None if self.line.is_synchronised() => Origin::Own,
+            None => Origin::New,
         }
     }
 
@@ -349,7 +359,7 @@ impl Clock {
             State::Slave(_) => None,
         };
         let bound_ns = self.is_held_over().then_some(self.stated.0);
-        let election_ns = self.election.deadline_ns(now_ns, self.line.is_synchronised());
+        let election_ns = self.election.deadline_ns(now_ns, self.origin(now_ns));
         let deadlines = [role_ns, self.line.slew_end_ns(), bound_ns, election_ns];
         deadlines.into_iter().flatten().min().unwrap_or(now_ns + SECOND_NS).max(now_ns)
     }

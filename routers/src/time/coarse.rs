@@ -1,4 +1,5 @@
-//! The time of a node that cannot ask yet: by the Sync of the last eight that took the least time.
+//! The time of a node that cannot ask yet: by the one of the last eight frames that took the least time. Masters say what time it is in
+//! their Syncs, and who has time but hears no master in the question for one.
 
 use super::line::EVEN_PPB;
 use super::{RATE_MAX_PPB, Reckoning};
@@ -8,14 +9,15 @@ use rohrpost_mailbox::{TimeRecord, TimeSource};
 pub const JOINING_SYNCS: u8 = 8;
 const SYNCS: usize = JOINING_SYNCS as usize;
 
-/// When a Sync came, and what it said.
+/// When a frame came, and what it said.
 #[derive(Clone, Copy, Debug, Default)]
 struct Came {
     local_ns: u64,
     system_ns: u64,
+    error_ns: u64,
 }
 
-/// The last Syncs of one master.
+/// The last frames that told the time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coarse {
     syncs: [Came; SYNCS],
@@ -33,14 +35,25 @@ impl Coarse {
         self.count
     }
 
-    /// A Sync that said `system_ns` when it was handed over came at `local_ns`.
-    pub(super) fn add(&mut self, epoch: u64, system_ns: u64, local_ns: u64) {
+    /// A frame that said `system_ns` when it was handed over came at `local_ns`; whoever sent it may be off by `error_ns`.
+    pub(super) fn add(&mut self, epoch: u64, system_ns: u64, local_ns: u64, error_ns: u64) {
         if epoch != self.epoch {
             *self = Self { epoch, ..Self::default() };
         }
-        self.syncs[self.next] = Came { local_ns, system_ns };
+        self.syncs[self.next] = Came { local_ns, system_ns, error_ns };
         self.next = (self.next + 1) % SYNCS;
         self.count = (self.count + 1).min(JOINING_SYNCS);
+    }
+
+    /// How far a time of now seems to be off what was heard, ns.
+    pub(super) fn off_ns(&self, now_ns: u64, system_ns: u64) -> u64 {
+        let heard_ns =
+            self.best(now_ns).map(|best| best.system_ns.saturating_add(now_ns.saturating_sub(best.local_ns)));
+        heard_ns.map_or(0, |heard_ns| heard_ns.abs_diff(system_ns))
+    }
+
+    fn best(&self, now_ns: u64) -> Option<&Came> {
+        self.syncs[..usize::from(self.count)].iter().max_by_key(|came| came.score(now_ns))
     }
 
     /// The way is taken to last from nothing to `delay_max_ns`: that is an assumption.
@@ -48,14 +61,14 @@ impl Coarse {
         if self.count < JOINING_SYNCS {
             return None;
         }
-        let best = self.syncs.iter().max_by_key(|came| came.score(now_ns))?;
+        let best = self.best(now_ns)?;
         Some(Reckoning::new(TimeRecord {
             epoch: self.epoch,
             source: TimeSource::Master,
             monotonic_ns: best.local_ns,
             system_ns: best.system_ns,
             pace_ppb: EVEN_PPB,
-            error_ns: delay_max_ns,
+            error_ns: delay_max_ns.saturating_add(best.error_ns),
             drift_ns_s: RATE_MAX_PPB.unsigned_abs(),
         }))
     }

@@ -6,6 +6,19 @@ use crate::frame::NodeIndex;
 
 /// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
 const DEAF_NS_MIN: u64 = 200_000_000;
+/// In time slots others may be unheard for so long, and send by a time that they have.
+const BEGINS_AFTER_NS_MIN: u64 = 100_000_000;
+
+/// By what time a node would reign.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Origin {
+    /// Its own, which is that of the others.
+    Own,
+    /// That of the others, as it heard it.
+    Heard,
+    /// One that nobody else may have.
+    New,
+}
 
 /// A master that is heard.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -51,6 +64,8 @@ pub(super) struct Election {
     interval_ns: u64,
     /// So long a master is given to answer.
     deaf_ns: u64,
+    /// Who would begin a time hears nobody that has one for so long before; 0: its turn is enough.
+    begins_after_ns: u64,
     state: State,
     /// Since when no master is heard, and who was the last.
     quiet_since_ns: u64,
@@ -71,6 +86,7 @@ impl Election {
             masters,
             interval_ns,
             deaf_ns: DEAF_NS_MIN,
+            begins_after_ns: 0,
             state: State::Listening,
             quiet_since_ns: now_ns,
             lost: None,
@@ -81,9 +97,11 @@ impl Election {
         }
     }
 
-    /// A slave takes so many intervals until it asks: a master must not be replaced before that for not having answered.
+    /// A slave takes so many intervals until it asks: a master must not be replaced before that for not having answered. A time begins
+    /// only where for so long nobody that has one was heard.
     pub(super) fn asks_after(&mut self, intervals: u64) {
         self.deaf_ns = DEAF_NS_MIN.max(self.interval_ns.saturating_mul(2 * intervals));
+        self.begins_after_ns = BEGINS_AFTER_NS_MIN.max(self.interval_ns.saturating_mul(intervals));
     }
 
     pub(super) fn state(&self) -> State {
@@ -226,9 +244,9 @@ impl Election {
         silent
     }
 
-    /// Takes over if it is this node's turn. `timed`: it has system time.
-    pub(super) fn takes_over(&mut self, now_ns: u64, timed: bool) -> Option<Term> {
-        if self.takeover_ns(now_ns, timed)? > now_ns {
+    /// Takes over if it is this node's turn.
+    pub(super) fn takes_over(&mut self, now_ns: u64, origin: Origin) -> Option<Term> {
+        if self.takeover_ns(now_ns, origin)? > now_ns {
             return None;
         }
         let term = self.next_term(self.rank()?);
@@ -237,8 +255,8 @@ impl Election {
     }
 
     /// When something changes without a datagram.
-    pub(super) fn deadline_ns(&self, now_ns: u64, timed: bool) -> Option<u64> {
-        let takeover_ns = self.takeover_ns(now_ns, timed);
+    pub(super) fn deadline_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
+        let takeover_ns = self.takeover_ns(now_ns, origin);
         match self.state {
             State::Slave(master) => {
                 let heard_ns = master.heard_ns.max(self.awake_since_ns);
@@ -250,7 +268,7 @@ impl Election {
     }
 
     /// When it is this node's turn. A master that is heard, but answers nobody, hears nobody: it has to be replaced as well.
-    fn takeover_ns(&self, now_ns: u64, timed: bool) -> Option<u64> {
+    fn takeover_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
         let rank = self.rank()?;
         let (since_ns, patience_ns, last) = match self.state {
             State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
@@ -261,8 +279,13 @@ impl Election {
         // Who has no time leaves it to who has, as long as there is one.
         let recently_ns = self.interval_ns.saturating_mul(4);
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
-        let waits = before + if others_timed && !timed { self.masters.len() } else { 0 };
+        let waits = before + if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
+        let (since_ns, patience_ns) = match (origin, self.begins_after_ns, self.state) {
+            (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => (since_ns, patience_ns),
+            (Origin::New, begins_ns, State::Slave(master)) => (master.heard_ns, patience_ns.max(begins_ns)),
+            (Origin::New, begins_ns, _) => (since_ns.max(self.timed_heard_ns.unwrap_or(0)), patience_ns.max(begins_ns)),
+        };
         Some(since_ns.max(self.awake_since_ns).saturating_add(patience_ns).saturating_add(staggered_ns))
     }
 }

@@ -4,7 +4,7 @@
 //!           0    8         16        24       32      40      48     56      64      65      68       72
 //!           ┌────┬─────────┬─────────┬────────┬───────┬───────┬──────┬───────┬───────┬───────┬────────┐
 //!  Sync     │ id │ cycle   │ nominal │ sent   │ error │ epoch │ term │ began │ flags │ 0     │ 0      │
-//!  Request  │ id │ 0       │ 0       │ 0      │ error │ epoch │ term │ 0     │ flags │ 0     │ 0      │
+//!  Request  │ id │ 0       │ 0       │ sent   │ error │ epoch │ term │ 0     │ flags │ 0     │ 0      │
 //!  Reply    │ id │ sync    │ request │ sent   │ error │ epoch │ term │ began │ flags │ 0     │ doubt  │
 //!  WarmUp   │ 0  │ 0       │ 0       │ 0      │ 0     │ 0     │ 0    │ 0     │ 0     │ 0     │ 0      │
 //!           └────┴─────────┴─────────┴────────┴───────┴───────┴──────┴───────┴───────┴───────┴────────┘
@@ -71,6 +71,8 @@ pub struct Sync {
 pub struct Request {
     /// Of the [`Sync`]; 0: hears no master.
     pub id: u64,
+    /// Who hears no master, has system time and sends in time slots says so what time it is; else 0.
+    pub sent_ns: u64,
     /// The sender's error bound, ns.
     pub error_ns: u64,
     /// The epoch of the sender's page.
@@ -133,7 +135,7 @@ impl Message {
                 fields.flags = flag(m.followed, FOLLOWED) | flag(m.replacement, REPLACEMENT);
             }
             Self::Request(m) => {
-                fields.words = [m.id, 0, 0, 0, m.error_ns, m.epoch, m.term.0, 0];
+                fields.words = [m.id, 0, 0, m.sent_ns, m.error_ns, m.epoch, m.term.0, 0];
                 fields.flags = flag(m.eager, EAGER) | flag(m.far, FAR) | flag(m.timed, TIMED);
             }
             Self::Reply(m) => {
@@ -163,7 +165,7 @@ impl Message {
             }
             Kind::Request => {
                 let (eager, far, timed) = (has(EAGER), has(FAR), has(TIMED));
-                Self::Request(Request { id, error_ns, epoch, term, eager, far, timed })
+                Self::Request(Request { id, sent_ns: c, error_ns, epoch, term, eager, far, timed })
             }
             Kind::Reply => Self::Reply(Reply {
                 id,
@@ -192,6 +194,7 @@ impl Message {
     fn check(&self) -> Result<(), BadFrame> {
         let (id, epoch, term, times) = match self {
             Self::WarmUp => return Ok(()),
+            Self::Request(m) if m.sent_ns > TIME_MAX_NS => return Err(BadFrame::Damaged("a time after the year 2262")),
             Self::Request(_) => return Ok(()),
             Self::Sync(m) => (m.id, m.epoch, m.term, [m.nominal_ns, m.sent_ns, 0]),
             Self::Reply(m) => (m.id, m.epoch, m.term, [m.sync_ns, m.request_ns, m.sent_ns]),

@@ -128,6 +128,8 @@ pub struct InSlots {
     pub replies_in_synchronisation: bool,
     /// The quickest of a few Syncs is taken to be on its way for no longer, ns.
     pub delay_max_ns: u64,
+    /// Who sends may be off by so much at most, ns.
+    pub allowance_ns: u64,
 }
 
 /// What was sent and heard of synchronisation in time slots.

@@ -2,7 +2,7 @@
 
 use super::{Clock, Draft, Left, Slave};
 use crate::frame::NodeIndex;
-use crate::time::election::State;
+use crate::time::election::{Origin, State};
 use crate::time::line::EVEN_PPB;
 use crate::time::message::{Reply, Request, Sync};
 use crate::time::{Ignored, Stamp, Term};
@@ -17,6 +17,7 @@ impl Clock {
         if request.id == 0 {
             self.election.hello(request, received.ns);
             self.keep_term();
+            self.hello_in_slots(received, request);
             // Whoever asks for a master gets its time at once.
             if matches!(self.election.state(), State::Master(_)) {
                 self.slaves[usize::from(from)].next_ns = 0;
@@ -45,9 +46,13 @@ impl Clock {
         Ok(())
     }
 
-    /// This node is master from now on. If it has time, that goes on; else the first epoch begins by its wall clock.
-    pub(super) fn reign(&mut self, now_ns: u64, term: Term) {
+    /// This node is master from now on. If it has time, that goes on, or that which it heard; else the first epoch begins by its wall
+    /// clock.
+    pub(super) fn reign(&mut self, now_ns: u64, term: Term, origin: Origin) {
         self.line.stop_slew(now_ns);
+        if origin == Origin::Heard {
+            self.take_up_heard(now_ns);
+        }
         if self.line.is_synchronised() {
             self.line.become_reference(now_ns);
         } else {
@@ -62,7 +67,7 @@ impl Clock {
         self.slaves.iter_mut().for_each(|slave| *slave = Slave { next_ns: now_ns, ..Slave::default() });
         let error_ns = self.line.record().error_ns;
         if let Some(slots) = &mut self.slots {
-            slots.goes_by(error_ns);
+            slots.reigns(error_ns, origin);
         }
     }
 

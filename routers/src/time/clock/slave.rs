@@ -192,14 +192,16 @@ impl Clock {
             asked.sequence = sequence;
             (asked.exchange.request_sent_ns, asked.exchange.request_left) = (now_ns, Stamp::by_us(now_ns));
         }
+        let told = if id == 0 { self.sure(now_ns) } else { None };
         Some(Request {
             id,
-            error_ns: self.line.error_ns(now_ns),
+            sent_ns: told.map_or(0, |own| own.system_ns(now_ns)),
+            error_ns: told.map_or_else(|| self.line.error_ns(now_ns), |own| own.bound_ns(now_ns)),
             epoch: self.line.record().epoch,
             term: self.term,
             eager: self.history.samples() < SAMPLES_EAGER,
             far: self.far,
-            timed: self.line.is_synchronised(),
+            timed: if self.slots.is_some() { told.is_some() } else { self.line.is_synchronised() },
         })
     }
 }

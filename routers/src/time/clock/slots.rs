@@ -7,10 +7,14 @@ use super::{Clock, Draft};
 use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::time::coarse::Coarse;
-use crate::time::election::State;
-use crate::time::message::Sync;
+use crate::time::election::{Origin, State};
+use crate::time::line::EVEN_PPB;
+use crate::time::message::{Request, Sync};
 use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES};
 use rohrpost_mailbox::TimeRecord;
+
+/// Who begins a time sends nothing but Syncs in so many cycles: who else began one meanwhile hears of it.
+const BEGINNING_CYCLES: u8 = JOINING_SYNCS;
 
 /// What of time may leave now.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -60,6 +64,8 @@ pub(super) struct Slots {
     synced_cycle: u64,
     next: usize,
     is_warm: bool,
+    /// Cycles in which this node has only to say that it began a time.
+    beginning: u8,
     /// When this node was awake last, local ns.
     advanced_ns: u64,
 }
@@ -68,6 +74,12 @@ impl Slots {
     /// The page goes by the master's time, which may be so far off that of an earlier term.
     pub(super) fn goes_by(&mut self, master_error_ns: u64) {
         (self.unsure, self.master_error_ns) = (false, master_error_ns);
+    }
+
+    /// This node reigns by such a time, which may be so far off that of an earlier term.
+    pub(super) fn reigns(&mut self, error_ns: u64, origin: Origin) {
+        self.goes_by(error_ns);
+        self.beginning = if origin == Origin::New { BEGINNING_CYCLES } else { 0 };
     }
 }
 
@@ -88,6 +100,7 @@ impl Clock {
             synced_cycle: 0,
             next: 0,
             is_warm: false,
+            beginning: 0,
             advanced_ns: 0,
         }));
         self.forget();
@@ -115,11 +128,11 @@ impl Clock {
         Step::Wait { until_ns: self.deadline_ns(now_ns) }
     }
 
-    /// In time slots this node is awake at least once in a cycle.
+    /// In time slots this node is awake at least once in a cycle, from the first time on that it is asked.
     pub(super) fn stood_still(&mut self, now_ns: u64) {
         let Some(slots) = &mut self.slots else { return };
         let before_ns = std::mem::replace(&mut slots.advanced_ns, now_ns);
-        if before_ns != 0 && now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
+        if now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
             self.election.awakes(now_ns);
         }
     }
@@ -165,6 +178,7 @@ impl Clock {
             }
             let slots = self.slots.as_mut()?;
             (slots.synced_cycle, slots.next, slots.is_warm) = (cycle, 0, false);
+            slots.beginning = slots.beginning.saturating_sub(1);
             *(if is_master { &mut slots.counts.sent } else { &mut slots.counts.replacements_sent }) += 1;
         }
         let slots = self.slots.as_ref()?;
@@ -226,16 +240,24 @@ impl Clock {
             slots.coarse.clear();
             slots.heard_cycle = 0;
         }
-        // A master that had no time begins another: to go on by the old one is to send in the slots of those who follow it.
-        let off_ns = sync.sent_ns.abs_diff(self.line.at(received.ns).ns);
-        let is_other = sync.epoch != self.line.record().epoch || off_ns > 2 * slots.settings.delay_max_ns;
-        slots.unsure |= (contested || (turned && is_other)) && !broken!(KeepsOwnTime);
+        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
+        // Until it is measured, its time may be another: to go on by the old one is to send in the slots of those who follow it.
+        let is_measured = self.timeline == sync.began;
+        let off_ns = slots.coarse.off_ns(received.ns, self.line.at(received.ns).ns);
+        let is_other = sync.epoch != self.line.record().epoch || off_ns > slots.settings.allowance_ns;
+        slots.unsure |= (contested || (!is_measured && is_other)) && !broken!(KeepsOwnTime);
         slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
         if slots.heard_cycle != 0 {
             slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
         }
         (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
-        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+    }
+
+    /// Somebody hears no master either, and has time: whoever takes over goes on by that.
+    pub(super) fn hello_in_slots(&mut self, received: Stamp, hello: &Request) {
+        if let (Some(slots), State::Listening, true) = (&mut self.slots, self.election.state(), hello.timed) {
+            slots.coarse.add(hello.epoch, hello.sent_ns, received.ns, hello.error_ns);
+        }
     }
 
     /// Another sent in the master's place: the cycle lives. That the master was not heard remains as it is.
@@ -250,7 +272,7 @@ impl Clock {
         slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
         slots.lives_cycle = sync.cycle;
         if broken!(ReplacementCalibrates) {
-            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
         }
         Ok(())
     }
@@ -264,6 +286,43 @@ impl Clock {
         let record = *self.line.record();
         let error_ns = record.error_ns.saturating_sub(slots.master_error_ns);
         Some(Reckoning::new(TimeRecord { error_ns, ..record }))
+    }
+
+    /// The same, if it is sure enough of it to send by it.
+    pub(super) fn sure(&self, now_ns: u64) -> Option<Reckoning> {
+        let allowance_ns = self.slots.as_ref()?.settings.allowance_ns;
+        self.reckoning().filter(|own| own.bound_ns(now_ns) <= allowance_ns)
+    }
+
+    /// By what time this node would reign: that which others still go by, if it knows it well enough.
+    pub(super) fn origin_in_slots(&self, slots: &Slots, now_ns: u64) -> Origin {
+        let is_heard =
+            || self.coarse(now_ns).is_some_and(|heard| heard.bound_ns(now_ns) <= slots.settings.allowance_ns);
+        match self.sure(now_ns) {
+            Some(_) => Origin::Own,
+            None if is_heard() => Origin::Heard,
+            None => Origin::New,
+        }
+    }
+
+    /// From now on the line is what others were heard to go by. It was so all along if it is hardly off; else it goes there, and must not go
+    /// back within an epoch.
+    pub(super) fn take_up_heard(&mut self, now_ns: u64) {
+        let Some((heard, slots)) = self.coarse(now_ns).zip(self.slots.as_ref()) else { return };
+        let (epoch, system_ns) = (self.line.record().epoch, heard.system_ns(now_ns));
+        let is_timed = self.line.is_synchronised();
+        let off_ns = self.line.at(now_ns).ns.abs_diff(system_ns);
+        if is_timed && epoch == heard.epoch() && off_ns <= slots.settings.allowance_ns {
+            return;
+        }
+        let epoch = if is_timed && epoch >= heard.epoch() { epoch + 1 } else { heard.epoch() };
+        self.line.step(now_ns, epoch, system_ns, EVEN_PPB, heard.bound_ns(now_ns), 0);
+    }
+
+    /// Whether this node began a time, and others may have begun one as well: it sends nothing but Syncs.
+    pub fn is_beginning(&self) -> bool {
+        let is_master = matches!(self.election.state(), State::Master(_));
+        is_master && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
     }
 
     /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.

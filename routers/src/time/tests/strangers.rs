@@ -41,7 +41,7 @@ fn message() -> impl Strategy<Value = Message> {
                 Message::Sync(Sync { id, epoch, term, began, followed, replacement, ..times })
             }
             1 => Message::WarmUp,
-            2 => Message::Request(Request { id, error_ns, epoch, term, eager: x, far: y, timed: z }),
+            2 => Message::Request(Request { id, sent_ns: c, error_ns, epoch, term, eager: x, far: y, timed: z }),
             _ => Message::Reply(Reply {
                 id,
                 sync_ns: a,
@@ -83,7 +83,7 @@ proptest! {
         let mut now_ns = 1_000_000_000;
         let mut clock = Clock::new(settings(), now_ns, 1_790_000_000_000_000_000, None);
         if in_slots {
-            clock = clock.in_slots(InSlots { warm_ups: true, replies_in_synchronisation: false, delay_max_ns: 30_000 });
+            clock = clock.in_slots(InSlots { warm_ups: true, replies_in_synchronisation: false, delay_max_ns: 30_000, allowance_ns: 60_000 });
         }
         let mut last = clock.reading(now_ns).time;
         for (message, from, waits_ns, came_before_ns) in told {
