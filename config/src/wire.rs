@@ -2,7 +2,7 @@
 
 use crate::network::Network;
 use crate::node::Node;
-use crate::tdma::Tdma;
+use crate::tdma::{LATE, Tdma};
 use rohrpost_mailbox::HEAD_BYTES as PACKAGE_HEAD_BYTES;
 use std::time::Duration;
 
@@ -22,6 +22,29 @@ pub const REFUSAL_BYTES: usize = 16;
 pub const KEPT_IN_BYTES: u64 = 256;
 /// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
 pub const HAND_OVER: Duration = Duration::from_micros(20);
+
+/// What of time goes in the windows of a system with time slots: the rule by which clocks send, and bounds are computed.
+///
+/// In each of its synchronisation windows the master sends a Sync to every other node. If the window has room for twice as many frames,
+/// a warm-up goes before each of them; if it has room for a reply to each besides, replies go there too, and nowhere else; otherwise in slots of
+/// the master, before all else. A slave sends a warm-up and a request in a slot, before all else, at most once in a cycle; who hears no master a
+/// request to each master. A window has room for what is through before its guard also when it is begun [`LATE`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TimeShare {
+    /// A warm-up goes before each Sync.
+    pub warm_ups: bool,
+    /// Replies go in the synchronisation window alone.
+    pub replies_in_synchronisation: bool,
+    /// Frames of time at most in each slot of a node.
+    pub frames_in_slot: usize,
+}
+
+impl TimeShare {
+    /// `heads_bytes`: what IP and UDP put before each datagram.
+    pub fn new(tdma: &Tdma, heads_bytes: usize, nodes: usize, masters: usize) -> Self {
+        Link { bytes_s: tdma.link_bytes_s.max(1), heads_bytes, datagram_bytes_max: 0 }.time_share(tdma, nodes, masters)
+    }
+}
 
 /// The link of a system with time slots.
 #[derive(Clone, Copy, Debug)]
@@ -69,20 +92,24 @@ impl Link {
         self.takes_ns(FRAME_HEAD_BYTES + ALIVE_BYTES)
     }
 
-    /// Frames of time that a synchronisation window has room for.
-    pub(crate) fn frames_in_synchronisation(&self, tdma: &Tdma) -> usize {
-        let sends_ns = tdma.synchronisation.saturating_sub(tdma.guard).as_nanos() as u64;
-        (sends_ns / self.time_wire_ns()) as usize
+    /// What of time goes where.
+    fn time_share(&self, tdma: &Tdma, nodes: usize, masters: usize) -> TimeShare {
+        let others = nodes.saturating_sub(1);
+        let sends_ns = tdma.synchronisation.saturating_sub(tdma.guard + LATE).as_nanos() as u64;
+        let frames = (sends_ns / self.time_ns()) as usize;
+        let replies_in_synchronisation = frames >= 3 * others;
+        let replies = if replies_in_synchronisation { 0 } else { others };
+        let frames_in_slot = replies.max(2).max(masters);
+        TimeShare { warm_ups: frames >= 2 * others, replies_in_synchronisation, frames_in_slot }
     }
 
     /// What routers say to each other in a slot at most, before any package, ns: frames of time, one to each other node that says "still
-    /// there", and a refusal. A slave sends a warm-up and a request, or a request to each master; a master its replies, unless its
-    /// synchronisation window has room for them besides a warm-up and a Sync to each.
+    /// there", and a refusal.
     pub(crate) fn said_ns(&self, tdma: &Tdma, nodes: usize, masters: usize) -> u64 {
         let others = nodes.saturating_sub(1);
-        let replies = if self.frames_in_synchronisation(tdma) >= 3 * others { 0 } else { others };
         let refusal_ns = self.takes_ns(FRAME_HEAD_BYTES + REFUSAL_BYTES);
-        replies.max(2).max(masters) as u64 * self.time_ns() + others as u64 * self.alive_ns() + refusal_ns
+        let frames = self.time_share(tdma, nodes, masters).frames_in_slot;
+        frames as u64 * self.time_ns() + others as u64 * self.alive_ns() + refusal_ns
     }
 
     /// What the datagrams of a package take, none of them shared with another package.

@@ -7,7 +7,7 @@ use super::plan::{Plan, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::fragment::PARTIAL_MAX;
 use crate::frame::{Frame, FrameHead, NodeIndex};
-use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS};
+use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS, TICK_EVERY_NS};
 use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
@@ -27,6 +27,8 @@ pub const PORT: Port = 0;
 pub(super) const DIGEST: u64 = 0x1234_5678;
 /// A router that did nothing for so long stood still: threads do not wake that late.
 const STILL_NS: u64 = 400_000_000;
+/// So long after a datagram came what went before it, and is missing, is counted as lost: at the third tick.
+const SETTLED_NS: u64 = 3 * TICK_EVERY_NS + STILL_NS;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
@@ -296,9 +298,10 @@ impl Packages {
         }
     }
 
-    /// At the end all losses on the wire are known.
+    /// At the end all losses on the wire are known, but of who came so late that what is missing may still come.
     fn check_losses(&self, io: &mut Io<'_>) {
-        for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node) {
+        let is_settled = |peer: &usize| io.now.monotonic_ns - self.present_since_ns[*peer] > SETTLED_NS;
+        for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node).filter(is_settled) {
             let missing = io.book.missing(io.life, peer as NodeIndex);
             let counted = self.stats.peer(peer as NodeIndex).received.missing();
             if missing.is_some_and(|missing| missing != counted) {

@@ -2,10 +2,12 @@
 //! blamed for transmitting at once.
 
 use super::chance::Chance;
+use super::host::COMMAND_SLOTS;
 use super::link::Quality;
 use super::plan::{Fault, MS, Plan, Planned, S, US};
 use crate::frame::NodeIndex;
 use crate::time::{JOINING_SYNCS, TIME_BYTES};
+use rohrpost_config::wire::HAND_OVER;
 use rohrpost_config::{Tdma, TimeSlot};
 use std::ops::Range;
 use std::time::Duration;
@@ -103,8 +105,24 @@ impl Plan {
         plan.timed_ns += 2 * u64::from(JOINING_SYNCS) * plan.shape.interval_ns + DEAF_NS;
         plan.end_ns = plan.end_ns.max(plan.timed_ns + S);
         plan.draw_all(chance);
+        plan.spread_calls();
         plan.divide();
         plan
+    }
+
+    /// Commands that wait behind large packages come all at once: no more of them than fit in a mailbox, else some are lost though all is
+    /// well.
+    fn spread_calls(&mut self) {
+        let large = |node: usize| {
+            let flows = self.flows.iter().filter(move |flow| flow.node == node && flow.burst == 1);
+            flows.map(|flow| flow.bytes.1).sum::<u64>()
+        };
+        let most_bytes = (0..self.nodes.len()).map(large).max().unwrap_or(0);
+        let behind_ns = most_bytes * S / self.shape.rate_bytes_s.max(1);
+        let callers = self.calls.len() as u64;
+        for calls in &mut self.calls {
+            calls.period_ns = calls.period_ns.max(4 * callers * behind_ns / COMMAND_SLOTS as u64);
+        }
     }
 
     /// When faults divide the network.
@@ -144,7 +162,7 @@ pub fn node_bytes_s(table: &Tdma, node: usize) -> u64 {
 fn table(plan: &Plan, link_bytes_s: u64, chance: &mut Chance) -> Tdma {
     let others = plan.nodes.len() as u64 - 1;
     let datagram_ns = takes_ns(plan.shape.datagram_bytes_max + AROUND_BYTES, link_bytes_s);
-    let time_ns = takes_ns(TIME_WIRE_BYTES, link_bytes_s);
+    let time_ns = takes_ns(TIME_WIRE_BYTES, link_bytes_s).max(HAND_OVER.as_nanos() as u64);
     let guard_ns = chance.between(100, 250) * US;
     // For each slave a synchronisation; or a warm-up, too; or a reply, too. Without it replies go in the slots of the master.
     let frames = chance.pick(&[1, 2, 3, 3]) * others;

@@ -7,6 +7,8 @@ use crate::time::Stamp;
 const HISTORY: usize = 64;
 /// The least of so many and as many before counts for what may be relied on.
 const LEAST_OF: u32 = 1024;
+/// Calls are made earlier when so many have been measured: one that is quicker than the least of them is seldom.
+const KNOWN_FROM: u32 = 256;
 /// What took longer was kept up by something else.
 const LEAD_NS_MAX: u64 = 1_000_000;
 /// A stamp that may be further off says too little.
@@ -59,7 +61,8 @@ impl Lead {
 
     /// By how much a call may be earlier, ns, and yet no frame has been seen that would have left too early.
     pub(super) fn ns(&self) -> u64 {
-        if self.count < HISTORY {
+        let is_known = self.least[1] < u64::MAX || self.in_span >= KNOWN_FROM;
+        if !is_known {
             return 0;
         }
         if broken!(LeadTooLong) { 2 * self.median_ns } else { self.median_ns.min(self.least[0]).min(self.least[1]) }

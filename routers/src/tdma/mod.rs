@@ -23,9 +23,8 @@
 //! 1. [`Discipline::next`]; sleep until [`Planned::wake_ns`], or until a datagram of time comes.
 //! 2. Hand all datagrams of time that came to the [`Clock`](crate::time::Clock), so that it knows whether the master was heard. Spin until [`Planned::call_ns`].
 //! 3. [`Discipline::judge`]. With a [`Permit`]: as long as a datagram of time fits, [`Clock::poll_in`](crate::time::Clock::poll_in) with
-//!    [`Permit::allowed`], until it waits; or with [`Permit::spaced`], and if that waits for a moment within the window, spin until then and ask
-//!    again. Then what must be said, then packages, each asked for by [`Permit::room_bytes`] and told by [`Permit::takes`]. At last
-//!    [`Discipline::close`].
+//!    [`Permit::allowed`], until it waits. Then what must be said, then packages, each asked for by [`Permit::room_bytes`] and told by
+//!    [`Permit::takes`]. At last [`Discipline::close`].
 //! 4. The kernel's stamp of the first datagram of a window goes to [`Discipline::left`].
 
 mod discipline;
@@ -38,7 +37,7 @@ pub mod wire;
 
 pub use discipline::{Counts, Discipline, Next, Planned, Silent, Verdict};
 pub use permit::{Carries, Permit};
-pub use table::{Kind, Owner, Table, TimeShare, Window};
+pub use table::{Kind, Owner, Table, Window};
 pub use wire::Wire;
 
 /// A window whose wake-up comes so much after its beginning is not used.

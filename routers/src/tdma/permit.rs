@@ -73,23 +73,13 @@ impl Permit {
         self.wire_bytes
     }
 
-    /// What the clock may send in it now.
+    /// What the clock may send in it.
     pub fn allowed(&self) -> Allowed {
-        self.allowed_from(0)
-    }
-
-    /// The same, but the clock waits with what is stamped until the wire is free: see [`Allowed`]. Worth it where datagrams queue up behind
-    /// their stamps, in a network card.
-    pub fn spaced(&self) -> Allowed {
-        self.allowed_from(self.free_ns.saturating_sub(self.lead_ns))
-    }
-
-    fn allowed_from(&self, free_ns: u64) -> Allowed {
         match self.window.kind {
             Kind::Synchronisation { .. } => {
-                Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns, free_ns }
+                Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns }
             }
-            Kind::Slot { .. } => Allowed::Slot { free_ns },
+            Kind::Slot { .. } => Allowed::Slot,
         }
     }
 }

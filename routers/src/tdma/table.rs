@@ -12,8 +12,9 @@
 use super::wire::Wire;
 use crate::broken::broken;
 use crate::frame::NodeIndex;
-use crate::time::{InSlots, TIME_BYTES};
+use crate::time::InSlots;
 use rohrpost_config::Tdma;
+use rohrpost_config::wire::TimeShare;
 use std::time::Duration;
 
 /// What a window is for.
@@ -55,36 +56,16 @@ pub struct Owner {
     pub is_guard: bool,
 }
 
-/// What of time fits in the windows of a system: the rule by which clocks send, for `check` and for the analysis of bounds.
-///
-/// In each of its synchronisation windows the master sends a Sync to every other node. If the window has room for twice as many frames,
-/// a warm-up goes before each of them; if it has room for a Reply to each besides, Replies go there too, and nowhere else; otherwise in slots of the
-/// master, before all else. A slave sends a warm-up and a Request in a slot, before all else, at most once in a cycle; who hears no master a
-/// Request to each master. All these are datagrams of [`TIME_BYTES`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct TimeShare {
-    /// Frames of time that a synchronisation window has room for.
-    pub frames_in_synchronisation: usize,
-    /// A warm-up goes before each Sync.
-    pub warm_ups: bool,
-    /// Replies go in the synchronisation window alone.
-    pub replies_in_synchronisation: bool,
-    /// Every other node gets a Sync in each cycle. If not, some do in turns, and all others miss some: too few to rely on.
-    pub suffices: bool,
-    /// Frames of time at most in each slot of a node.
-    pub frames_in_slot: usize,
-}
-
 /// The slots of a system, and which of its windows are this node's.
 #[derive(Clone, Debug)]
 pub struct Table {
     own: NodeIndex,
-    nodes: u8,
     masters: Vec<NodeIndex>,
     cycle_ns: u64,
     synchronisation_ns: u64,
     guard_ns: u64,
     wire: Wire,
+    share: TimeShare,
     slots: Vec<Slot>,
 }
 
@@ -110,12 +91,12 @@ impl Table {
         });
         Self {
             own,
-            nodes,
             masters: masters.to_vec(),
             cycle_ns: ns(tdma.cycle).max(1),
             synchronisation_ns: ns(tdma.synchronisation),
             guard_ns: ns(tdma.guard),
             wire: Wire::new(tdma, heads_bytes),
+            share: TimeShare::new(tdma, heads_bytes, nodes.into(), masters.len()),
             slots: slots.collect(),
         }
     }
@@ -204,28 +185,11 @@ impl Table {
         &self.wire
     }
 
-    /// What of time goes in which windows.
-    pub fn time_share(&self) -> TimeShare {
-        let sends_ns = self.synchronisation_ns.saturating_sub(self.guard_ns);
-        let fits = self.wire.bytes_in(sends_ns) / self.wire.bytes(TIME_BYTES);
-        let others = usize::from(self.nodes.saturating_sub(1));
-        let replies_in_synchronisation = fits >= 3 * others;
-        let replies = if replies_in_synchronisation { 0 } else { others };
-        TimeShare {
-            frames_in_synchronisation: fits,
-            warm_ups: fits >= 2 * others,
-            replies_in_synchronisation,
-            suffices: fits >= others,
-            frames_in_slot: replies.max(2).max(self.masters.len()),
-        }
-    }
-
     /// What a clock in time slots has to know of them.
     pub fn for_clock(&self) -> InSlots {
-        let share = self.time_share();
         InSlots {
-            warm_ups: share.warm_ups,
-            replies_in_synchronisation: share.replies_in_synchronisation,
+            warm_ups: self.share.warm_ups,
+            replies_in_synchronisation: self.share.replies_in_synchronisation,
             delay_max_ns: self.guard_ns / 4,
             allowance_ns: self.allowance_ns(),
         }

@@ -60,13 +60,6 @@ enum Draft {
     Reply { id: u64, came: Stamp },
 }
 
-impl Draft {
-    /// Whether it matters when it leaves.
-    fn is_stamped(&self) -> bool {
-        matches!(self, Self::Sync { .. } | Self::Replacement { .. } | Self::Request { id: 1.. })
-    }
-}
-
 /// The sans-I/O core of time. See the module's own page.
 pub struct Clock {
     settings: TimeSettings,

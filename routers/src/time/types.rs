@@ -119,7 +119,7 @@ pub struct Exchange {
     pub by_kernel: bool,
 }
 
-/// What a clock in time slots has to know of them; see [`TimeShare`](crate::tdma::TimeShare).
+/// What a clock in time slots has to know of them; see [`TimeShare`](rohrpost_config::wire::TimeShare).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct InSlots {
     /// A warm-up goes before each Sync.

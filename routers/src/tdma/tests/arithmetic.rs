@@ -147,14 +147,11 @@ pub(super) fn windows_end_where_their_guard_begins() {
 
 #[test]
 fn time_takes_what_the_table_says() {
-    // 108 bytes, and 28 and 38 of heads: 174 bytes, 13.92 µs; ten in 150 µs.
-    let share = table(0).time_share();
-    assert_eq!((share.frames_in_synchronisation, share.frames_in_slot), (10, 2));
-    assert!(share.warm_ups && share.replies_in_synchronisation && share.suffices);
-    let many = |nodes| Table::new(&tdma(), &MASTERS, 0, nodes, HEADS).time_share();
-    assert!(many(6).warm_ups && !many(6).replies_in_synchronisation, "five others");
-    assert_eq!(many(6).frames_in_slot, 5);
-    assert!(!many(7).warm_ups && many(11).suffices && !many(12).suffices);
+    // 150 µs, of which 50 are for a late beginning; 20 µs for each frame.
+    let many = |nodes| Table::new(&tdma(), &MASTERS, 0, nodes, HEADS).for_clock();
+    assert!(many(2).warm_ups && many(2).replies_in_synchronisation, "one other node");
+    assert!(many(3).warm_ups && !many(3).replies_in_synchronisation, "two others");
+    assert!(!many(4).warm_ups, "three others");
     assert_eq!(table(0).wire().ns(108), 13_920);
     assert_eq!(table(0).wire().bytes(0), 84, "a packet is filled up to 46 bytes");
 }

@@ -73,7 +73,7 @@ impl Lonely {
         let Verdict::Send(permit) = verdict else { panic!("{verdict:?}") };
         let mut datagram = [0; TIME_BYTES];
         let mut kinds = Vec::new();
-        let allowed = Allowed::Slot { free_ns: permit.begin_ns };
+        let allowed = permit.allowed();
         while let Step::Send { to, stamp } = self.clock.poll_in(self.now_ns, allowed, &mut datagram) {
             assert_eq!(to, 0);
             kinds.push(FrameHead::parse(&datagram).unwrap().0.kind);
@@ -100,8 +100,8 @@ impl Lonely {
             one.hears_sync();
         }
         // It asks no more.
-        one.clock.poll_in(one.now_ns, Allowed::Slot { free_ns: 0 }, &mut [0; TIME_BYTES]);
-        one.clock.poll_in(one.now_ns, Allowed::Slot { free_ns: 0 }, &mut [0; TIME_BYTES]);
+        one.clock.poll_in(one.now_ns, Allowed::Slot, &mut [0; TIME_BYTES]);
+        one.clock.poll_in(one.now_ns, Allowed::Slot, &mut [0; TIME_BYTES]);
         one
     }
 }
@@ -176,7 +176,7 @@ pub(super) fn silence_begins_right_above_the_allowance() {
 pub(super) fn no_frame_starts_before_its_slot() {
     let mut one = Lonely::joined();
     // From the call to the wire it takes 12, 13, … µs.
-    for sample in 0..100 {
+    for sample in 0..300 {
         let left = Stamp { ns: one.now_ns + 12 * US + sample % 10 * US, doubt_ns: 0, by_kernel: true };
         one.discipline.left(one.now_ns, left);
     }
@@ -235,7 +235,7 @@ pub(super) fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     assert_eq!(one.clock.heard_ns(one.now_ns), heard_ns, "the master is as silent as before");
     assert_eq!(one.clock.coarse(one.now_ns), coarse, "nobody goes by it");
     assert_eq!(one.clock.sync_counts().replacements_heard, counts.replacements_heard + 1);
-    let asks = one.clock.poll_in(one.now_ns, Allowed::Slot { free_ns: 0 }, &mut [0; TIME_BYTES]);
+    let asks = one.clock.poll_in(one.now_ns, Allowed::Slot, &mut [0; TIME_BYTES]);
     assert!(matches!(asks, Step::Wait { .. }), "nobody asks after it: {asks:?}");
     one.cycle += 2;
     one.now_ns += 2 * CYCLE;

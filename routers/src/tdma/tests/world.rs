@@ -108,8 +108,6 @@ pub(super) struct World {
     pub(super) unsure: u32,
     /// One wake-up in so many comes up to 3 ms late; 0: none does.
     pub(super) stalls: u32,
-    /// What is stamped waits until the wire is free.
-    pub(super) spaced: bool,
     random: ChaCha8Rng,
 }
 
@@ -129,17 +127,7 @@ impl World {
         });
         let nodes = nodes.collect();
         let (wire, collisions) = (Vec::new(), Vec::new());
-        Self {
-            now: SECOND,
-            nodes,
-            wire,
-            cut: [[false; 3]; 3],
-            collisions,
-            unsure: 0,
-            stalls: 0,
-            spaced: seed.is_multiple_of(2),
-            random,
-        }
+        Self { now: SECOND, nodes, wire, cut: [[false; 3]; 3], collisions, unsure: 0, stalls: 0, random }
     }
 
     pub(super) fn start(&mut self, node: NodeIndex) {
@@ -280,7 +268,7 @@ impl World {
     }
 
     fn send(&mut self, node: NodeIndex, mut permit: crate::tdma::Permit) {
-        let (mut free, spaced) = (0, self.spaced);
+        let mut free = 0;
         loop {
             let one = &mut self.nodes[usize::from(node)];
             let local_ns = one.local_ns(self.now);
@@ -289,15 +277,7 @@ impl World {
             if !permit.fits(local_ns, TIME_BYTES) {
                 break;
             }
-            let (to, stamp) =
-                match clock.poll_in(local_ns, if spaced { permit.spaced() } else { permit.allowed() }, &mut bytes) {
-                    Step::Send { to, stamp } => (to, stamp),
-                    Step::Wait { until_ns } if until_ns > local_ns && until_ns < permit.end_ns => {
-                        self.now = one.true_ns(until_ns);
-                        continue;
-                    }
-                    Step::Wait { .. } => break,
-                };
+            let Step::Send { to, stamp } = clock.poll_in(local_ns, permit.allowed(), &mut bytes) else { break };
             permit.takes(local_ns, TIME_BYTES);
             let frame = self.put(node, TIME_BYTES, &mut free, true);
             let one = &mut self.nodes[usize::from(node)];

@@ -36,12 +36,15 @@ impl Clock {
         if request.far && request.term.round() <= own.round() {
             self.begin_epoch(received.ns, request.epoch);
         }
-        if self.slots.is_some() {
-            // One answer to each is enough, however many questions came before there is a window.
-            self.drafts.retain(|(to, draft)| *to != from || !matches!(draft, Draft::Reply { .. }));
-        }
-        if self.drafts.len() < self.drafts.capacity() {
-            self.drafts.push_back((from, Draft::Reply { id: request.id, came: received }));
+        let reply = Draft::Reply { id: request.id, came: received };
+        let waits = |(to, draft): &(NodeIndex, Draft)| *to == from && matches!(draft, Draft::Reply { .. });
+        let waiting = self.slots.as_ref().and_then(|_| self.drafts.iter().position(waits));
+        // In time slots one answer to each is enough, however many questions came before there is a window. It keeps its place: else who asks
+        // again and again would never be answered where not all answers fit.
+        if let Some(at) = waiting {
+            self.drafts[at] = (from, reply);
+        } else if self.drafts.len() < self.drafts.capacity() {
+            self.drafts.push_back((from, reply));
         }
         Ok(())
     }

@@ -22,29 +22,14 @@ pub enum Allowed {
     /// Nothing: only what the passing of time does, with roles, page and bound.
     Nothing,
     /// It is a slot of this node: what asks and answers.
-    Slot {
-        /// What is stamped waits until then, local ns: when the wire has carried what was handed over before. Else it might stand in the
-        /// queue of a network card after its stamp, and the way seem longer than it is. 0: it does not wait.
-        free_ns: u64,
-    },
+    Slot,
     /// It is the window of this node's synchronisation.
     Synchronisation {
         /// Of this cycle.
         cycle: u64,
         /// When the window begins, system ns.
         nominal_ns: u64,
-        /// As in a slot.
-        free_ns: u64,
     },
-}
-
-impl Allowed {
-    fn free_ns(self) -> u64 {
-        match self {
-            Self::Nothing => 0,
-            Self::Slot { free_ns } | Self::Synchronisation { free_ns, .. } => free_ns,
-        }
-    }
 }
 
 /// What a clock in time slots remembers besides.
@@ -108,19 +93,13 @@ impl Clock {
     }
 
     /// As [`Clock::poll`], of a clock in time slots: what may leave now. All that came is to be handed over before: a backup master
-    /// sends when it has not heard the master's Sync of this cycle. It may have to wait until the wire is free, within the window: until
-    /// then nothing else should be handed over. What has to wait for another window is not waited for.
+    /// sends when it has not heard the master's Sync of this cycle. What has to wait for another window is not waited for.
     pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
         self.advance(now_ns);
-        let is_slot = matches!(allowed, Allowed::Slot { .. });
-        if is_slot && self.drafts.is_empty() && self.election.state() == State::Listening {
+        if allowed == Allowed::Slot && self.drafts.is_empty() && self.election.state() == State::Listening {
             self.draft_hello(now_ns);
         }
         while let Some((to, draft)) = self.next_in(now_ns, allowed) {
-            if draft.is_stamped() && now_ns < allowed.free_ns() {
-                self.put_back(to, draft);
-                return Step::Wait { until_ns: allowed.free_ns() };
-            }
             if let Some(stamp) = self.write(now_ns, to, draft, datagram) {
                 return Step::Send { to, stamp };
             }
@@ -142,25 +121,15 @@ impl Clock {
         let is_reply = |draft: &Draft| matches!(draft, Draft::Reply { .. });
         match allowed {
             Allowed::Nothing => None,
-            Allowed::Synchronisation { cycle, nominal_ns, .. } => {
+            Allowed::Synchronisation { cycle, nominal_ns } => {
                 self.next_sync(now_ns, cycle, nominal_ns).or_else(|| self.take_draft(is_reply))
             }
-            Allowed::Slot { .. } if broken!(SyncInForeignWindow) => {
+            Allowed::Slot if broken!(SyncInForeignWindow) => {
                 let cycle = self.line.at(now_ns).ns / self.interval_ns;
                 let sync = self.next_sync(now_ns, cycle, cycle * self.interval_ns);
                 sync.or_else(|| self.take_draft(|_| true))
             }
-            Allowed::Slot { .. } => self.take_draft(|draft| !(replies_wait && is_reply(draft))),
-        }
-    }
-
-    /// It was next, and is again.
-    fn put_back(&mut self, to: NodeIndex, draft: Draft) {
-        match (draft, &mut self.slots) {
-            (Draft::Sync { .. } | Draft::Replacement { .. }, Some(slots)) => {
-                (slots.next, slots.is_warm) = (slots.next - 1, true)
-            }
-            _ => self.drafts.push_front((to, draft)),
+            Allowed::Slot => self.take_draft(|draft| !(replies_wait && is_reply(draft))),
         }
     }
 

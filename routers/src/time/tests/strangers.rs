@@ -95,8 +95,8 @@ proptest! {
                 prop_assert!(sent < 100, "it sends without end");
                 let step = match sent % 3 {
                     _ if !in_slots => clock.poll(now_ns, &mut datagram),
-                    0 => clock.poll_in(now_ns, Allowed::Slot { free_ns: 0 }, &mut datagram),
-                    1 => clock.poll_in(now_ns, Allowed::Synchronisation { cycle: now_ns, nominal_ns: now_ns, free_ns: 0 }, &mut datagram),
+                    0 => clock.poll_in(now_ns, Allowed::Slot, &mut datagram),
+                    1 => clock.poll_in(now_ns, Allowed::Synchronisation { cycle: now_ns, nominal_ns: now_ns }, &mut datagram),
                     _ => clock.poll_in(now_ns, Allowed::Nothing, &mut datagram),
                 };
                 match step {
