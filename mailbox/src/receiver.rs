@@ -69,6 +69,12 @@ impl Receiver {
         Some(self.hand_out(in_hand))
     }
 
+    /// How many packages wait, and how important the first is: all stay where they are. One that gave way just now may still be counted.
+    pub fn waits(&mut self) -> (usize, Option<Priority>) {
+        self.settle();
+        (self.queue.len(), self.queue.first())
+    }
+
     fn hand_out(&self, in_hand: InHand) -> Package<'_> {
         Package { segment: &self.segment, queue: &self.queue, in_hand }
     }

@@ -22,6 +22,7 @@ enum Step {
         priority: u8,
     },
     Receive,
+    Look,
     /// The receiver goes, another adopts.
     Restart,
 }
@@ -32,6 +33,7 @@ fn step() -> impl Strategy<Value = Step> {
         6 => (sends.clone(), 0u16..3).prop_map(|((sender, priority), state)| Step::Send { sender, priority, state }),
         1 => sends.prop_map(|(sender, priority)| Step::DropLoan { sender, priority }),
         4 => Just(Step::Receive),
+        1 => Just(Step::Look),
         1 => Just(Step::Restart),
     ]
 }
@@ -130,6 +132,13 @@ fn agree(slots: u16, full: Full, steps: &[Step]) {
                 assert_eq!(senders[sender].loan(Priority(priority)).is_ok(), model.claim(priority));
             }
             Step::Receive => assert_eq!(receive(&mut receiver), model.receive()),
+            Step::Look => {
+                // What gave way to a loan that was dropped is still counted.
+                let (count, first) = receiver.waits();
+                let there = model.waiting.iter().map(|package| package.priority).max();
+                assert!((model.waiting.len()..=model.slots).contains(&count), "{count}");
+                assert!(first.map(|first| first.0) >= there, "{first:?}, {there:?}");
+            }
             Step::Restart => {
                 drop(receiver);
                 receiver = ground.join().receiver(MAILBOX, shape).unwrap();

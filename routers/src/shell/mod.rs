@@ -213,7 +213,7 @@ impl Shell {
         let spin_ns = slots::spin_ns(table.cycle_ns());
         let (refusals, line) = sync_channel(slots::REFUSALS);
         let discipline = Discipline::new(table, spin_ns);
-        let slots = Slots::new(departures, works, discipline, self.socket.clone(), line);
+        let slots = Slots::new(departures, works, discipline, settings.network, self.socket.clone(), line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(refusals)

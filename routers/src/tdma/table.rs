@@ -143,11 +143,6 @@ impl Table {
         self.synchronisation(rank, self.cycles_begun(from_ns, offset_ns))
     }
 
-    /// How many windows of this node there are in a cycle at most: slots, and that of its synchronisation.
-    pub fn own_windows_of_cycle(&self) -> u64 {
-        self.own_slots().count() as u64 + u64::from(self.rank().is_some())
-    }
-
     /// How many slots of this node begin from `from_ns` on and before `to_ns`, system time.
     pub fn slots_between(&self, from_ns: u64, to_ns: u64) -> u64 {
         let slots = self.own_slots().map(|(_, slot)| {

@@ -19,6 +19,11 @@ pub(crate) fn module(node: u8) -> Name {
     Name::new(1, 100, node, 0)
 }
 
+/// The router of a node.
+pub(crate) fn router(node: u8) -> Name {
+    Name::new(1, 250, node, 0)
+}
+
 /// Answers with the cause's word, behind the first bytes of the command.
 pub(crate) struct Words;
 
@@ -61,11 +66,37 @@ pub(crate) fn turns() -> Tdma {
 }
 
 impl Side {
+    /// Without a router yet. `addresses`: of both.
+    pub(crate) fn new(own: u8, node: Arc<Node>, addresses: [IpAddr; 2], tdma: Option<Tdma>) -> Self {
+        let there = module(1 - own);
+        let nodes = [0, 1].map(|node| NodeSettings { name: format!("node{node}"), address: addresses[node] });
+        let network = Network {
+            port: 21_117,
+            mtu: 1500,
+            datagram_bytes_max: 1472,
+            rate_bytes_s: 1 << 30,
+            quota_bytes: 1 << 20,
+            bulk_below: 16,
+        };
+        let settings = Settings {
+            system: 1,
+            own,
+            nodes: nodes.into(),
+            digest: 7,
+            incarnation: 1,
+            network,
+            tdma,
+            routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
+            senders: vec![vec![module(own)]],
+        };
+        Self { node, settings, shell: None }
+    }
+
     /// Ends its router, if it has one, and starts it anew.
     pub(crate) fn start(&mut self) {
         self.shell = None;
         self.settings.incarnation += 1;
-        let name = Name::new(1, 250, self.settings.own, 0);
+        let name = router(self.settings.own);
         let (settings, faults, clock) = (self.settings.clone(), Arc::new(Words), self.clock());
         let parts = Parts { node: &self.node, name, settings, faults, impair: None, clock };
         self.shell = Some(Shell::start(parts).unwrap());
@@ -109,6 +140,7 @@ pub(crate) struct Pair {
 }
 
 impl Pair {
+    #[allow(dead_code, reason = "each test uses a part")]
     pub(crate) fn new() -> Self {
         Self::with(None)
     }
@@ -122,32 +154,9 @@ impl Pair {
             IpAddr::V4(Ipv4Addr::new(127, 128 + (pid / 250 % 120) as u8, (pid % 250) as u8, 2 * (1 + count) + node))
         };
         let folder = tempfile::Builder::new().prefix("rohrpost-shell-").tempdir_in("/dev/shm").unwrap();
-        let nodes = || [0, 1].map(|node| NodeSettings { name: format!("node{node}"), address: address(node) });
-        let network = Network {
-            port: 21_117,
-            mtu: 1500,
-            datagram_bytes_max: 1472,
-            rate_bytes_s: 1 << 30,
-            quota_bytes: 1 << 20,
-            bulk_below: 16,
-        };
-        let sides = [0, 1].map(|own| {
-            let there = module(1 - own);
-            let mut side = Side {
-                node: Node::create(&folder.path().join(format!("node{own}")), 0o700).unwrap(),
-                settings: Settings {
-                    system: 1,
-                    own,
-                    nodes: nodes().into(),
-                    digest: 7,
-                    incarnation: 1,
-                    network,
-                    tdma: tdma.clone(),
-                    routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
-                    senders: vec![vec![module(own)]],
-                },
-                shell: None,
-            };
+        let sides = [0, 1].map(|own: u8| {
+            let node = Node::create(&folder.path().join(format!("node{own}")), 0o700).unwrap();
+            let mut side = Side::new(own, node, [0, 1].map(address), tdma.clone());
             side.start();
             side
         });

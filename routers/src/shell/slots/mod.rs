@@ -3,8 +3,9 @@
 //! ```text
 //!        sleep, at most a millisecond at a time             wake    call begin              guard
 //!  ──┬──────────────┬──────────────┬─────────────────────────┬───────┬────┬───────────────────┬─────▶ local time
-//!    mailbox ─▶ queue   the same       the same              │ spin  │lead│ time, refusal,    │
-//!                                       stamps, datagrams of time ─▶ Clock  │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
+//!    is the mailbox full?   the same      the same           │ spin  │lead│ time, refusal,    │
+//!    does one wait in vain?     stamps, datagrams of time ─▶ Clock,    │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
+//!                                                      mailbox ─▶ queue
 //! ```
 //!
 //! Nothing but this thread sends, and this thread only with a [`Permit`]. It is never rung: who publishes a package makes no system call, and
@@ -12,6 +13,8 @@
 
 mod alarm;
 mod granted;
+mod held;
+mod intake;
 mod state;
 
 pub use granted::Granted;
@@ -23,10 +26,14 @@ use super::departures::{Departures, Wire};
 use super::socket::InSocket;
 use super::threads::Shared;
 use crate::frame::{FrameHead, NodeIndex};
-use crate::outbound::{Outbound, Package};
-use crate::tdma::{Carries, Counts, Discipline, Next, Permit, Planned, Silent, Verdict};
+use crate::outbound::Outbound;
+use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Permit, Planned, Silent, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
-use rohrpost_mailbox::{Receiver, monotonic_ns};
+use held::Held;
+use intake::Intake;
+use rohrpost_config::Network;
+use rohrpost_config::wire::HAND_OVER;
+use rohrpost_mailbox::monotonic_ns;
 use std::io::IoSlice;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -39,14 +46,13 @@ const SPIN_NS_MAX: u64 = 150_000;
 const SPIN_CYCLES: u64 = 20;
 /// In the last moments before the call nothing is begun that might last until then.
 const QUIET_NS: u64 = 20_000;
-/// The mailbox is looked into this often: it has room for a burst of 64 packages.
+/// Whether the mailbox is full is looked at this often: half of it has room for a burst of 32 packages.
 const NAP_NS: u64 = 1_000_000;
-/// A datagram that was made and missed its slot waits for another at most so long.
-const HELD_NS_MAX: u64 = 100_000_000;
-/// Packages taken from the mailbox at a time: all that it may hold.
-const BURST: usize = 64;
-/// Packages taken between two datagrams of a slot: what came just now, and is perhaps more important.
-const FEW: usize = 4;
+/// With less than this until it has to wake up it sleeps on: the look at the mailbox would last too long.
+const NAP_NS_MIN: u64 = NAP_NS / 4;
+/// A datagram is made so long before it is handed over, at most, unless the thread stands still.
+const MAKING_NS: u64 = 10_000;
+const _: () = assert!(MAKING_NS < HAND_OVER.as_nanos() as u64, "bounds have room for it");
 /// Room for the longest refusal.
 pub(super) const REFUSAL_BYTES: usize = 128;
 /// Refusals that wait for a slot; more are lost, and said again a second later.
@@ -69,7 +75,7 @@ pub(super) struct Slots {
     shared: Arc<Shared>,
     works: Works,
     discipline: Discipline,
-    transit: Receiver,
+    intake: Intake,
     outbound: Outbound,
     answers: Answers,
     wire: Wire,
@@ -81,7 +87,8 @@ pub(super) struct Slots {
     /// Room for the largest datagram.
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
-    held: Option<(NodeIndex, usize, u64)>,
+    held: Option<Held>,
+    network: Network,
     /// When the socket of time was read last, local ns.
     looked_ns: u64,
     /// The first datagram of the last window, if the kernel stamps it.
@@ -106,6 +113,7 @@ impl Slots {
         departures: Departures,
         works: Works,
         discipline: Discipline,
+        network: Network,
         socket: Arc<InSocket>,
         refusals: mpsc::Receiver<Refusal>,
     ) -> Self {
@@ -123,7 +131,7 @@ impl Slots {
             shared,
             works,
             discipline,
-            transit,
+            intake: Intake::new(transit),
             outbound,
             answers,
             wire,
@@ -132,6 +140,7 @@ impl Slots {
             refusal: None,
             datagram,
             held: None,
+            network,
             looked_ns: 0,
             first: None,
             snapshot,
@@ -162,7 +171,7 @@ impl Slots {
                 Next::Silent { until_ns, .. } => (None, until_ns),
             };
             let left_ns = wake_ns.saturating_sub(now_ns);
-            if left_ns > NAP_NS {
+            if left_ns > NAP_NS_MIN {
                 // Not so that the rest is a short one.
                 alarm::sleep(NAP_NS.min(left_ns / 2));
                 self.between(planned.is_none());
@@ -177,12 +186,12 @@ impl Slots {
         }
     }
 
-    /// Between windows: makes room in the mailbox. Whoever is `silent` waits for datagrams of time; others read them once a cycle at least.
+    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is `silent` waits for datagrams of time; others read them once a cycle at least.
     fn between(&mut self, silent: bool) {
         let now_ns = monotonic_ns();
         self.drop_if_old();
         self.outbound.tidy(now_ns, &mut self.answers);
-        self.take(BURST);
+        self.intake.relieve(&mut self.outbound, &mut self.answers);
         self.wire.deliver(now_ns);
         if silent || self.works.now_ns().saturating_sub(self.looked_ns) > self.discipline.table().cycle_ns() {
             self.look();
@@ -216,6 +225,10 @@ impl Slots {
 
     /// Waits for the call, and uses the window.
     fn window(&mut self, planned: &Planned) {
+        if let (Kind::Slot { .. }, None) = (planned.window.kind, self.discipline.silent()) {
+            let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
+            self.intake.open(self.discipline.table().wire().bytes_in(sends_ns));
+        }
         self.spin(planned.call_ns);
         let called_ns = self.works.now_ns();
         let Verdict::Send(mut permit) = self.discipline.judge(planned, called_ns, &self.works.clock) else { return };
@@ -239,7 +252,7 @@ impl Slots {
         self.look();
     }
 
-    /// Takes what still comes, until shortly before the call.
+    /// Takes what the slot has room for, and what still comes, until shortly before the call.
     fn spin(&mut self, call_ns: u64) {
         loop {
             let left_ns = call_ns.saturating_sub(self.works.now_ns());
@@ -247,20 +260,9 @@ impl Slots {
                 return;
             }
             if left_ns > QUIET_NS {
-                self.take(1);
+                self.intake.take_one(&mut self.outbound, &mut self.answers);
             }
             std::hint::spin_loop();
-        }
-    }
-
-    /// Takes packages from the mailbox, most important first, at most so many.
-    fn take(&mut self, most: usize) {
-        let Self { transit, outbound, answers, .. } = self;
-        for _ in 0..most {
-            let Some(waiting) = transit.try_receive() else { return };
-            let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body: waiting.body() };
-            // None leaves at once where there are time slots.
-            let _ = outbound.accept(monotonic_ns(), &package, false, answers);
         }
     }
 
@@ -297,28 +299,20 @@ impl Slots {
         }
     }
 
-    /// What was made and found no slot for so long is lost: whoever sent it counts on that nothing arrives that is much older than it may be.
+    /// What was made and found no slot for long is lost: whoever sent it counts on that nothing arrives that is much older than it may be.
     fn drop_if_old(&mut self) {
         let now_ns = monotonic_ns();
-        if let Some((_, bytes, _)) = self.held.take_if(|(.., made_ns)| now_ns.saturating_sub(*made_ns) > HELD_NS_MAX) {
-            self.outbound.unsent(&self.datagram[..bytes], &[], &mut self.answers);
+        if let Some(held) = self.held.take_if(|held| held.is_old(now_ns)) {
+            self.outbound.unsent(&self.datagram[..held.bytes], &[], &mut self.answers);
         }
     }
 
     fn send_packages(&mut self, permit: &mut Permit) {
-        loop {
-            self.drop_if_old();
-            let next = self.held.take().map(|(to, bytes, _)| (to, bytes)).or_else(|| {
-                self.take(FEW);
-                let room_bytes = permit.room_bytes(self.works.now_ns())?;
-                self.outbound.poll_slot(monotonic_ns(), room_bytes, &mut self.datagram, &mut self.answers)
-            });
-            let Some((to, bytes)) = next else { return };
+        self.drop_if_old();
+        while let Some((to, bytes)) = self.next_datagram(permit) {
             let now_ns = self.works.now_ns();
             if !permit.fits(now_ns, bytes) {
-                // The thread stood still, and it is made: it goes first in the next slot.
-                self.held = Some((to, bytes, monotonic_ns()));
-                self.snapshot.held += 1;
+                self.missed(to, bytes);
                 return;
             }
             permit.takes(now_ns, bytes);
@@ -327,6 +321,29 @@ impl Slots {
             if sent.is_err_and(super::Failure::is_loss) {
                 self.outbound.unsent(datagram, &[], &mut self.answers);
             }
+        }
+    }
+
+    /// What leaves next: for whom, and how many bytes. Room is reckoned for when it will be made, so that it misses the slot only
+    /// if the thread stands still meanwhile.
+    fn next_datagram(&mut self, permit: &Permit) -> Option<(NodeIndex, usize)> {
+        if let Some(held) = self.held.take() {
+            return Some((held.to, held.bytes));
+        }
+        self.intake.take_on(&mut self.outbound, &mut self.answers);
+        let room_bytes = permit.room_bytes(self.works.now_ns() + MAKING_NS)?;
+        self.outbound.poll_slot(monotonic_ns(), room_bytes, &mut self.datagram, &mut self.answers)
+    }
+
+    /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time: then it would keep
+    /// up what is, and is lost.
+    fn missed(&mut self, to: NodeIndex, bytes: usize) {
+        let datagram = &self.datagram[..bytes];
+        if held::is_real_time(datagram, &self.network) {
+            self.held = Some(Held { to, bytes, made_ns: monotonic_ns() });
+            self.snapshot.held += 1;
+        } else {
+            self.outbound.unsent(datagram, &[], &mut self.answers);
         }
     }
 }

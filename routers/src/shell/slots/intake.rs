@@ -1,0 +1,105 @@
+//! What the thread of the time slots takes from the router's mailbox, and when.
+//!
+//! ```text
+//!  between slots                             shortly before the call              in the slot
+//!  all stays in the mailbox; if that has     as much as the slot has room for,    what came since, if it is more
+//!  more than half of its slots full: ─▶      the most important first: ─▶         important than what was taken: ─▶   queue
+//! ```
+//!
+//! The mailbox outlives a router that is killed, the queue does not: so what waits for a slot waits in the mailbox. A flood is taken out of it,
+//! since quotas hold in the queue. So is all, if no slot came for long: what cannot leave must be told so to its sender.
+
+use crate::outbound::{Accepted, Outbound, Package};
+use crate::report::Report;
+use rohrpost_mailbox::{HEAD_BYTES, Head, Kind, Priority, Receiver, monotonic_ns};
+
+/// If no slot came for so long, what waits is taken: whether its peer is there, and whether it is too old, is found in the queue. A third of
+/// the time after which packages are dropped.
+const UNTAKEN_NS_MAX: u64 = crate::outbound::WAIT_MAX_NS / 3;
+/// Packages taken at a time: all that the mailbox may hold.
+const BURST: usize = 64;
+/// More important ones than those which fill the slot, between two datagrams: the rest has come just now, and has its turn with the next.
+const FEW: usize = 4;
+
+/// The router's mailbox, and what the coming slot still wants of it.
+pub(super) struct Intake {
+    transit: Receiver,
+    /// What was taken for the slot leaves room for so many bytes.
+    room_bytes: usize,
+    /// The least important of what was taken for the slot.
+    least: Priority,
+    /// When there was a slot, or all was taken, ns.
+    taken_ns: u64,
+}
+
+impl Intake {
+    pub(super) fn new(transit: Receiver) -> Self {
+        Self { transit, room_bytes: 0, least: Priority(u8::MAX), taken_ns: monotonic_ns() }
+    }
+
+    /// A slot comes that carries at most so many bytes.
+    pub(super) fn open(&mut self, room_bytes: usize) {
+        (self.room_bytes, self.least, self.taken_ns) = (room_bytes, Priority(u8::MAX), monotonic_ns());
+    }
+
+    /// Before the call: takes the next package, if the slot wants it.
+    pub(super) fn take_one(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
+        if self.room_bytes > 0 || self.outranks() {
+            self.take(outbound, report);
+        }
+    }
+
+    /// In the slot: takes all that it still has room for, and a few of what is more important and came since.
+    pub(super) fn take_on(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
+        let mut few = FEW;
+        for _ in 0..BURST {
+            if self.room_bytes == 0 {
+                if few == 0 || !self.outranks() {
+                    return;
+                }
+                few -= 1;
+            }
+            if !self.take(outbound, report) {
+                return;
+            }
+        }
+    }
+
+    /// Between slots: takes all if it is much, or if there was no slot for long.
+    pub(super) fn relieve(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
+        let (count, now_ns) = (self.transit.waits().0, monotonic_ns());
+        let is_full = 2 * count > usize::from(self.transit.shape().slots);
+        if is_full || now_ns.saturating_sub(self.taken_ns) > UNTAKEN_NS_MAX {
+            self.taken_ns = now_ns;
+            let mut taken = 0;
+            while taken < BURST && self.take(outbound, report) {
+                taken += 1;
+            }
+        }
+    }
+
+    /// Whether something waits that is more important than what was taken.
+    fn outranks(&mut self) -> bool {
+        self.transit.waits().1.is_some_and(|first| first.outranks(self.least))
+    }
+
+    /// Takes the most important package; whether there was one.
+    fn take(&mut self, outbound: &mut Outbound, report: &mut impl Report) -> bool {
+        let Some(waiting) = self.transit.try_receive() else { return false };
+        let head = *waiting.head();
+        let package = Package { head, published_ns: waiting.published_ns(), body: waiting.body() };
+        let accepted = outbound.accept(monotonic_ns(), &package, false, report);
+        drop(waiting);
+        // What is lost takes no room; and who hurries more than it may stands further behind in the queue.
+        if accepted == Accepted::Waits && !hurries(&head) {
+            self.room_bytes = self.room_bytes.saturating_sub(HEAD_BYTES + usize::from(head.len));
+            self.least = self.least.at_most(head.priority);
+        }
+        true
+    }
+}
+
+/// Whether a package stands further ahead in the mailbox than its sender may have it in the queue, see [`Outbound::accept`].
+fn hurries(head: &Head) -> bool {
+    matches!(head.kind.kind(), Kind::Command(_)) && head.priority.outranks(head.from.class().priority())
+}
