@@ -10,14 +10,14 @@
 
 use crate::latencies::Latencies;
 use crate::stats::{Cause, Count};
-use rohrpost_config::{Installation, bounds};
+use rohrpost_config::{Installation, Module, bounds};
 use rohrpost_mailbox::{Head, Kind, Latency, Name};
 use std::time::Duration;
 
 /// A flow from a module of this node to one of another.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Flow {
-    /// The module that sends: its name, then its faces.
+    /// The module that sends: the name that is declared, then the others of its process.
     pub from: Vec<Name>,
     /// The module that receives, in the same way.
     pub to: Vec<Name>,
@@ -39,8 +39,8 @@ impl Flow {
             let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
             let bound = bounds.iter().find(|bound| bound.flow == index);
             (from.node == node && to.node != node).then(|| Self {
-                from: from.names().collect(),
-                to: to.names().collect(),
+                from: names(flow.from, from),
+                to: names(flow.to, to),
                 size: flow.size,
                 period: flow.period,
                 deadline: flow.deadline,
@@ -49,6 +49,22 @@ impl Flow {
         };
         installation.flows.iter().enumerate().filter_map(flow).collect()
     }
+
+    fn entries(&self, flow: u16) -> impl Iterator<Item = Entry> {
+        let pairs = self.from.iter().flat_map(|from| self.to.iter().map(move |to| (from, to)));
+        pairs.enumerate().map(move |(place, (from, to))| Entry {
+            ends: (from.module().raw(), to.module().raw()),
+            is_other: place > 0,
+            size: self.size,
+            period_ns: ns(self.period),
+            flow,
+        })
+    }
+}
+
+/// All names of a module, the declared one first.
+fn names(declared: Name, module: &Module) -> Vec<Name> {
+    std::iter::once(declared).chain(module.names().filter(|name| *name != declared)).collect()
 }
 
 /// What became of a flow's packages. Counts are since the router began.
@@ -101,7 +117,7 @@ impl FlowCounts {
 /// All flows of a router, and which packages are of them.
 #[derive(Debug)]
 pub struct Flows {
-    /// By the names of both ends, size and period.
+    /// By the names of both ends, then by size and period.
     entries: Box<[Entry]>,
     counts: Box<[FlowCounts]>,
 }
@@ -109,6 +125,8 @@ pub struct Flows {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Entry {
     ends: (u32, u32),
+    /// By another name than the declared one.
+    is_other: bool,
     size: u32,
     period_ns: u64,
     flow: u16,
@@ -116,17 +134,12 @@ struct Entry {
 
 impl Flows {
     pub(crate) fn new(flows: &[Flow]) -> Self {
-        let entries = flows.iter().zip(0..).flat_map(|(flow, index)| {
-            let pairs = flow.from.iter().flat_map(|from| flow.to.iter().map(move |to| (from, to)));
-            pairs.map(move |(from, to)| Entry {
-                ends: (from.module().raw(), to.module().raw()),
-                size: flow.size,
-                period_ns: ns(flow.period),
-                flow: index,
-            })
-        });
+        let entries = flows.iter().zip(0..).flat_map(|(flow, index)| flow.entries(index));
         let mut entries: Vec<Entry> = entries.collect();
         entries.sort_unstable();
+        // What a process sends by a name for which nothing is declared is of what is declared for its others.
+        let declared: Vec<_> = entries.iter().filter(|entry| !entry.is_other).map(|entry| entry.ends).collect();
+        entries.retain(|entry| !entry.is_other || declared.binary_search(&entry.ends).is_err());
         Self { entries: entries.into(), counts: flows.iter().map(FlowCounts::new).collect() }
     }
 
@@ -178,6 +191,7 @@ mod tests {
             [flow(laser, pilot, 800), flow(laser, pilot, 64), flow(laser, pilot, 64), flow(pilot, laser, 8)];
         flows[1].period = ms(900);
         flows[0].to.push(face);
+        flows[3].to.push(wheels);
         let flows = Flows::new(&flows);
         let (data, reply) = (Type::data(1), Type::reply(16));
         for (from, to, kind, len, expected, why) in [
@@ -188,8 +202,9 @@ mod tests {
             (laser, pilot, data, 900, Some(0), "larger than declared"),
             (laser, face, data, 10, Some(0), "declared for all names of the process"),
             (pilot, laser, data, 1, Some(3), "the other way is another"),
+            (pilot, wheels, data, 1, Some(4), "declared for this name"),
             (laser, module(52, 1), data, 1, None, "not declared"),
-            (module(201, 0), pilot, data, 1, None, "not declared either"),
+            (wheels, pilot, data, 1, None, "not declared either"),
         ] {
             let head = Head { len, kind, ..head(to, from, 90) };
             assert_eq!(flows.of(&head), expected, "{why}");
