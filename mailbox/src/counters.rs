@@ -264,7 +264,7 @@ impl Latency {
     pub fn count_one(&mut self, time: Duration) {
         self.max = self.max.max(time);
         self.sum += time;
-        let count = &mut self.buckets[bucket(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX))];
+        let count = &mut self.buckets[Self::bucket_of(time)];
         *count = count.saturating_add(1);
     }
 
@@ -273,6 +273,11 @@ impl Latency {
         self.max = self.max.max(other.max);
         self.sum = self.sum.saturating_add(other.sum);
         self.buckets.iter_mut().zip(&other.buckets).for_each(|(a, b)| *a = a.saturating_add(*b));
+    }
+
+    /// The bucket that a time counts in.
+    pub fn bucket_of(time: Duration) -> usize {
+        bucket(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX))
     }
 
     /// Shortest time that counts in a bucket; each begins where the one before ends.

@@ -4,8 +4,8 @@
 mod router;
 
 pub use router::{
-    Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, LevelWaiting, LinkState, Links, PeerLink, Router,
-    RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure,
+    Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkState,
+    Links, PeerLink, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
 };
 
 use crate::interface;

@@ -1,6 +1,7 @@
 //! What the tests of the cores have in common: settings from plain values, a log of all that is told, and a router without sockets.
 
 use crate::broken::{Broken, with};
+use crate::flows::Flow;
 use crate::frame::NodeIndex;
 use crate::inbound::{self, Datagram, Inbound};
 use crate::outbound::{Accepted, Outbound, Output, Package};
@@ -11,6 +12,7 @@ use rohrpost_config::{Network, Route};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
+use std::time::Duration;
 
 pub(crate) const MS: u64 = 1_000_000;
 pub(crate) const S: u64 = 1000 * MS;
@@ -49,7 +51,14 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
         tdma: None,
         routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
         senders: vec![vec![module(200, own)], vec![module(100, own)]],
+        flows: Vec::new(),
     }
+}
+
+/// A flow that has 10 ms, and for which 5 ms are sure.
+pub(crate) fn flow(from: Name, to: Name, size: u32) -> Flow {
+    let ms = Duration::from_millis;
+    Flow { from: vec![from], to: vec![to], size, period: ms(90), deadline: ms(10), bound: Some(ms(5)) }
 }
 
 pub(crate) fn head(to: Name, from: Name, priority: u8) -> Head {

@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 pub mod broken;
+pub mod flows;
 pub mod fragment;
 pub mod frame;
 #[cfg(test)]
@@ -21,6 +22,7 @@ mod harness;
 pub mod impair;
 pub mod inbound;
 pub mod lab;
+pub mod latencies;
 pub mod link;
 mod netlink;
 pub mod outbound;

@@ -2,6 +2,7 @@
 //!
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
+use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
 use crate::tdma::{LATE_NS, Wire};
 use rohrpost_config::{Installation, Network, Route, Tdma};
@@ -49,6 +50,8 @@ pub struct Settings {
     pub routes: Vec<Route>,
     /// The modules of this node: the names of a group have a quota together, and so have all other names.
     pub senders: Vec<Vec<Name>>,
+    /// Declared flows that leave this node, to be measured.
+    pub flows: Vec<Flow>,
 }
 
 /// A node, as others see it.
@@ -95,6 +98,7 @@ impl Settings {
             tdma: installation.tdma.clone(),
             routes: installation.routes_from(node),
             senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
+            flows: Flow::all_from(installation, node),
         })
     }
 

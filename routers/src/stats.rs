@@ -8,6 +8,7 @@
 //! inn.packages  =  inn.passed + inn.lost, all causes  + those of which only parts have come
 //! ```
 
+use crate::flows::Flows;
 use crate::frame::NodeIndex;
 use crate::link::Link;
 use crate::settings::{LEVELS, Settings};
@@ -250,6 +251,8 @@ pub struct Stats {
     pub waiting_bytes: Count,
     /// Datagrams from addresses that no node has, or that are nothing of ours.
     pub foreign: Count,
+    /// The declared flows that leave the node.
+    pub flows: Flows,
     /// When the router began, ns of the monotonic clock.
     pub started_ns: u64,
 }
@@ -271,6 +274,7 @@ impl Stats {
             waiting: Default::default(),
             waiting_bytes: Count::default(),
             foreign: Count::default(),
+            flows: Flows::new(&settings.flows),
             started_ns: now_ns,
         })
     }

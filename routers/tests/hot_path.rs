@@ -9,6 +9,7 @@ pub mod counting;
 use counting::{CountingHeap, heap_uses};
 use rohrpost_config::{Network, Route};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::{Datagram, Inbound};
 use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
@@ -18,6 +19,7 @@ use rohrpost_routers::stats::{Cause, Stats};
 use rohrpost_routers::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
+use std::time::Duration;
 
 #[global_allocator]
 static HEAP: CountingHeap = CountingHeap;
@@ -52,6 +54,14 @@ fn settings(own: NodeIndex) -> Settings {
         tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(255), node: other }],
         senders: vec![vec![module(own)]],
+        flows: vec![Flow {
+            from: vec![module(own)],
+            to: vec![module(other)],
+            size: 9000,
+            period: Duration::from_millis(1),
+            deadline: Duration::from_millis(10),
+            bound: None,
+        }],
     }
 }
 
@@ -80,6 +90,7 @@ impl Deliver for Counts {
 /// Two routers and a wire that now and then loses, copies and holds back.
 struct Pair {
     out: Outbound,
+    out_stats: Arc<Stats>,
     inn: Inbound,
     back: (Outbound, Inbound),
     counts: Counts,
@@ -93,6 +104,7 @@ impl Pair {
         let stats: [Arc<Stats>; 2] = [Stats::new(&base, now_ns), Stats::new(&arm, now_ns)];
         Self {
             out: Outbound::new(&base, stats[0].clone()),
+            out_stats: stats[0].clone(),
             inn: Inbound::new(&arm, stats[1].clone()),
             back: (Outbound::new(&arm, stats[1].clone()), Inbound::new(&base, stats[0].clone())),
             counts: Counts::default(),
@@ -116,6 +128,7 @@ impl Pair {
             let mut datagram = [0; 1472];
             datagram[..head.len()].copy_from_slice(&head);
             datagram[head.len()..head.len() + body.len()].copy_from_slice(body);
+            self.out.sent(now_ns);
             self.wire(now_ns, &datagram[..head.len() + body.len()]);
         }
     }
@@ -125,6 +138,8 @@ impl Pair {
         while let Output::Send { bytes, .. } = self.out.poll(now_ns, &mut datagram, &mut self.counts) {
             if self.datagrams % 31 == 30 {
                 self.out.unsent(&datagram[..bytes], &[], &mut self.counts);
+            } else {
+                self.out.sent(now_ns);
             }
             self.wire(now_ns, &datagram[..bytes]);
         }
@@ -205,6 +220,9 @@ fn no_package_touches_the_heap() {
         assert!(happened(cause) > 10, "{cause:?}: {} times", happened(cause));
     }
     assert!(pair.counts.delivered > 10_000 && pair.datagrams > 10_000);
+    let flow = &pair.out_stats.flows.counts()[0];
+    assert_eq!(flow.latency().count(), pair.out_stats.peer(1).sent.packages.get(), "each is measured");
+    assert!(flow.lost(Cause::Quota) > 10 && flow.over_deadline.get() > 10, "{flow:?}");
 }
 
 /// Two clocks without a network: what one sends the other has at once.
@@ -217,7 +235,7 @@ struct Clocks {
 impl Clocks {
     fn new() -> Self {
         let clock = |own| {
-            let interval = std::time::Duration::from_millis(100);
+            let interval = Duration::from_millis(100);
             let settings =
                 TimeSettings { system: 1, own, nodes: 2, masters: vec![0], interval, digest: 7, incarnation: 9 };
             Clock::new(settings, 0, 1_790_000_000 * 1000 * MS, None)

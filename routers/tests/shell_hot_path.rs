@@ -8,8 +8,10 @@ mod common;
 
 use common::{PATIENCE, Pair, label, module, turns};
 use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
+use rohrpost_routers::stats::Stats;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 /// Uses of the heap by all threads: those of the routers, and the test's, which makes none while it counts.
 static USES: AtomicU64 = AtomicU64::new(0);
@@ -84,8 +86,20 @@ fn as_packages_come() {
     assert_eq!(USES.load(Ordering::SeqCst), before);
     let stats = pair.sides[0].shell.as_ref().unwrap().stats();
     let sent = &stats.peer(1).sent;
+    assert_measured(stats);
     assert!(sent.fragments.get() > 500, "in parts");
     assert!(sent.datagrams.get() - sent.fragments.get() < 550 * 41, "some shared a datagram");
+}
+
+/// Each package was measured; the last one perhaps after it had come.
+fn assert_measured(stats: &Stats) {
+    let (flow, sent) = (&stats.flows.counts()[0], &stats.peer(1).sent.packages);
+    let began = Instant::now();
+    while flow.latency().count() != sent.get() {
+        assert!(began.elapsed() < PATIENCE, "{flow:?}, of {} packages", sent.get());
+        std::thread::yield_now();
+    }
+    assert!(flow.latency().max > Duration::ZERO, "{flow:?}");
 }
 
 /// The thread that sends in time slots: synchronisation, questions and answers, packages alone, in company and in parts, and tools that look.
@@ -101,6 +115,7 @@ fn in_time_slots() {
     let after = seen();
     assert!(after[0].counts.syncs.sent > before[0].counts.syncs.sent + 50, "{after:?}");
     assert!(after.iter().zip(&before).all(|(after, before)| after.counts.used > before.counts.used + 50), "{after:?}");
-    let sent = &pair.sides[0].shell.as_ref().unwrap().stats().peer(1).sent;
-    assert!(sent.fragments.get() > 100, "in parts");
+    let stats = pair.sides[0].shell.as_ref().unwrap().stats();
+    assert_measured(stats);
+    assert!(stats.peer(1).sent.fragments.get() > 100, "in parts");
 }

@@ -2,7 +2,6 @@
 
 mod account;
 mod copy;
-mod flows;
 mod nodes;
 
 use super::launch::{View, end};

@@ -11,6 +11,7 @@ mod delay;
 mod demo;
 mod doctor;
 mod echo;
+mod flows;
 mod graph;
 mod help;
 mod hz;

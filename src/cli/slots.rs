@@ -2,7 +2,7 @@
 
 use super::table::table;
 use super::units::{bytes, fine};
-use rohrpost::interfaces::SlotState;
+use rohrpost::interfaces::{SlotState, TunnelState};
 
 /// A row for each node, and why those are silent that are; empty without any.
 pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String {
@@ -19,9 +19,11 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
             slots.late.to_string(),
             slots.skipped.to_string(),
             slots.silent.to_string(),
+            slots.held.to_string(),
             off_ns.map_or("-".into(), |ns| fine(ns as f64 * 1e-9)),
             bytes(slots.wire_bytes as f64),
             slots.synchronisations_sent.to_string(),
+            slots.synchronisations_late.to_string(),
             slots.synchronisations_heard.to_string(),
             slots.synchronisations_missed.to_string(),
             slots.replacements_sent.to_string(),
@@ -35,9 +37,11 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
         ">late",
         ">skipped",
         ">silent",
-        ">off of late",
+        ">held",
+        ">off by",
         ">sent",
         ">syncs sent",
+        ">late",
         ">heard",
         ">missed",
         ">replaced",
@@ -45,5 +49,31 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
     ];
     let silent = slots.iter().filter(|slots| !slots.why_silent.is_empty());
     let silent = silent.map(|slots| format!("node {} is silent: {}\n", slots.node, slots.why_silent));
-    table(heads, rows) + &silent.collect::<String>()
+    let tunnels = slots.iter().filter_map(|slots| slots.tunnel.map(|tunnel| tunnelled(&slots.node, &tunnel)));
+    table(heads, rows) + &silent.collect::<String>() + &tunnels.collect::<String>()
+}
+
+/// What ordinary traffic did; what went wrong is told if it did.
+fn tunnelled(node: &str, tunnel: &TunnelState) -> String {
+    let TunnelState { sent, dropped, stray, received, refused } = *tunnel;
+    let wrong =
+        [(dropped, "dropped, since too many waited"), (stray, "for nobody"), (refused, "not taken by the kernel")];
+    let wrong = wrong.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
+    format!("tunnel of {node}: {sent} packets sent, {received} received{}\n", wrong.collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tunnel_says_what_went_wrong_only_if_it_did() {
+        let well = TunnelState { sent: 7, received: 5, ..TunnelState::default() };
+        assert_eq!(tunnelled("arm", &well), "tunnel of arm: 7 packets sent, 5 received\n");
+        let badly = TunnelState { dropped: 3, stray: 2, refused: 1, ..well };
+        assert_eq!(
+            tunnelled("arm", &badly),
+            "tunnel of arm: 7 packets sent, 5 received, 3 dropped, since too many waited, 2 for nobody, 1 not taken by the kernel\n"
+        );
+    }
 }

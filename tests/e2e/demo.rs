@@ -74,7 +74,15 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
             slots.lines().find_map(|line| line.strip_prefix(node)).unwrap_or_else(|| panic!("no {node}:\n{said}"));
         assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
     }
-    assert!(slots.lines().any(|line| line.starts_with("laser.0 → pilot.0") && line.contains("10.00 ms")), "{said}");
+    let flows = slots.split("\nflow ").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap();
+    let rows: Vec<_> = flows.lines().skip(1).collect();
+    assert_eq!(rows.len(), 11, "all of config/demo-tdma.toml: {flows}");
+    for row in rows {
+        let columns: Vec<_> = row.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
+        let [flow, _, packages, bound, slowest, _, within, ..] = columns[..] else { panic!("{row}") };
+        assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
+        assert!(flow != "laser.0 → pilot.0" || ["10.00 ms", "900.00 ms"].contains(&within), "{row}");
+    }
     place.assert_empty();
     let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
     assert!(said.contains("say --nodes 3"), "{said}");

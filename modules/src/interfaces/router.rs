@@ -222,14 +222,35 @@ pub struct SlotState {
     pub replacements_heard: u64,
     /// See `synchronisations_heard`.
     pub synchronisations_missed: u64,
+    /// Synchronisations that it left out as the master because it woke up too late for them.
+    pub synchronisations_late: u64,
+    /// Datagrams that were made and missed the end of their slot, since the router stood still just then: they waited for the next one.
+    pub held: u64,
     /// Changes of role: slave, master.
     pub roles: u64,
     /// From the router's call to the wire, the median, ns.
     pub lead_ns: u64,
+    /// Ordinary traffic through the tunnel; none without one.
+    pub tunnel: Option<TunnelState>,
     /// How the kernel schedules who keeps the slots: `deadline`, `fifo` or `ordinary`.
     pub scheduled: String,
     /// The last slots and windows that were used, the oldest first.
     pub last: Vec<SlotUse>,
+}
+
+/// What ordinary traffic did in a tunnel. Counts are since its router began, and only grow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TunnelState {
+    /// Packets taken from the kernel for other nodes.
+    pub sent: u64,
+    /// Packets for other nodes that were dropped, since too many waited.
+    pub dropped: u64,
+    /// Packets for nobody, or not of IPv4.
+    pub stray: u64,
+    /// Packets from other nodes, handed to the kernel.
+    pub received: u64,
+    /// Packets from other nodes that the kernel did not take.
+    pub refused: u64,
 }
 
 /// A slot or synchronisation window that was used.
@@ -249,6 +270,45 @@ pub struct SlotUse {
     pub datagrams: u64,
 }
 
+/// Declared flows that leave a node, in their order in the configuration. Counts are since its router began, and only grow.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct FlowStates {
+    /// The node.
+    pub node: String,
+    /// Its flows.
+    pub flows: Vec<FlowState>,
+}
+
+/// How late packages of a declared flow were. Measured by the router that sends: from publishing to the arrival of the last bit at the other
+/// computer, the link's time reckoned as bounds have it; where there are no time slots, until the package is handed to the kernel.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct FlowState {
+    /// The module that sends.
+    pub from: String,
+    /// The module that receives.
+    pub to: String,
+    /// Bytes of a body at most, as declared: several flows between the same modules are told apart by it.
+    pub size: u32,
+    /// Packages sent.
+    pub packages: u64,
+    /// The slowest of them, ns; 0 without any.
+    pub worst_ns: u64,
+    /// Their mean, ns.
+    pub mean_ns: u64,
+    /// 99 of 100 were not slower, ns.
+    pub p99_ns: u64,
+    /// The bound, ns; none: without time slots nothing is sure.
+    pub bound_ns: Option<u64>,
+    /// The deadline, ns.
+    pub deadline_ns: u64,
+    /// Packages slower than the bound.
+    pub over_bound: u64,
+    /// Packages slower than the deadline.
+    pub over_deadline: u64,
+    /// Packages lost in this router, and why.
+    pub lost: Vec<CarriedLoss>,
+}
+
 /// Carries packages between nodes; it does so also while it is off.
 #[interface(class = "router", crate = crate::macro_support)]
 pub trait Router {
@@ -263,4 +323,8 @@ pub trait Router {
     /// How it keeps its time slots, where there are any.
     #[data(3)]
     fn slots() -> SlotState;
+
+    /// How late packages of declared flows were that left this node.
+    #[data(4)]
+    fn flows() -> FlowStates;
 }

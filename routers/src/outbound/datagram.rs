@@ -1,6 +1,6 @@
 //! How a datagram is made: of one package where it lies, of many that wait, of a part of one, or of nothing but "still there".
 
-use super::{DIRECT_HEAD_BYTES, Outbound, Peer, is_stale};
+use super::{DIRECT_HEAD_BYTES, Outbound, Package, Peer, is_stale};
 use crate::broken::broken;
 use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
@@ -14,15 +14,23 @@ use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 pub(super) const PART_START: usize = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
 
 impl Outbound {
-    pub(super) fn direct(&mut self, now_ns: u64, peer: NodeIndex, head: &Head, body: &[u8]) -> [u8; DIRECT_HEAD_BYTES] {
+    /// What goes before the body of a package; it goes with this head.
+    pub(super) fn direct(
+        &mut self,
+        now_ns: u64,
+        peer: NodeIndex,
+        head: &Head,
+        package: &Package<'_>,
+    ) -> [u8; DIRECT_HEAD_BYTES] {
         let package_head = head.to_bytes();
-        let frame = self.head(Kind::Packages, peer).to_bytes(&[&package_head, body]);
+        let frame = self.head(Kind::Packages, peer).to_bytes(&[&package_head, package.body]);
         let mut bytes = [0; DIRECT_HEAD_BYTES];
         bytes[..frame::HEAD_BYTES].copy_from_slice(&frame);
         bytes[frame::HEAD_BYTES..].copy_from_slice(&package_head);
-        self.passed(peer, head);
+        self.aboard.clear();
+        self.passed(peer, head, package.published_ns);
         let level = self.levels[usize::from(head.priority.0)];
-        self.left(now_ns, peer, DIRECT_HEAD_BYTES + body.len(), Some(level));
+        self.left(now_ns, peer, DIRECT_HEAD_BYTES + package.body.len(), Some(level));
         bytes
     }
 
@@ -63,7 +71,7 @@ impl Outbound {
             end += size;
             self.queue.remove(place);
             self.left_queue(waiting.level);
-            self.passed(peer, &waiting.head);
+            self.passed(peer, &waiting.head, waiting.published_ns);
         }
         self.finish(now_ns, (Kind::Packages, Some(from)), peer, &mut datagram[..end])
     }
@@ -86,7 +94,7 @@ impl Outbound {
         if index + 1 == count {
             self.queue.remove(place);
             self.left_queue(waiting.level);
-            self.passed(peer, &waiting.head);
+            self.passed(peer, &waiting.head, waiting.published_ns);
         }
         self.finish(now_ns, (Kind::Fragment, Some(waiting.level)), peer, &mut datagram[..start + size])
     }

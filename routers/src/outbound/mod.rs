@@ -18,9 +18,11 @@ use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
 use std::sync::Arc;
 
 mod datagram;
+mod flows;
 mod pace;
 mod slot;
 
+use flows::Aboard;
 use pace::Pace;
 
 /// Longest time from the publishing of a package to its leaving. The time to its mailbox is [`TRANSIT_MAX`] of "at most once" at most,
@@ -92,6 +94,7 @@ pub struct Outbound {
     peers: Box<[Peer]>,
     /// Most bytes of a datagram.
     datagram_bytes: usize,
+    aboard: Aboard,
     /// It sends in time slots only.
     in_slots: bool,
     /// Nobody is due to be told anything before this, ns.
@@ -122,6 +125,7 @@ impl Outbound {
             others: others as u16,
             peers: vec![Peer::default(); settings.nodes.len()].into(),
             datagram_bytes: settings.datagram_bytes(),
+            aboard: Aboard::new(settings.datagram_bytes()),
             in_slots: settings.tdma.is_some(),
             alive_ns: 0,
             sweep_ns: 0,
@@ -150,7 +154,7 @@ impl Outbound {
         let needs_no_company = alone || self.fills_a_datagram(package.body.len());
         let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
         if needs_no_company && self.may_leave_at_once(now_ns, level, package.body.len()) {
-            return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package.body) };
+            return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package) };
         }
         let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
         let stats = &self.stats;
@@ -186,6 +190,7 @@ impl Outbound {
     /// If it has not.
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
         let datagram = &mut datagram[..self.datagram_bytes];
+        self.aboard.clear();
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
         }
@@ -295,11 +300,6 @@ impl Outbound {
         DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.datagram_bytes
     }
 
-    fn passed(&self, peer: NodeIndex, head: &Head) {
-        self.stats.peer(peer).sent.packages.add(1);
-        self.stats.out.passed(head.priority, head.len);
-    }
-
     fn drop_out(&mut self, place: Place, cause: Cause, report: &mut impl Report) {
         let (waiting, body) = self.queue.remove(place);
         lose(&self.stats, Some(waiting.peer), &waiting.head, body, cause, report);
@@ -331,6 +331,7 @@ fn is_stale(now_ns: u64, published_ns: u64) -> bool {
 
 fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause, report: &mut impl Report) {
     stats.out.lost(head.priority, cause);
+    stats.flows.lost(head, cause);
     report.lost(peer, head, body, cause);
 }
 

@@ -30,6 +30,7 @@ impl Outbound {
     ) -> Option<(NodeIndex, usize)> {
         let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };
         let datagram = &mut datagram[..room_bytes];
+        self.aboard.clear();
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {

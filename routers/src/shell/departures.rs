@@ -75,11 +75,9 @@ impl Departures {
             let (now_ns, body) = (monotonic_ns(), waiting.body());
             let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body };
             let alone = taken == 0 && !waiting.is_followed();
-            if let Accepted::Send { to, head } = outbound.accept(now_ns, &package, alone, answers)
-                && let Err(failure) = wire.send(now_ns, to, &[IoSlice::new(&head), IoSlice::new(body)])
-                && failure.is_loss()
-            {
-                outbound.unsent(&head, body, answers);
+            if let Accepted::Send { to, head } = outbound.accept(now_ns, &package, alone, answers) {
+                let sent = wire.send(now_ns, to, &[IoSlice::new(&head), IoSlice::new(body)]);
+                settle(sent, outbound, (&head, body), answers);
             }
             if outbound.has_plenty() {
                 break;
@@ -91,9 +89,7 @@ impl Departures {
     fn send(&mut self, to: NodeIndex, bytes: usize) {
         let datagram = &self.datagram[..bytes];
         let sent = self.wire.send(monotonic_ns(), to, &[IoSlice::new(datagram)]);
-        if sent.is_err_and(Failure::is_loss) {
-            self.outbound.unsent(datagram, &[], &mut self.answers);
-        }
+        settle(sent, &mut self.outbound, (datagram, &[]), &mut self.answers);
     }
 
     /// The pace holds the wire, and the mailbox holds more. Only what may leave before all that waits is worth waking up for.
@@ -110,6 +106,15 @@ impl Departures {
         // Before the look at the mailbox: who rings because of this time changes the bell that is slept on.
         self.shared.departures_due_ns.store(until_ns, Ordering::Release);
         wait_any(&mut [&mut self.transit], deadline, || self.shared.ends())
+    }
+}
+
+/// Says what became of the datagram that was made last, and of the body besides if it left from where it lay.
+fn settle(sent: Result<(), Failure>, outbound: &mut Outbound, (datagram, body): (&[u8], &[u8]), answers: &mut Answers) {
+    if sent.is_err_and(Failure::is_loss) {
+        outbound.unsent(datagram, body, answers);
+    } else if outbound.is_measured() {
+        outbound.sent(monotonic_ns());
     }
 }
 

@@ -65,6 +65,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
         tdma: plan.slots.as_ref().map(|slots| slots.table.clone()),
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
+        flows: Vec::new(),
     }
 }
 

@@ -57,6 +57,12 @@ impl Permit {
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
 
+    /// From handing over a datagram now until its last bit is at the other computer, behind a switch that passes it on when it has all of it,
+    /// ns. `to_wire_ns`: how long it takes to the wire, unless that is busy for longer.
+    pub fn arrives_after_ns(&self, now_ns: u64, datagram_bytes: usize, to_wire_ns: u64) -> u64 {
+        self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
+    }
+
     /// When a datagram is on the wire that is handed over now: not before those that were.
     fn starts_ns(&self, now_ns: u64) -> u64 {
         let at_once_ns = now_ns.saturating_add(self.lead_ns);

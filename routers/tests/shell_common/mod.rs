@@ -2,6 +2,7 @@
 
 use rohrpost_config::{Network, Route, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
+use rohrpost_routers::flows::Flow;
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
@@ -88,6 +89,7 @@ impl Side {
             tdma,
             routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
             senders: vec![vec![module(own)]],
+            flows: vec![declared(module(own), there)],
         };
         Self { node, settings, shell: None }
     }
@@ -162,6 +164,12 @@ impl Pair {
         });
         Self { sides, _folder: folder }
     }
+}
+
+/// All that the module of one node sends to that of the other.
+fn declared(from: Name, to: Name) -> Flow {
+    let (period, deadline) = (Duration::from_micros(10), Duration::from_millis(100));
+    Flow { from: vec![from], to: vec![to], size: u16::MAX.into(), period, deadline, bound: None }
 }
 
 pub(crate) fn label(from: Name, priority: u8, id: u16) -> Label {

@@ -257,6 +257,7 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
         tdma: Some(Tdma { tunnel, ..table() }),
         routes: others().map(module).chain(others().map(router)).map(route).collect(),
         senders: vec![vec![module(own)]],
+        flows: Vec::new(),
     }
 }
 

@@ -1,16 +1,16 @@
 //! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
 
 use super::account::{self, Balance};
-use super::{Arguments, FIRST_FUNCTION, copy, drawn, flows};
+use super::{Arguments, FIRST_FUNCTION, copy, drawn};
 use crate::cli::launch::{Nodes, lab};
-use crate::cli::slots;
 use crate::cli::speech::Speech;
 use crate::cli::summary::print_classes;
 use crate::cli::{Failure, say};
+use crate::cli::{flows, slots};
 use rohrpost::common::{GET_DATA, State};
 use rohrpost::config::{Installation, Network};
 use rohrpost::interface::{DataPort, Interface};
-use rohrpost::interfaces::{CartographerInterface, Links, MapCounts, RouterInterface, SlotState};
+use rohrpost::interfaces::{CartographerInterface, FlowStates, Links, MapCounts, RouterInterface, SlotState};
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
 use rohrpost::survey::Survey;
@@ -79,6 +79,7 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
     let links = settled(installation, &mut tool)?;
     let kept = in_slots(installation, &mut tool)?;
+    let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
     tool.close();
     let balance = Balance::of(&links, installation.classes.tool().0);
     let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
@@ -91,8 +92,10 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     if !kept.is_empty() {
         text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
         text += &slots::kept(&kept);
-        text += "\nFlows; seen: how old data were when they came to the mailbox (a slot that was late or skipped costs a cycle):\n\n";
-        text += &flows::table_of(installation, &links);
+    }
+    let late = flows::measured(installation, &late, &links.iter().collect::<Vec<_>>());
+    if !late.is_empty() {
+        text += &format!("\nDeclared flows; a slot that was left out costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
     }
     text += &format!("\n{balance}\n{clocks}");
     text += &map;

@@ -4,7 +4,7 @@ mod show;
 
 use super::round::{Round, Rounds};
 use super::{Failure, say};
-use rohrpost::interfaces::{ClockState, Links, RouterInterface, SlotState};
+use rohrpost::interfaces::{ClockState, FlowStates, Links, RouterInterface, SlotState};
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -19,7 +19,8 @@ const LOOK_AGAIN: Duration = Duration::from_millis(600);
   rohrpost net --node arm --json
 `lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. `refused` are \
 those that came from the peer's address and were not taken. With time slots, `late` are those that were left out because the router woke \
-up too late, `skipped` those that went by while it stood still, `silent` those in which it was not sure enough of the time. Packages lost in routers stand below, by class and cause. The \
+up too late, `skipped` those that went by while it stood still, `silent` those in which it was not sure enough of the time; `held` are datagrams that missed the end of their slot. Packages lost in routers stand \
+below, by class and cause, and at the end the declared flows: how late each may be, and how late it was. The \
 exit code is 1 if a router does not answer or a peer is not alive.")]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -35,6 +36,7 @@ struct Told {
     links: Option<Links>,
     clock: Option<ClockState>,
     slots: Option<SlotState>,
+    flows: Option<FlowStates>,
     /// Bytes and packages a second, by peer; empty at the first look.
     rates: Vec<Rates>,
     /// Why there is nothing.
@@ -87,12 +89,15 @@ fn ask(round: &mut Round, node: String) -> Told {
     let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
     let in_slots = links.is_ok() && round.running.installation.tdma.is_some();
     let slots = in_slots.then(|| round.newest(&node, RouterInterface::SLOTS).ok()).flatten();
+    let declares = links.is_ok() && !round.running.installation.flows.is_empty();
+    let flows = declares.then(|| round.newest(&node, RouterInterface::FLOWS).ok()).flatten();
     let (time_ns, links, failure) = match links {
         Ok((time_ns, links)) => (time_ns, Some(links), None),
         Err(failure) => (0, None, Some(failure)),
     };
     let (clock, slots) = (clock.map(|(_, clock)| clock), slots.map(|(_, slots)| slots));
-    Told { node, time_ns, links, clock, slots, rates: Vec::new(), failure }
+    let flows = flows.map(|(_, flows)| flows);
+    Told { node, time_ns, links, clock, slots, flows, rates: Vec::new(), failure }
 }
 
 /// What went by between two looks; nothing if the router was started anew in between, or has not told anything new.

@@ -1,12 +1,13 @@
 //! `rohrpost net`, for people.
 
 use super::Told;
+use crate::cli::flows;
 use crate::cli::slots::kept;
 use crate::cli::table::{table, time};
 use crate::cli::target::Running;
 use crate::cli::units::{bytes, fine};
 use rohrpost::Class;
-use rohrpost::interfaces::{ClockRole, ClockState, LinkState, PeerLink};
+use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink};
 use std::time::Duration;
 
 /// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
@@ -25,6 +26,7 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
     }
     let slots = all.iter().filter_map(|told| told.slots.as_ref());
     parts.extend([strangers(all), failures(all), waiting(all), losses(running, all), clocks(all), kept(slots)]);
+    parts.push(measured(running, all));
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
 }
@@ -146,6 +148,14 @@ fn losses(running: &Running, all: &[Told]) -> String {
         return String::new();
     }
     table(["node", "class", ">taken", ">sent", ">came", ">delivered", "lost"], rows)
+}
+
+/// Declared flows; nothing without any.
+fn measured(running: &Running, all: &[Told]) -> String {
+    let links: Vec<&Links> = all.iter().filter_map(|told| told.links.as_ref()).collect();
+    let states = all.iter().filter_map(|told| told.flows.as_ref());
+    let table = flows::measured(&running.installation, states, &links);
+    if table.is_empty() { table } else { format!("{table}({})\n", flows::LEGEND) }
 }
 
 fn clocks(all: &[Told]) -> String {

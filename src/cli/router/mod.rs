@@ -2,6 +2,7 @@
 
 mod clock;
 mod faults;
+mod flows;
 mod links;
 mod slots;
 
@@ -78,6 +79,8 @@ impl Module for RouterModule {
         if let Some(slots) = self.shell.slots() {
             context.publish_now(RouterInterface::SLOTS, &slots::of(&self.shell, slots))?;
         }
+        let flows = flows::of(&self.shell, &context.installation().classes);
+        context.publish_now(RouterInterface::FLOWS, &flows)?;
         Ok(())
     }
 }

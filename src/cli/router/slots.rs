@@ -1,8 +1,9 @@
 //! How it keeps its time slots, as a router publishes it.
 
-use rohrpost::interfaces::{SlotState, SlotUse};
+use rohrpost::interfaces::{SlotState, SlotUse, TunnelState};
 use rohrpost_routers::shell::Shell;
 use rohrpost_routers::shell::slots::{State, Used};
+use rohrpost_routers::shell::tunnel::Passed;
 use rohrpost_routers::tdma::Kind;
 
 /// How it stands now.
@@ -24,10 +25,23 @@ pub(super) fn of(shell: &Shell, slots: &State) -> SlotState {
         synchronisations_heard: syncs.heard,
         replacements_heard: syncs.replacements_heard,
         synchronisations_missed: syncs.missed,
+        synchronisations_late: counts.synchronisations_late,
+        held: seen.held,
         roles: counts.roles,
         lead_ns: seen.lead_ns.0,
+        tunnel: shell.tunnel().map(|passed| tunnel(passed)),
         scheduled: seen.granted.word().into(),
         last: seen.windows.iter().flatten().map(used).collect(),
+    }
+}
+
+fn tunnel(passed: &Passed) -> TunnelState {
+    TunnelState {
+        sent: passed.sent.get(),
+        dropped: passed.dropped.get(),
+        stray: passed.stray.get(),
+        received: passed.received.get(),
+        refused: passed.refused.get(),
     }
 }
 

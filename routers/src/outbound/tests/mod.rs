@@ -7,6 +7,7 @@ use crate::stats::Cause;
 use proptest::prelude::*;
 use rohrpost_mailbox::Type;
 
+mod flows;
 mod slot;
 
 pub(crate) const CHECKS: &[fn()] = &[

@@ -11,7 +11,7 @@ use rohrpost_config::{Tdma, TimeSlot};
 use std::time::Duration;
 
 /// Slots of node 0 of these lengths, µs, on a wire of 100 Mbit/s.
-fn table(lengths_us: &[u64]) -> Tdma {
+pub(super) fn table(lengths_us: &[u64]) -> Tdma {
     let slot = |(at, length): (u64, &u64)| TimeSlot {
         node: 0,
         offset: Duration::from_millis(at + 1),

@@ -315,12 +315,7 @@ impl Slots {
                 self.missed(to, bytes);
                 return;
             }
-            permit.takes(now_ns, bytes);
-            let datagram = &self.datagram[..bytes];
-            let sent = self.wire.send(monotonic_ns(), to, &[IoSlice::new(datagram)]);
-            if sent.is_err_and(super::Failure::is_loss) {
-                self.outbound.unsent(datagram, &[], &mut self.answers);
-            }
+            self.hand_over(permit, now_ns, to, bytes);
         }
     }
 
@@ -345,6 +340,22 @@ impl Slots {
         } else {
             self.outbound.unsent(datagram, &[], &mut self.answers);
         }
+    }
+
+    /// `now_ns`: local; when it was found to fit.
+    fn hand_over(&mut self, permit: &mut Permit, now_ns: u64, to: NodeIndex, bytes: usize) {
+        let datagram = &self.datagram[..bytes];
+        let handed_ns = monotonic_ns();
+        let sent = self.wire.send(handed_ns, to, &[IoSlice::new(datagram)]);
+        if sent.is_err_and(super::Failure::is_loss) {
+            self.outbound.unsent(datagram, &[], &mut self.answers);
+        } else if self.outbound.is_measured() {
+            // The usual way to the wire; where the call took longer it was perhaps kept up before that.
+            let (usual_ns, _) = self.discipline.lead_ns();
+            let to_wire_ns = usual_ns.max(monotonic_ns().saturating_sub(handed_ns));
+            self.outbound.sent(handed_ns + permit.arrives_after_ns(now_ns, bytes, to_wire_ns));
+        }
+        permit.takes(now_ns, bytes);
     }
 }
 

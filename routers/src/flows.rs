@@ -1,0 +1,213 @@
+//! The declared flows that leave a node, and how late their packages were.
+//!
+//! ```text
+//!  published ──▶ transit mailbox ─▶ queue ─▶ slot ─▶ handed over ──▶ wire ──▶ switch ──▶ last bit at the other computer
+//!     └───────────── by the sender's clock ─────────────┘ └──── lead, bytes of the link ───┘
+//! ```
+//!
+//! What `check` computes a bound for, measured by the router that sends: so one clock suffices, and packages without a stamp, commands among
+//! them, are measured as well. Where nodes send as packages come, no link is known, and the time ends with handing over.
+
+use crate::latencies::Latencies;
+use crate::stats::{Cause, Count};
+use rohrpost_config::{Installation, Module, bounds};
+use rohrpost_mailbox::{Head, Kind, Latency, Name};
+use std::time::Duration;
+
+/// A flow from a module of this node to one of another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Flow {
+    /// The module that sends: the name that is declared, then the others of its process.
+    pub from: Vec<Name>,
+    /// The module that receives, in the same way.
+    pub to: Vec<Name>,
+    /// Bytes of a body, at most.
+    pub size: u32,
+    /// Shortest time from one package to the next.
+    pub period: Duration,
+    /// Time within which a package has to arrive.
+    pub deadline: Duration,
+    /// Time in which it arrives for sure; none where nothing is sure.
+    pub bound: Option<Duration>,
+}
+
+impl Flow {
+    /// All that leave a node, in their order in the file.
+    pub(crate) fn all_from(installation: &Installation, node: &str) -> Vec<Self> {
+        let bounds = bounds(installation);
+        let flow = |(index, flow): (usize, &rohrpost_config::Flow)| {
+            let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
+            let bound = bounds.iter().find(|bound| bound.flow == index);
+            (from.node == node && to.node != node).then(|| Self {
+                from: names(flow.from, from),
+                to: names(flow.to, to),
+                size: flow.size,
+                period: flow.period,
+                deadline: flow.deadline,
+                bound: bound.and_then(|bound| bound.latency.ok()).map(|bound| bound.latency),
+            })
+        };
+        installation.flows.iter().enumerate().filter_map(flow).collect()
+    }
+
+    fn entries(&self, flow: u16) -> impl Iterator<Item = Entry> {
+        let pairs = self.from.iter().flat_map(|from| self.to.iter().map(move |to| (from, to)));
+        pairs.enumerate().map(move |(place, (from, to))| Entry {
+            ends: (from.module().raw(), to.module().raw()),
+            is_other: place > 0,
+            size: self.size,
+            period_ns: ns(self.period),
+            flow,
+        })
+    }
+}
+
+/// All names of a module, the declared one first.
+fn names(declared: Name, module: &Module) -> Vec<Name> {
+    std::iter::once(declared).chain(module.names().filter(|name| *name != declared)).collect()
+}
+
+/// What became of a flow's packages. Counts are since the router began.
+#[derive(Debug)]
+pub struct FlowCounts {
+    deadline_ns: u64,
+    bound_ns: u64,
+    latency: Latencies,
+    /// Packages that took longer than the bound.
+    pub over_bound: Count,
+    /// Packages that took longer than the deadline.
+    pub over_deadline: Count,
+    lost: [Count; Cause::ALL.len()],
+}
+
+impl FlowCounts {
+    fn new(flow: &Flow) -> Self {
+        Self {
+            deadline_ns: ns(flow.deadline),
+            bound_ns: flow.bound.map_or(u64::MAX, ns),
+            latency: Latencies::default(),
+            over_bound: Count::default(),
+            over_deadline: Count::default(),
+            lost: Default::default(),
+        }
+    }
+
+    /// How long packages took that were sent.
+    pub fn latency(&self) -> Latency {
+        self.latency.get()
+    }
+
+    /// Packages lost in this router for a cause.
+    pub fn lost(&self, cause: Cause) -> u64 {
+        self.lost[cause as usize].get()
+    }
+
+    /// Packages lost in this router for any.
+    pub fn lost_in_all(&self) -> u64 {
+        self.lost.iter().map(Count::get).sum()
+    }
+
+    fn took(&self, took_ns: u64) {
+        self.latency.note(took_ns);
+        self.over_bound.add(u64::from(took_ns > self.bound_ns));
+        self.over_deadline.add(u64::from(took_ns > self.deadline_ns));
+    }
+}
+
+/// All flows of a router, and which packages are of them.
+#[derive(Debug)]
+pub struct Flows {
+    /// By the names of both ends, then by size and period.
+    entries: Box<[Entry]>,
+    counts: Box<[FlowCounts]>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+struct Entry {
+    ends: (u32, u32),
+    /// By another name than the declared one.
+    is_other: bool,
+    size: u32,
+    period_ns: u64,
+    flow: u16,
+}
+
+impl Flows {
+    pub(crate) fn new(flows: &[Flow]) -> Self {
+        let entries = flows.iter().zip(0..).flat_map(|(flow, index)| flow.entries(index));
+        let mut entries: Vec<Entry> = entries.collect();
+        entries.sort_unstable();
+        // What a process sends by a name for which nothing is declared is of what is declared for its others.
+        let declared: Vec<_> = entries.iter().filter(|entry| !entry.is_other).map(|entry| entry.ends).collect();
+        entries.retain(|entry| !entry.is_other || declared.binary_search(&entry.ends).is_err());
+        Self { entries: entries.into(), counts: flows.iter().map(FlowCounts::new).collect() }
+    }
+
+    /// The counts of all flows, in their order in the settings.
+    pub fn counts(&self) -> &[FlowCounts] {
+        &self.counts
+    }
+
+    /// The flow of a package. Of several between the same modules it is the smallest that holds it; of those of one size replies are the
+    /// rarest, and all else is the most frequent.
+    pub(crate) fn of(&self, head: &Head) -> Option<u16> {
+        let ends = (head.from.module().raw(), head.to.module().raw());
+        let behind = &self.entries[self.entries.partition_point(|entry| entry.ends < ends)..];
+        let between = &behind[..behind.partition_point(|entry| entry.ends == ends)];
+        let largest = between.last()?;
+        let size = between.iter().map(|entry| entry.size).find(|size| *size >= u32::from(head.len));
+        let size = size.unwrap_or(largest.size);
+        let mut fitting = between.iter().filter(|entry| entry.size == size);
+        let entry = if matches!(head.kind.kind(), Kind::Reply(_)) { fitting.next_back() } else { fitting.next() };
+        entry.map(|entry| entry.flow)
+    }
+
+    pub(crate) fn took(&self, flow: u16, took_ns: u64) {
+        self.counts[usize::from(flow)].took(took_ns);
+    }
+
+    pub(crate) fn lost(&self, head: &Head, cause: Cause) {
+        if let Some(flow) = self.of(head) {
+            self.counts[usize::from(flow)].lost[cause as usize].add(1);
+        }
+    }
+}
+
+fn ns(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::{flow, head, module};
+    use rohrpost_mailbox::Type;
+
+    #[test]
+    fn flows_of_one_pair_are_told_apart_by_size_and_then_by_kind() {
+        let ms = Duration::from_millis;
+        let (laser, pilot, face) = (module(200, 0), module(50, 1), module(51, 1));
+        let mut flows =
+            [flow(laser, pilot, 800), flow(laser, pilot, 64), flow(laser, pilot, 64), flow(pilot, laser, 8)];
+        flows[1].period = ms(900);
+        flows[0].to.push(face);
+        flows[3].to.push(wheels);
+        let flows = Flows::new(&flows);
+        let (data, reply) = (Type::data(1), Type::reply(16));
+        for (from, to, kind, len, expected, why) in [
+            (laser, pilot, data, 700, Some(0), "the one that holds it"),
+            (laser, pilot.with_local(1), data, 65, Some(0), "whichever mailbox of the module"),
+            (laser, pilot, data, 64, Some(2), "the more frequent"),
+            (laser, pilot.with_local(1), reply, 10, Some(1), "the rarer"),
+            (laser, pilot, data, 900, Some(0), "larger than declared"),
+            (laser, face, data, 10, Some(0), "declared for all names of the process"),
+            (pilot, laser, data, 1, Some(3), "the other way is another"),
+            (pilot, wheels, data, 1, Some(4), "declared for this name"),
+            (laser, module(52, 1), data, 1, None, "not declared"),
+            (wheels, pilot, data, 1, None, "not declared either"),
+        ] {
+            let head = Head { len, kind, ..head(to, from, 90) };
+            assert_eq!(flows.of(&head), expected, "{why}");
+        }
+    }
+}
