@@ -30,6 +30,8 @@ pub const PARAMETERS: u16 = 9;
 pub const SET_PARAMETERS: u16 = 10;
 /// Asks for system time as the module's node has it: [`TimeReport`], made when the command is run.
 pub const TIME: u16 = 11;
+/// Asks what came of its exchange with others, from an index on (u16): [`ExchangePage`].
+pub const EXCHANGE: u16 = 12;
 /// Numbers from here on are the interfaces' own.
 pub const FIRST_OWN: u16 = 16;
 
@@ -41,6 +43,9 @@ pub const DESCRIPTION_PART: usize = 768;
 
 /// Bytes of parameters that go into one reply, for the same reason; a single one that is longer goes alone.
 pub const PARAMETER_PAGE: usize = 768;
+
+/// Others that go into one reply, so that it fits every reply mailbox.
+pub const EXCHANGE_PAGE: usize = 8;
 
 /// How a module is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -140,6 +145,30 @@ impl TimeReport {
         let error_ns = u64::try_from(now.error.as_nanos()).unwrap_or(u64::MAX);
         Self { ns: now.ns, epoch: now.epoch, error_ns, source }
     }
+}
+
+/// What came of a module's exchange with another one, in this life of the module.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Exchange {
+    /// The other one, such as `laser.0`.
+    pub module: String,
+    /// Which of its data is followed; none: these are calls of its functions.
+    pub data: Option<u16>,
+    /// Packages of data that came, or calls that have ended.
+    pub packages: u64,
+    /// Commands that were sent again, since the answer was long in coming.
+    pub repeated: u64,
+    /// Packages of data that should have come and did not (gaps in their numbers), or calls to which the other one gave no answer.
+    pub lost: u64,
+}
+
+/// Some of those with whom a module exchanges something.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct ExchangePage {
+    /// All there are.
+    pub total: u16,
+    /// From the one that was asked for on, at most [`EXCHANGE_PAGE`].
+    pub exchanges: Vec<Exchange>,
 }
 
 /// Which output lines a module sends.
@@ -254,6 +283,7 @@ const fn _all_common_types_are_data() {
     data::<Subscribe>();
     data::<Unsubscribe>();
     data::<TimeReport>();
+    data::<ExchangePage>();
     data::<OutputLevel>();
     data::<DescriptionPart>();
     data::<SetParameters>();

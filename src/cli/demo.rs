@@ -2,7 +2,11 @@
 
 mod account;
 mod copy;
+mod lives;
+mod losses;
 mod nodes;
+mod reigns;
+mod takeover;
 
 use super::launch::{View, end};
 use super::speech::Speech;
@@ -34,6 +38,7 @@ const FIRST_FUNCTION: u16 = 16;
   rohrpost demo --log run.log.gz --speed 10
   rohrpost demo --nodes 3 --seconds 30 --impair loss=5%,delay=2ms,reorder=5%
   rohrpost demo --nodes 3 --tdma --seconds 30
+  rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
 Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml) of the present folder if there is one, else its own copy.")]
 pub(super) struct Arguments {
     /// End by itself after so many seconds.
@@ -51,6 +56,9 @@ pub(super) struct Arguments {
     /// The nodes send in time slots, each in its own.
     #[arg(long, requires = "nodes", conflicts_with = "config")]
     tdma: bool,
+    /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch starts it again.
+    #[arg(long, requires_all = ["nodes", "seconds"])]
+    kill_master: bool,
     /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed.
     #[arg(long, value_name = "TEXT", requires = "nodes")]
     impair: Option<impair::Settings>,

@@ -31,6 +31,7 @@ pub struct Link {
     senders: Vec<Sender>,
     absent: Absent,
     calls: Vec<Call>,
+    tallies: Vec<Tally>,
     /// Buffers of calls that are over, to be used again.
     spare: Vec<Vec<u8>>,
     next_sequence: u32,
@@ -53,6 +54,19 @@ struct Call {
     answer: Option<Head>,
 }
 
+/// What came of the calls of one module.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Tally {
+    /// Who was called.
+    pub(crate) to: Name,
+    /// Calls that have ended.
+    pub(crate) calls: u64,
+    /// Commands that were sent again.
+    pub(crate) repeated: u64,
+    /// Calls that ended without an answer of who was called.
+    pub(crate) unanswered: u64,
+}
+
 impl Link {
     /// A link of this module (local id 0), with its reply mailbox.
     pub fn new(participant: &Arc<Participant>, me: Name, replies: Receiver) -> Self {
@@ -66,6 +80,7 @@ impl Link {
             senders: Vec::new(),
             absent: Absent::default(),
             calls: Vec::new(),
+            tallies: Vec::new(),
             spare: Vec::new(),
             // Sequence numbers may begin anywhere; from 1 they are easier to read.
             next_sequence: 1,
@@ -251,7 +266,7 @@ impl Link {
 
     fn finish<T>(&mut self, at: usize, read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>) -> Result<T, CallError> {
         let call = self.calls.swap_remove(at);
-        let result = match call.answer {
+        let result = match &call.answer {
             None => Err(CallError::Timeout(call.to, call.timeout)),
             Some(head) if head.options.has(Options::ERROR) => match postcard::from_bytes(&call.body) {
                 Ok(fault) => Err(CallError::Fault(call.to, fault)),
@@ -259,8 +274,31 @@ impl Link {
             },
             Some(_) => read(&call.body).map_err(|error| CallError::BadReply(call.to, error.to_string())),
         };
+        let unanswered = match &result {
+            Err(CallError::Timeout(..)) => true,
+            Err(CallError::Fault(_, fault)) => fault.is_of_this_try(),
+            _ => false,
+        };
+        let tally = self.tally(call.to);
+        tally.calls += 1;
+        tally.unanswered += u64::from(unanswered);
         self.spare.push(call.body);
         result
+    }
+
+    /// Where calls of this module are counted.
+    fn tally(&mut self, to: Name) -> &mut Tally {
+        let to = to.module();
+        let at = self.tallies.iter().position(|tally| tally.to == to).unwrap_or_else(|| {
+            self.tallies.push(Tally { to, calls: 0, repeated: 0, unanswered: 0 });
+            self.tallies.len() - 1
+        });
+        &mut self.tallies[at]
+    }
+
+    /// Whom it has called, and what came of it.
+    pub(crate) fn tallies(&self) -> &[Tally] {
+        &self.tallies
     }
 
     /// Gives a call up; its answer, should it come, is dropped.
@@ -305,6 +343,7 @@ impl Link {
         // A repeat that cannot be sent is as good as one that was lost: the next one, or the timeout, takes care.
         let _ = self.send(to, &self.label(kind, sequence), &[&body]);
         self.calls[at].body = body;
+        self.tally(to).repeated += 1;
     }
 }
 

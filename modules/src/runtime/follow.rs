@@ -63,6 +63,10 @@ struct Followed {
     next: Instant,
     /// Number that the next package should have; none before the first.
     expected: Option<u32>,
+    /// Packages that came.
+    came: u64,
+    /// Packages that should have come and did not.
+    lost: u64,
     /// What the last refusal said, so that it is told once.
     refusal: Option<String>,
 }
@@ -71,8 +75,6 @@ struct Followed {
 #[derive(Default)]
 pub(crate) struct Followings {
     list: Vec<Followed>,
-    /// Packages that should have come and did not.
-    pub(crate) lost: u64,
 }
 
 impl Followings {
@@ -86,8 +88,19 @@ impl Followings {
         let wish = Subscribe { number, id, period_us, lease_ms: LEASE.as_millis() as u32, mailbox };
         let next = Instant::now();
         let from = from.module();
-        self.list.push(Followed { from, wish, interface, call: None, next, expected: None, refusal: None });
+        let (came, lost) = (0, 0);
+        self.list.push(Followed { from, wish, interface, call: None, next, expected: None, came, lost, refusal: None });
         id
+    }
+
+    /// Packages that should have come and did not.
+    pub(crate) fn lost(&self) -> u64 {
+        self.list.iter().map(|followed| followed.lost).sum()
+    }
+
+    /// Of each: whose data, their number, packages that came, and packages that did not.
+    pub(crate) fn tallies(&self) -> impl Iterator<Item = (Name, u16, u64, u64)> {
+        self.list.iter().map(|followed| (followed.from, followed.wish.number, followed.came, followed.lost))
     }
 
     /// Asks for what is due, and looks at the answers. Never waits.
@@ -124,11 +137,12 @@ impl Followings {
     pub(crate) fn note(&mut self, mailbox: u8, latest: bool, from: Name, id: u16, head: &DataHead) {
         let its = |followed: &&mut Followed| (followed.from, followed.wish.mailbox) == (from.module(), mailbox);
         let Some(followed) = self.list.get_mut(usize::from(id)).filter(its) else { return };
+        followed.came += 1;
         if let Some(expected) = followed.expected {
             // A publisher that was restarted begins at 0 again; that is no gap.
             let gap = head.sequence.wrapping_sub(expected);
             if head.sequence != 0 && gap < u32::MAX / 2 && !latest {
-                self.lost += u64::from(gap);
+                followed.lost += u64::from(gap);
             }
         }
         followed.expected = Some(head.sequence.wrapping_add(1));

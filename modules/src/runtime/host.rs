@@ -1,7 +1,10 @@
 //! How a program that is no module takes part: tools, tests, launch itself.
 
 use crate::call::{CallError, Link, REPLIES_KEPT};
-use crate::common::{self, Change, DescriptionPart, OutputLevel, ParameterPage, SetParameters, Status, TimeReport};
+use crate::common::{
+    self, Change, DescriptionPart, Exchange, ExchangePage, OutputLevel, ParameterPage, SetParameters, Status,
+    TimeReport,
+};
 use crate::description::Description;
 use crate::interface::append;
 use crate::parameter::{Parameter, Refusal};
@@ -193,6 +196,22 @@ impl ToolLink {
     /// See [`CallError`]. A module built before there was this function says [`crate::call::Fault::Unknown`].
     pub fn time(&mut self, module: Name) -> Result<TimeReport, CallError> {
         self.common(module, common::TIME, &())
+    }
+
+    /// Asks a module what came of its exchange with others: the data that it follows, then those that it has called.
+    ///
+    /// # Errors
+    /// See [`CallError`]. A module built before there was this function says [`crate::call::Fault::Unknown`].
+    pub fn exchange(&mut self, module: Name) -> Result<Vec<Exchange>, CallError> {
+        let mut all = Vec::new();
+        loop {
+            let page: ExchangePage = self.common(module, common::EXCHANGE, &(all.len() as u16,))?;
+            let last = page.exchanges.is_empty();
+            all.extend(page.exchanges);
+            if all.len() >= usize::from(page.total) || last {
+                return Ok(all);
+            }
+        }
     }
 
     /// Sets which output lines a module sends, and tells which it sent before; none when nothing collects them.

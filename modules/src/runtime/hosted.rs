@@ -1,6 +1,7 @@
 //! A module as those who send it commands see it, under one of its names.
 
 use super::context::Context;
+use super::exchange;
 use super::face::Offer;
 use super::parameters;
 use super::runner::Life;
@@ -81,6 +82,10 @@ impl<M: Module> Hosted<'_, M> {
                 write_result(reply, &set)
             }
             common::TIME => write_result(reply, &TimeReport::of(&self.context.clock)),
+            common::EXCHANGE => {
+                let (from,): (u16,) = read_arguments(call.arguments)?;
+                write_result(reply, &exchange::page(self.context, from))
+            }
             other => Err(Fault::Unknown(other)),
         }
     }

@@ -9,6 +9,7 @@
 //! ```
 
 mod context;
+mod exchange;
 mod face;
 mod follow;
 mod host;

@@ -155,7 +155,7 @@ impl<M: Module> Life<M> {
             uptime_ms: self.started.elapsed().as_millis() as u64,
             subscribers: context.subscriptions.len() as u32,
             missed: context.subscriptions.missed(),
-            lost: context.followings.lost,
+            lost: context.followings.lost(),
             output_lost: output::lost(),
             output_suppressed: output::suppressed(),
             output_level: output::level(),

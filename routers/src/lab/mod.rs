@@ -11,8 +11,10 @@
 //! A thread goes into the namespace of a node ([`Lab::enter`]) and comes out again; sockets that it makes and processes that it starts
 //! meanwhile stay in. Whoever is not root goes into a user namespace first ([`become_able`]).
 
+mod capture;
 mod namespace;
 
+pub use capture::{Capture, Crossing};
 pub use namespace::{Inside, become_able};
 
 use crate::netlink::{Device, End};
@@ -155,6 +157,14 @@ impl Lab {
     /// When the system does not allow it.
     pub fn enter_bridge(&self) -> Result<Inside, LabError> {
         self.hub.enter()
+    }
+
+    /// Begins to watch what crosses the bridge.
+    ///
+    /// # Errors
+    /// When the system does not allow it.
+    pub fn capture(&self) -> Result<Capture, LabError> {
+        Capture::new(self)
     }
 
     /// Starts a program on a node. Its parent is this thread: what it asks to be told of its parent's death, it is told of this thread's.

@@ -2,25 +2,19 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
-use nix::sys::socket::{
-    AddressFamily, ControlMessageOwned, LinkAddr, MsgFlags, SockFlag, SockProtocol, SockType, recvmsg, setsockopt,
-    socket, sockopt,
-};
-use nix::sys::time::{TimeVal, TimeValLike};
 use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
 use rohrpost_mailbox::{
     Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type, monotonic_ns, realtime_ns,
 };
 use rohrpost_routers::frame::{Alive, FrameHead, Kind};
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_routers::lab::{Crossing, Lab, LabError, NodeSpec};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered, slots};
 use rohrpost_routers::tdma::Table;
 use rohrpost_routers::time::TimeSettings;
-use std::io::{IoSliceMut, Write};
+use std::io::Write;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
-use std::os::fd::{AsRawFd, OwnedFd};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -270,7 +264,15 @@ pub(crate) struct Crossed {
     pub(crate) kind: Kind,
 }
 
-/// Watches the bridge.
+impl Crossed {
+    fn of(crossing: &Crossing<'_>) -> Option<Self> {
+        let (head, _) = FrameHead::parse(crossing.datagram).ok()?;
+        let from = (0..NODES).find(|node| address(*node) == crossing.source)?;
+        Some(Self { at_ns: crossing.at_ns, from, kind: head.kind })
+    }
+}
+
+/// Watches the bridge from a thread of its own.
 pub(crate) struct Capture {
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<Vec<Crossed>>>,
@@ -278,17 +280,18 @@ pub(crate) struct Capture {
 
 impl Capture {
     pub(crate) fn start(lab: &Lab) -> Self {
-        let inside = lab.enter_bridge().unwrap();
-        let flags = SockFlag::SOCK_CLOEXEC;
-        let socket = socket(AddressFamily::Packet, SockType::Raw, flags, SockProtocol::EthAll).unwrap();
-        drop(inside);
-        let _ = setsockopt(&socket, sockopt::RcvBufForce, &(64 << 20));
-        setsockopt(&socket, sockopt::ReceiveTimestampns, &true).unwrap();
-        setsockopt(&socket, sockopt::ReceiveTimeout, &TimeVal::milliseconds(20)).unwrap();
+        let mut bridge = lab.capture().unwrap();
         let ends = Arc::new(AtomicBool::new(false));
         let thread = std::thread::spawn({
             let ends = ends.clone();
-            move || watch(&socket, &ends)
+            move || {
+                let mut seen = Vec::new();
+                while !ends.load(Ordering::Relaxed) {
+                    std::thread::sleep(Duration::from_millis(20));
+                    bridge.drain(|crossing| seen.extend(Crossed::of(&crossing)));
+                }
+                seen
+            }
         });
         Self { ends, thread: Some(thread) }
     }
@@ -297,36 +300,6 @@ impl Capture {
     pub(crate) fn end(mut self) -> Vec<Crossed> {
         self.ends.store(true, Ordering::Relaxed);
         self.thread.take().unwrap().join().unwrap()
-    }
-}
-
-fn watch(socket: &OwnedFd, ends: &AtomicBool) -> Vec<Crossed> {
-    /// Ethernet, IPv4, UDP.
-    const HEADS: usize = 14 + 20 + 8;
-    /// As `packet(7)` has it: leaves by this port, and was seen when it came by another.
-    const OUTGOING: u8 = 4;
-    let ahead_ns = realtime_ns() - monotonic_ns();
-    let mut seen = Vec::new();
-    let (mut bytes, mut control) = ([0; 2048], [0; 128]);
-    loop {
-        let mut parts = [IoSliceMut::new(&mut bytes)];
-        let read = recvmsg::<LinkAddr>(socket.as_raw_fd(), &mut parts, Some(&mut control), MsgFlags::empty());
-        if ends.load(Ordering::Relaxed) {
-            return seen;
-        }
-        let Ok(message) = read else { continue };
-        let stamp = message.cmsgs().unwrap().find_map(|message| match message {
-            ControlMessageOwned::ScmTimestampns(stamp) => Some(stamp.num_nanoseconds() as u64),
-            _ => None,
-        });
-        let (came_in, len) = (message.address.unwrap().pkttype() != OUTGOING, message.bytes);
-        let frame = &bytes[..len];
-        let is_ipv4_udp = len > HEADS && frame[12..14] == [8, 0] && frame[23] == 17;
-        if let (true, true, Some(stamp)) = (came_in, is_ipv4_udp, stamp)
-            && let Ok((head, _)) = FrameHead::parse(&frame[HEADS..])
-        {
-            seen.push(Crossed { at_ns: stamp - ahead_ns, from: frame[29] - 1, kind: head.kind });
-        }
     }
 }
 

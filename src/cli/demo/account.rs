@@ -20,45 +20,79 @@ pub(super) struct Balance {
     on_wire: u64,
     /// Datagrams that went missing with them.
     datagrams: u64,
+    /// Nodes whose routers died: what those had counted is gone with them.
+    died: Vec<String>,
     /// What does not add up.
     wrong: Vec<String>,
 }
 
 impl Balance {
     /// The snapshots are of different moments: what goes on meanwhile, calls of tools (class `tool`), is compared within each node only.
-    pub(super) fn of(links: &[Links], tool: u8) -> Self {
-        let mut balance = Self::default();
-        let mut ways: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
-        for node in links {
-            let waiting: u64 = node.waiting.iter().map(|level| level.packages).sum();
-            let (mut into, mut out) = (0, waiting);
-            for class in &node.classes {
-                let lost = lost_of(class);
-                into += class.taken + class.came;
-                out += class.sent + class.delivered + lost;
-                balance.lost += lost;
-                balance.taken += class.taken;
-                balance.delivered += class.delivered;
-                let way = ways.entry(class.class).or_default();
-                *way = [way[0] + class.sent, way[1] + class.came];
-            }
-            if into != out {
-                balance.wrong.push(format!("the router of {} had {into} packages and knows of {out}", node.node));
-            }
-            balance.datagrams += node.peers.iter().map(gone).sum::<u64>();
-        }
-        for (class, [sent, came]) in ways.into_iter().filter(|(class, _)| *class != tool) {
-            balance.on_wire += sent.saturating_sub(came);
-            if came > sent {
-                balance.wrong.push(format!("of class {class}, {sent} packages were sent and {came} came"));
-            } else if came < sent && balance.datagrams == 0 {
-                let missing = sent - came;
-                balance
-                    .wrong
-                    .push(format!("of class {class}, packages that did not come: {missing}; no datagram was lost"));
-            }
+    /// Routers of the nodes that have `died` count from their last start, so that between nodes only the others are compared, and as a whole.
+    pub(super) fn of(links: &[Links], tool: u8, died: &[&str]) -> Self {
+        let mut balance = Self { died: died.iter().map(ToString::to_string).collect(), ..Self::default() };
+        links.iter().for_each(|node| balance.within(node));
+        let survived = |node: &str| !died.contains(&node);
+        let to_survivors = links.iter().filter(|links| survived(&links.node));
+        let ways = to_survivors.flat_map(|to| to.peers.iter().filter(|from| survived(&from.node)));
+        balance.datagrams = ways.map(gone).sum();
+        if died.is_empty() {
+            balance.by_class(links, tool)
+        } else {
+            balance.by_way(links)
         }
         balance
+    }
+
+    /// What a router has got must be what it knows of.
+    fn within(&mut self, node: &Links) {
+        let waiting: u64 = node.waiting.iter().map(|level| level.packages).sum();
+        let (mut into, mut out) = (0, waiting);
+        for class in &node.classes {
+            let lost = lost_of(class);
+            into += class.taken + class.came;
+            out += class.sent + class.delivered + lost;
+            self.lost += lost;
+            self.taken += class.taken;
+            self.delivered += class.delivered;
+        }
+        if into != out {
+            self.wrong.push(format!("the router of {} had {into} packages and knows of {out}", node.node));
+        }
+    }
+
+    /// What was sent must have come, class by class.
+    fn by_class(&mut self, links: &[Links], tool: u8) {
+        let mut ways: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
+        for class in links.iter().flat_map(|node| &node.classes) {
+            let way = ways.entry(class.class).or_default();
+            *way = [way[0] + class.sent, way[1] + class.came];
+        }
+        for (class, sent_and_came) in ways.into_iter().filter(|(class, _)| *class != tool) {
+            self.compare(&format!("of class {class}"), sent_and_came);
+        }
+    }
+
+    /// The same from each node to each other, as far as the routers of both have lived throughout.
+    fn by_way(&mut self, links: &[Links]) {
+        let survivors: Vec<&Links> = links.iter().filter(|links| !self.died.contains(&links.node)).collect();
+        let towards = |of: &Links, to: &Links| of.peers.iter().position(|peer| peer.node == to.node);
+        for (from, to) in survivors.iter().flat_map(|from| survivors.iter().map(move |to| (*from, *to))) {
+            if let (Some(there), Some(back)) = (towards(from, to), towards(to, from)) {
+                let sent_and_came = [from.peers[there].sent.packages, to.peers[back].received.packages];
+                self.compare(&format!("from {} to {}", from.node, to.node), sent_and_came);
+            }
+        }
+    }
+
+    fn compare(&mut self, what: &str, [sent, came]: [u64; 2]) {
+        self.on_wire += sent.saturating_sub(came);
+        if came > sent {
+            self.wrong.push(format!("{what}, {sent} packages were sent and {came} came"));
+        } else if came < sent && self.datagrams == 0 {
+            let missing = sent - came;
+            self.wrong.push(format!("{what}, packages that did not come: {missing}; no datagram was lost"));
+        }
     }
 
     pub(super) fn holds(&self) -> bool {
@@ -68,12 +102,19 @@ impl Balance {
 
 impl fmt::Display for Balance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { taken, delivered, lost, on_wire, datagrams, wrong } = self;
+        let Self { taken, delivered, lost, on_wire, datagrams, died, wrong } = self;
         writeln!(
             f,
             "packages to other nodes: {taken}; delivered: {delivered}; lost in routers, for the causes above: {lost}\n\
              lost on the wire: {on_wire}; datagrams that did not come whole: {datagrams}"
         )?;
+        if !died.is_empty() {
+            writeln!(
+                f,
+                "what the router of {} had counted before it died is gone with it: between nodes, packages are compared of the others alone",
+                died.join(", of ")
+            )?;
+        }
         if wrong.is_empty() {
             return writeln!(f, "the accounts balance");
         }
@@ -147,15 +188,16 @@ mod tests {
         ClassCarried { class, taken, sent, came, delivered, lost, age: None }
     }
 
-    fn node(name: &str, classes: Vec<ClassCarried>, lost: u64) -> Links {
-        let peer = PeerLink {
-            node: "other".into(),
+    fn peer(name: &str, [sent, received]: [u64; 2], lost: u64) -> PeerLink {
+        let carried = |packages| Carried { packages, ..Carried::default() };
+        PeerLink {
+            node: name.into(),
             address: "10.77.0.9".into(),
             state: LinkState::Alive,
             why: String::new(),
             heard_ms: Some(1),
-            sent: Carried::default(),
-            received: Carried::default(),
+            sent: carried(sent),
+            received: carried(received),
             unsent: 0,
             lost,
             missed: 0,
@@ -164,12 +206,19 @@ mod tests {
             overtaken: 0,
             refused: 0,
             restarts: 0,
-        };
+        }
+    }
+
+    fn node(name: &str, classes: Vec<ClassCarried>, lost: u64) -> Links {
+        with_peers(name, classes, vec![peer("other", [0, 0], lost)])
+    }
+
+    fn with_peers(name: &str, classes: Vec<ClassCarried>, peers: Vec<PeerLink>) -> Links {
         Links {
             node: name.into(),
             digest: 1,
             uptime_ms: 1,
-            peers: vec![peer],
+            peers,
             waiting: Vec::new(),
             waiting_bytes: 0,
             classes,
@@ -179,7 +228,7 @@ mod tests {
     }
 
     fn wrong(base: ClassCarried, desk: ClassCarried, lost: u64) -> Vec<String> {
-        Balance::of(&[node("base", vec![base], 0), node("desk", vec![desk], lost)], TOOL).wrong
+        Balance::of(&[node("base", vec![base], 0), node("desk", vec![desk], lost)], TOOL, &[]).wrong
     }
 
     #[test]
@@ -196,6 +245,24 @@ mod tests {
             wrong(class(150, [10, 9, 0, 0], 0), class(150, [0, 0, 9, 9], 0), 0),
             ["the router of base had 10 packages and knows of 9"]
         );
+    }
+
+    #[test]
+    fn after_a_death_the_others_are_compared_and_each_life_for_itself() {
+        let survivors = |came: u64| {
+            let base = with_peers("base", vec![class(150, [3, 3, 0, 0], 0)], vec![peer("brain", [3, 9], 5)]);
+            let brain = with_peers(
+                "brain",
+                vec![class(150, [20, 20, 0, 0], 0)],
+                vec![peer("base", [20, 8], 0), peer("desk", [4, 2], 0)],
+            );
+            let desk = with_peers("desk", Vec::new(), vec![peer("brain", [2, came], 0)]);
+            Balance::of(&[base, brain, desk], TOOL, &["base"])
+        };
+        let balance = survivors(4);
+        assert!(balance.holds() && balance.to_string().contains("the router of base had counted"), "{balance}");
+        assert_eq!(survivors(3).wrong, ["from brain to desk, packages that did not come: 1; no datagram was lost"]);
+        assert_eq!(survivors(5).wrong, ["from brain to desk, 4 packages were sent and 5 came"]);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
 
 use super::account::{self, Balance};
+use super::losses::Losses;
+use super::takeover::{Seen, Watch};
 use super::{Arguments, FIRST_FUNCTION, copy, drawn};
 use crate::cli::launch::{Nodes, lab};
 use crate::cli::speech::Speech;
@@ -39,7 +41,8 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     let speech = Speech::begin()?;
     speech.say(Network::UNPROTECTED);
     let mut nodes = Nodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
-    let summary = watch(&mut nodes, long).then(|| summary(&installation));
+    let kill_after = long.map(|long| long / 2).filter(|_| arguments.kill_master);
+    let summary = watch(&mut nodes, &installation, long, kill_after).map(|seen| summary(&installation, &seen?));
     let code = nodes.stop();
     speech.settle();
     let Some(summary) = summary else { return Ok(ExitCode::FAILURE) };
@@ -49,25 +52,42 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     Ok(if well { code } else { ExitCode::FAILURE })
 }
 
-/// Until the time is over, which begins when all modules are on, or it is told to stop; false if not all ran.
-fn watch(nodes: &mut Nodes<'_>, long: Option<Duration>) -> bool {
-    let mut deadline = None;
-    let left = |deadline: Option<Instant>| {
-        deadline.map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()))
-    };
-    while nodes.watch(left(deadline)) {
-        if nodes.all_run() {
-            deadline = deadline.or(long.map(|long| Instant::now() + long));
-        }
-        if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-            break;
+/// Until the time is over, which begins when all modules are on, or it is told to stop; what was seen of routers, or none if not all ran.
+fn watch(
+    nodes: &mut Nodes<'_>,
+    installation: &Arc<Installation>,
+    long: Option<Duration>,
+    kill_after: Option<Duration>,
+) -> Option<Result<Seen, Failure>> {
+    while !nodes.all_run() {
+        if !nodes.watch(Duration::MAX) {
+            return None;
         }
     }
-    nodes.all_run()
+    let watch = nodes.capture().and_then(|capture| Watch::begin(installation, capture));
+    let watch = match watch {
+        Ok(watch) => watch,
+        Err(error) => return Some(Err(error)),
+    };
+    let after = |time: Option<Duration>| time.map(|time| Instant::now() + time);
+    let (deadline, mut kill_at) = (after(long), after(kill_after));
+    let is_over = |at: Option<Instant>| at.is_some_and(|at| Instant::now() >= at);
+    while !is_over(deadline) {
+        let next = kill_at.or(deadline);
+        let left = next.map_or(Duration::MAX, |next| next.saturating_duration_since(Instant::now()));
+        if !nodes.watch(left) {
+            break;
+        }
+        if is_over(kill_at) {
+            kill_at = None;
+            watch.kill_master();
+        }
+    }
+    Some(watch.end())
 }
 
 /// All there is to say at the end, and whether all is well.
-fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> {
+fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, bool), Failure> {
     let open = |node: &rohrpost::config::Node| Node::open(&node_directory(&installation.name, &node.name));
     let nodes = installation.nodes.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let (first, name) = (&nodes[0], &installation.nodes[0].name);
@@ -77,11 +97,13 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     let (clocks, clocks_hold) = clocks(installation, &nodes);
     let survey = |(node, config): (&Arc<Node>, &rohrpost::config::Node)| Survey::new(node, installation, &config.name);
     let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
-    let links = settled(installation, &mut tool)?;
+    let died = seen.died();
+    let links = settled(installation, &mut tool, &died)?;
+    let losses = Losses::ask(installation, &mut tool);
     let kept = in_slots(installation, &mut tool)?;
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
     tool.close();
-    let balance = Balance::of(&links, installation.classes.tool().0);
+    let balance = Balance::of(&links, installation.classes.tool().0, &died);
     let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
     text += &print_classes(installation, &classes(&surveys));
     text += "(data and replies carry the class of the module that asked for them)\n";
@@ -97,12 +119,20 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     if !late.is_empty() {
         text += &format!("\nDeclared flows; a slot that was left out costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
     }
+    if !installation.flows.is_empty() {
+        text += "\nDeclared flows from end to end, as the modules themselves have counted:\n\n";
+        text += &losses.table(installation);
+    }
     text += &format!("\n{balance}\n{clocks}");
+    let deaths = seen.text();
+    if !deaths.is_empty() {
+        text += &format!("\n{deaths}\n");
+    }
     text += &map;
     for error in &errors {
         text += &format!("{error}\n");
     }
-    Ok((text, errors.is_empty() && clocks_hold && balance.holds()))
+    Ok((text, errors.is_empty() && clocks_hold && balance.holds() && seen.is_well()))
 }
 
 /// What the mailboxes of all nodes did.
@@ -173,7 +203,7 @@ fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
 }
 
 /// What routers counted when all that was on its way had come: the modules that send are switched off first.
-fn settled(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Links>, Failure> {
+fn settled(installation: &Installation, tool: &mut ToolLink, died: &[&str]) -> Result<Vec<Links>, Failure> {
     for module in installation.modules.iter().filter(|module| module.is_in_file()) {
         // One that does not answer was told of above.
         let _ = tool.switch(module.name, false);
@@ -181,7 +211,7 @@ fn settled(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Links
     let deadline = Instant::now() + SETTLE;
     loop {
         let links: Vec<Links> = of_routers(installation, tool, RouterInterface::LINKS)?;
-        if Balance::of(&links, installation.classes.tool().0).holds() || Instant::now() >= deadline {
+        if Balance::of(&links, installation.classes.tool().0, died).holds() || Instant::now() >= deadline {
             return Ok(links);
         }
         std::thread::sleep(LOOK);

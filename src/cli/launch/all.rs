@@ -16,7 +16,7 @@ use nix::unistd::{Pid, getppid};
 use rohrpost::config::Installation;
 use rohrpost::launch::{Event, events};
 use rohrpost_routers::impair;
-use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -153,6 +153,11 @@ impl<'a> Nodes<'a> {
         read(index, true, err, sender.clone())?;
         self.open += 1;
         Ok(())
+    }
+
+    /// Begins to watch what crosses the network.
+    pub(crate) fn capture(&self) -> Result<Capture, Failure> {
+        Ok(self.lab.capture()?)
     }
 
     /// Watches for at most `period`, or until something happens; false when it is time to stop: somebody said so, a node did not start,

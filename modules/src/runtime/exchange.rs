@@ -1,0 +1,28 @@
+//! What a module says of its exchange with others.
+
+use super::context::Context;
+use crate::common::{EXCHANGE_PAGE, Exchange, ExchangePage};
+use rohrpost_mailbox::Name;
+
+/// From this one on: first the data that it follows, then those that it calls.
+pub(super) fn page(context: &Context, from: u16) -> ExchangePage {
+    let named = |module: Name| context.installation.classes.format(module);
+    let link = context.link.borrow();
+    let followed = context.followings.tallies().map(|(publisher, number, came, lost)| Exchange {
+        module: named(publisher),
+        data: Some(number),
+        packages: came,
+        repeated: 0,
+        lost,
+    });
+    let called = link.tallies().iter().map(|tally| Exchange {
+        module: named(tally.to),
+        data: None,
+        packages: tally.calls,
+        repeated: tally.repeated,
+        lost: tally.unanswered,
+    });
+    let all: Vec<Exchange> = followed.chain(called).collect();
+    let total = u16::try_from(all.len()).unwrap_or(u16::MAX);
+    ExchangePage { total, exchanges: all.into_iter().skip(from.into()).take(EXCHANGE_PAGE).collect() }
+}

@@ -1,0 +1,63 @@
+//! What was lost of the declared flows, from end to end: as the modules at both ends have counted it.
+
+use crate::cli::table::table;
+use rohrpost::common::Exchange;
+use rohrpost::config::{Flow, Installation};
+use rohrpost::{Name, ToolLink};
+use std::collections::BTreeMap;
+
+/// What modules say of their exchange with others.
+pub(super) struct Losses {
+    told: BTreeMap<Name, Vec<Exchange>>,
+}
+
+impl Losses {
+    /// Asks both ends of each declared flow. One that does not answer was told of elsewhere.
+    pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Self {
+        let ends = installation.flows.iter().flat_map(|flow| [flow.from, flow.to]);
+        let mut told = BTreeMap::new();
+        for module in ends {
+            if let std::collections::btree_map::Entry::Vacant(place) = told.entry(module)
+                && let Ok(exchange) = tool.exchange(module)
+            {
+                place.insert(exchange);
+            }
+        }
+        Self { told }
+    }
+
+    /// A row for each kind of package that each declared flow between nodes carries.
+    pub(super) fn table(&self, installation: &Installation) -> String {
+        let name = |name| installation.classes.format(name);
+        let mut rows: Vec<[String; 5]> = Vec::new();
+        let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
+        for flow in installation.flows.iter().filter(crosses) {
+            let between = format!("{} → {}", name(flow.from), name(flow.to));
+            for (what, exchange) in self.of(installation, flow) {
+                let Exchange { packages, repeated, lost, data, .. } = exchange;
+                let again = if data.is_some() { "-".into() } else { repeated.to_string() };
+                rows.push([between.clone(), what.into(), packages.to_string(), again, lost.to_string()]);
+            }
+        }
+        rows.sort_unstable();
+        // Several flows may be declared between the same two.
+        rows.dedup();
+        table(["flow", "what", ">packages", ">sent again", ">lost"], rows)
+    }
+
+    fn of<'a>(
+        &'a self,
+        installation: &Installation,
+        flow: &Flow,
+    ) -> impl Iterator<Item = (&'static str, &'a Exchange)> {
+        let [from, to] = [flow.from, flow.to].map(|name| installation.classes.format(name));
+        let told = |by: Name, of: String, data: bool| {
+            let all = self.told.get(&by).into_iter().flatten();
+            all.filter(move |exchange| exchange.module == of && exchange.data.is_some() == data)
+        };
+        let data = told(flow.to, from.clone(), true).map(|exchange| ("data", exchange));
+        let commands = told(flow.from, to, false).map(|exchange| ("commands", exchange));
+        let answers = told(flow.to, from, false).map(|exchange| ("answers", exchange));
+        data.chain(commands).chain(answers)
+    }
+}

@@ -1,0 +1,110 @@
+//! Who has told the time, as seen on the bridge: from when to when, as master or in the place of one.
+
+use rohrpost_routers::frame::{FrameHead, NodeIndex};
+use rohrpost_routers::lab::Crossing;
+use rohrpost_routers::time::Term;
+use rohrpost_routers::time::message::{Message, Sync};
+use std::collections::VecDeque;
+
+/// The oldest are forgotten first. One cycle in some hundred is told by a backup master, on a busy computer.
+const REIGNS_MAX: usize = 10_000;
+
+/// Cycles in a row that one node told.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Reign {
+    pub(super) node: NodeIndex,
+    /// In the place of a master that was not heard.
+    pub(super) replacement: bool,
+    pub(super) term: Term,
+    /// When the first of its frames crossed the bridge, monotonic ns.
+    pub(super) first_ns: u64,
+    pub(super) first_cycle: u64,
+    /// And the last.
+    pub(super) last_ns: u64,
+    pub(super) last_cycle: u64,
+}
+
+impl Reign {
+    /// Cycles of it.
+    pub(super) fn cycles(&self) -> u64 {
+        self.last_cycle - self.first_cycle + 1
+    }
+}
+
+/// One after the other.
+#[derive(Debug, Default)]
+pub(super) struct Reigns {
+    list: VecDeque<Reign>,
+}
+
+impl Reigns {
+    /// Notes a datagram, if it tells the time.
+    pub(super) fn note(&mut self, crossing: &Crossing<'_>) {
+        let Ok((head, rest)) = FrameHead::parse(crossing.datagram) else { return };
+        if let Ok(Message::Sync(sync)) = Message::parse(head.kind, rest) {
+            self.told(head.from, crossing.at_ns, &sync);
+        }
+    }
+
+    fn told(&mut self, node: NodeIndex, at_ns: u64, sync: &Sync) {
+        let Sync { cycle, term, replacement, .. } = *sync;
+        let goes_on = |last: &&mut Reign| {
+            let same = (last.node, last.replacement, last.term) == (node, replacement, term);
+            same && (last.last_cycle..=last.last_cycle + 1).contains(&cycle)
+        };
+        if let Some(last) = self.list.back_mut().filter(goes_on) {
+            (last.last_ns, last.last_cycle) = (at_ns, cycle);
+            return;
+        }
+        if self.list.len() == REIGNS_MAX {
+            self.list.pop_front();
+        }
+        let (first_ns, last_ns, first_cycle, last_cycle) = (at_ns, at_ns, cycle, cycle);
+        self.list.push_back(Reign { node, replacement, term, first_ns, first_cycle, last_ns, last_cycle });
+    }
+
+    /// The last one that spoke as master before this moment.
+    pub(super) fn master_at(&self, at_ns: u64) -> Option<&Reign> {
+        self.list.iter().rev().find(|reign| !reign.replacement && reign.first_ns <= at_ns)
+    }
+
+    /// The last of this node as master that began before this moment.
+    pub(super) fn last_of(&self, node: usize, at_ns: u64) -> Option<&Reign> {
+        let is_it = |reign: &&Reign| usize::from(reign.node) == node && !reign.replacement && reign.first_ns <= at_ns;
+        self.list.iter().rev().find(is_it)
+    }
+
+    /// Those that began after this moment, the first first.
+    pub(super) fn since(&self, at_ns: u64) -> impl Iterator<Item = &Reign> {
+        self.list.iter().filter(move |reign| reign.first_ns > at_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reigns(told: &[(NodeIndex, u64, bool)]) -> Reigns {
+        let mut reigns = Reigns::default();
+        for (node, cycle, replacement) in told {
+            let sync = Sync { cycle: *cycle, replacement: *replacement, term: Term::new(1, 0), ..Sync::default() };
+            reigns.told(*node, cycle * 1000, &sync);
+        }
+        reigns
+    }
+
+    #[test]
+    fn a_reign_ends_with_another_node_another_role_or_a_cycle_that_nobody_told() {
+        let told =
+            [(0, 1, false), (0, 1, false), (0, 2, false), (1, 3, true), (1, 4, true), (1, 5, false), (1, 7, false)];
+        let reigns = reigns(&told);
+        let seen: Vec<_> = reigns.since(0).map(|reign| (reign.node, reign.replacement, reign.cycles())).collect();
+        assert_eq!(seen, [(0, false, 2), (1, true, 2), (1, false, 1), (1, false, 1)]);
+        assert_eq!(reigns.master_at(4000).map(|reign| reign.node), Some(0), "who stands in is no master");
+        assert_eq!(reigns.master_at(5000).map(|reign| reign.node), Some(1));
+        assert_eq!(reigns.master_at(999), None);
+        assert_eq!(reigns.last_of(0, 9000).map(|reign| reign.last_cycle), Some(2));
+        assert_eq!(reigns.last_of(1, 4999), None);
+        assert_eq!(reigns.since(2000).next().map(|reign| reign.first_cycle), Some(3));
+    }
+}
