@@ -1,8 +1,10 @@
 //! Time slots: how well they are kept, how well time is, what happens when the master dies, and whether bounds hold.
 
+mod brisk;
 mod contest;
 mod goals;
 mod observed;
+mod pitch;
 pub mod plans;
 mod slots;
 
@@ -10,5 +12,5 @@ use super::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [slots::cases()].into_iter().flatten().collect()
+    [slots::cases(), brisk::cases(), pitch::cases()].into_iter().flatten().collect()
 }

@@ -11,7 +11,7 @@ use crate::settings::Settings;
 use crate::statistics::Summary;
 use crate::tdma::rights::Rights;
 
-const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
+pub(super) const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
     Summary { p50, p99: Some(p99), p999: Some(p999), max: None }
 }
 
@@ -27,7 +27,7 @@ fn p999_us(seen: &Observed) -> f64 {
     seen.summary().ok().and_then(|summary| summary.p999).unwrap_or_default()
 }
 
-/// Of a table that has 5 ms.
+/// Of the routers' own counts.
 pub(super) const OMITTED: Figure = Figure {
     what: "omitted",
     unit: "%",
