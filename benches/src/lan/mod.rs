@@ -15,6 +15,7 @@ pub mod load;
 pub mod nodes;
 pub mod router;
 pub mod rtnet;
+pub mod skewed;
 pub mod udp;
 pub mod wire;
 

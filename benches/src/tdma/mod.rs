@@ -18,5 +18,6 @@ pub mod machine;
 pub mod plan;
 pub mod rights;
 pub mod routers;
+pub mod shells;
 pub mod stage;
 pub mod traffic;

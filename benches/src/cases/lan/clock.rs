@@ -8,6 +8,7 @@ use crate::harness::{End, Failure, sample_in_child};
 use crate::lan::Wire;
 use crate::lan::load::Load;
 use crate::lan::rtnet;
+use crate::lan::skewed::{SKEW, Shown, error_us};
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::address;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
@@ -31,7 +32,6 @@ const SETTLED: u64 = 50;
 const PATIENCE: Duration = Duration::from_secs(60);
 const PORT: u16 = 20_140;
 const MTU: u16 = 1_500;
-const SKEW: Skew = Skew { offset_ns: 1_234_000_000, rate_ppb: 30_000, wander_ppb: 500.0, begin_ns: 0 };
 /// What must be reached, and what may be hoped for: µs, as p50, p99, p99.9 (none given) and maximum.
 const MUST: (&str, Summary) = ("2, 5, 15 us", Summary { p50: 2.0, p99: Some(5.0), p999: None, max: Some(15.0) });
 const HOPED: (&str, Summary) = ("0.5, 1.5, 3 us", Summary { p50: 0.5, p99: Some(1.5), p999: None, max: Some(3.0) });
@@ -92,25 +92,10 @@ fn errors_us(wire: &Wire, settings: &Settings) -> Result<Vec<f64>, Failure> {
         }
         for _ in 0..settings.count(SAMPLES) {
             std::thread::sleep(EACH);
-            samples.push(error_us(&master, &slave)?);
+            samples.push(error_us(&master.shown(), &slave.shown())?);
         }
         Ok(())
     })
-}
-
-/// How far the slave is off the master at this moment. It must know.
-fn error_us(master: &Timed, slave: &Timed) -> Result<f64, Failure> {
-    let records = [master, slave].map(|timed| timed.service.state().snapshot().record);
-    let now_ns = monotonic_ns();
-    let [master, slave] = [records[0].at(master.skew.local_ns(now_ns)), records[1].at(slave.skew.local_ns(now_ns))];
-    if master.epoch != slave.epoch {
-        return Err(Failure::Failed(format!("epoch {} at the master, {} at the slave", master.epoch, slave.epoch)));
-    }
-    let (error, bound) = (Duration::from_nanos(master.ns.abs_diff(slave.ns)), slave.error);
-    if error > bound {
-        return Err(Failure::Failed(format!("off by {error:?}, where at most {bound:?} was promised")));
-    }
-    Ok(error.as_nanos() as f64 / 1000.0)
 }
 
 /// A node that keeps time, by a clock of its own.
@@ -124,8 +109,7 @@ impl Timed {
     fn start(wire: &Wire, end: End) -> Result<Self, Failure> {
         wire.enter(end)?;
         let own = NodeIndex::from(end == End::Pong);
-        let skew = if end == End::Ping { Skew { offset_ns: 0, rate_ppb: 0, wander_ppb: 0.0, ..SKEW } } else { SKEW };
-        let skew = Skew { begin_ns: monotonic_ns(), ..skew };
+        let skew = if end == End::Ping { Skew::default() } else { Skew { begin_ns: monotonic_ns(), ..SKEW } };
         let settings = TimeSettings {
             system: 1,
             own,
@@ -147,6 +131,10 @@ impl Timed {
         };
         let service = ClockService::start(parts).map_err(|error| Failure::of("clock service", error))?;
         Ok(Self { service, skew })
+    }
+
+    fn shown(&self) -> Shown {
+        Shown { record: self.service.state().snapshot().record, skew: self.skew }
     }
 
     fn is_settled(&self) -> bool {

@@ -11,13 +11,13 @@ use crate::settings::Settings;
 use crate::statistics::Summary;
 use crate::tdma::rights::Rights;
 
-pub(super) const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
+const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
     Summary { p50, p99: Some(p99), p999: Some(p999), max: None }
 }
 
 const MUST: (&str, Summary) = ("20, 50, 150 us", bounds(20.0, 50.0, 150.0));
 const HOPED: (&str, Summary) = ("5, 25, 60 us", bounds(5.0, 25.0, 60.0));
-const UNLOADED: &str = "unloaded";
+pub(super) const UNLOADED: &str = "unloaded";
 const ORDINARY: &str = "ordinary";
 /// Off by more, a slot would meet the next one also with a wide guard.
 const FAR_US: f64 = 250.0;
