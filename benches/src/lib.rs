@@ -28,6 +28,8 @@ pub mod rounds;
 pub mod settings;
 pub mod statistics;
 pub mod table;
+#[cfg(feature = "lan")]
+pub mod tdma;
 
 pub use harness::Failure;
 pub use settings::Settings;

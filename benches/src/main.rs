@@ -1,4 +1,4 @@
-//! `cargo run --release -p rohrpost-bench -- local`, or `lan`.
+//! `cargo run --release -p rohrpost-bench -- local`, `lan` or `tdma`.
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::cases::Case;
@@ -26,6 +26,9 @@ enum Command {
     /// Packages between nodes, over routers: two network namespaces of this computer.
     #[cfg(feature = "lan")]
     Lan(Run),
+    /// Time slots: three network namespaces of this computer.
+    #[cfg(feature = "lan")]
+    Tdma(Run),
 }
 
 #[derive(clap::Args)]
@@ -63,6 +66,11 @@ fn main() -> ExitCode {
         Command::Lan(run) => {
             rohrpost_bench::lan::prepare();
             measure(&run, &cases::lan::all())
+        }
+        #[cfg(feature = "lan")]
+        Command::Tdma(run) => {
+            rohrpost_bench::lan::prepare();
+            measure(&run, &cases::tdma::all())
         }
     };
     match done {

@@ -11,6 +11,8 @@ mod proof;
 mod rates;
 mod rivals;
 mod startup;
+#[cfg(feature = "lan")]
+pub mod tdma;
 
 pub use startup::run_hidden_program;
 

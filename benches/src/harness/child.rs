@@ -100,6 +100,11 @@ impl Child {
         self.report.read().unwrap_or_else(|| Err(Failure::Failed("its process was killed".into())))
     }
 
+    /// Its process; after it has ended, perhaps somebody else's.
+    pub fn pid(&self) -> i32 {
+        self.pid.as_raw()
+    }
+
     /// Sends it a signal, unless it has ended.
     pub fn signal(&mut self, signal: Signal) {
         if self.has_ended() == Ok(false) {

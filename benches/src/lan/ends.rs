@@ -7,6 +7,7 @@ use crate::harness::{End, Link, Meetings};
 use rohrpost_mailbox::{
     Full, Label, Name, Node, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -30,7 +31,7 @@ impl Module {
     pub fn open(nodes: &Nodes, end: End, turn: u8, bytes: usize, meetings: &mut Meetings) -> Result<Self, Failure> {
         let other = nodes::bench(if end == End::Ping { End::Pong } else { End::Ping }, turn);
         let own = nodes::bench(end, turn);
-        let participant = join(nodes, end, own)?;
+        let participant = join(&nodes.directory(end), own)?;
         let shape = Shape { body_bytes_max: body(bytes)?, ..Shape::default() };
         let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
         meetings.meet()?;
@@ -66,12 +67,12 @@ pub struct Source {
 }
 
 impl Source {
-    /// A sender on the near node, of the priority of its class.
+    /// A sender on the node with this directory, of the priority of its class.
     ///
     /// # Errors
     /// When there is no way to the other node.
-    pub fn open(nodes: &Nodes, own: Name, to: Name) -> Result<Self, Failure> {
-        let participant = join(nodes, End::Ping, own)?;
+    pub fn open(directory: &Path, own: Name, to: Name) -> Result<Self, Failure> {
+        let participant = join(directory, own)?;
         let sender = participant.sender(to).map_err(|error| Failure::of("way to the other node", error))?;
         let label = Label { from: own, kind: Type::data(0), priority: Priority(own.class().0), ..Label::default() };
         Ok(Self { sender, label })
@@ -79,6 +80,12 @@ impl Source {
 }
 
 impl Source {
+    /// From now on sends data of this type.
+    #[must_use]
+    pub fn of_type(self, kind: Type) -> Self {
+        Self { label: Label { kind, ..self.label }, ..self }
+    }
+
     /// Sends; false when the router's mailbox has no room.
     ///
     /// # Errors
@@ -105,15 +112,21 @@ pub struct Sink {
 }
 
 impl Sink {
-    /// A mailbox on the far node.
+    /// A mailbox on the node with this directory.
     ///
     /// # Errors
     /// When it cannot be made.
-    pub fn open(nodes: &Nodes, own: Name, bytes: usize) -> Result<Self, Failure> {
-        let participant = join(nodes, End::Pong, own)?;
+    pub fn open(directory: &Path, own: Name, bytes: usize) -> Result<Self, Failure> {
+        let participant = join(directory, own)?;
         let shape = Shape { slots: SLOTS, body_bytes_max: body(bytes)?, full: Full::Reject, ..Shape::default() };
         let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
         Ok(Self { receiver })
+    }
+
+    /// Takes all that is there, and tells how many.
+    pub fn drain(&mut self) -> u64 {
+        let taken = std::iter::from_fn(|| self.receiver.try_receive().map(drop));
+        taken.count() as u64
     }
 }
 
@@ -131,8 +144,8 @@ impl Outlet for Sink {
     }
 }
 
-fn join(nodes: &Nodes, end: End, own: Name) -> Result<Arc<Participant>, Failure> {
-    let node = Node::open(&nodes.directory(end)).map_err(|error| Failure::of("node", error))?;
+fn join(directory: &Path, own: Name) -> Result<Arc<Participant>, Failure> {
+    let node = Node::open(directory).map_err(|error| Failure::of("node", error))?;
     let module = Name::new(own.system(), own.class().0, own.instance(), 0);
     Participant::join(&node, module).map_err(|error| Failure::of("node", error))
 }

@@ -11,8 +11,11 @@
 pub mod chain;
 pub mod ends;
 pub mod flow;
+pub mod load;
 pub mod nodes;
+pub mod router;
 pub mod rtnet;
+pub mod skewed;
 pub mod udp;
 pub mod wire;
 

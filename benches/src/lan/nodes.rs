@@ -1,27 +1,17 @@
 //! Two nodes with real routers between them, as launch would start them.
 
+use super::router::{ROUTER, Router, RouterSpec, SYSTEM, end_all};
 use super::wire::{Wire, address, name_of};
 use crate::Failure;
-use crate::harness::{Child, End, Placement, Scheduling, Scratch, settle};
-use nix::sys::signal::Signal;
-use rohrpost_mailbox::{Class, Name, Node, local, node_directory};
+use crate::harness::{End, Placement, Scheduling, Scratch, settle};
+use rohrpost_mailbox::{Class, Name};
 use std::fs;
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 const INSTALLATION: &str = "bench-lan";
-const SYSTEM: u8 = 1;
 /// Class of the modules that are timed, and of those that flood.
 const BENCH: Class = Class(200);
 const FLOOD: Class = Class(100);
-const ROUTER: Class = Class(250);
-/// Reading a configuration and making a mailbox takes milliseconds, on a busy computer a second.
-const READY_WITHIN: Duration = Duration::from_secs(20);
-/// Within this a router that is told to end has told its peers.
-const ENDS_WITHIN: Duration = Duration::from_secs(5);
-const LOOK_EACH: Duration = Duration::from_millis(5);
 
 /// What differs between cases.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +30,7 @@ pub const UNPACED: &str = "64 GiB";
 /// Two nodes, until this is dropped.
 pub struct Nodes {
     scratch: Scratch,
-    routers: Vec<Child>,
+    routers: Vec<Router>,
 }
 
 impl Nodes {
@@ -55,72 +45,33 @@ impl Nodes {
         let text = configuration(network);
         fs::write(&config, text).map_err(|error| Failure::of("configuration", error))?;
         for end in [End::Ping, End::Pong] {
-            let router = Child::start(|| {
+            let scratch = nodes.scratch.directory();
+            let spec = spec(end, &command, &config, &scratch);
+            let router = Router::start(&spec, || {
                 wire.enter(end)?;
                 // Pinned; how it is scheduled the router knows itself.
-                settle(end, Placement::TwoCores, Scheduling::Normal)?;
-                let log = fs::File::create(nodes.log(end)).map_err(|error| Failure::of("router's log", error))?;
-                let error = Command::new(&command)
-                    .args(["router", "--config"])
-                    .arg(&config)
-                    .args(["--name", &format!("router.{}", index(end))])
-                    .env("ROHRPOST_DIR", nodes.scratch.directory())
-                    .stdin(Stdio::null())
-                    .stdout(Stdio::null())
-                    .stderr(log)
-                    .exec();
-                Err(Failure::of("rohrpost router", error))
+                settle(end, Placement::TwoCores, Scheduling::Normal)
             })?;
             nodes.routers.push(router);
         }
-        nodes.await_ready()?;
+        nodes.routers.iter_mut().try_for_each(Router::await_ready)?;
         Ok(nodes)
     }
 
     /// The directory of an end's node.
     pub fn directory(&self, end: End) -> PathBuf {
-        let file = node_directory(INSTALLATION, name_of(end));
-        self.scratch.directory().join(file.file_name().unwrap_or_default())
-    }
-
-    /// What the router of a node says.
-    fn log(&self, end: End) -> PathBuf {
-        self.scratch.directory().join(format!("router-{}.log", name_of(end)))
-    }
-
-    /// Until each router's mailbox for others' packages is there, which it makes last.
-    fn await_ready(&mut self) -> Result<(), Failure> {
-        let give_up = Instant::now() + READY_WITHIN;
-        for end in [End::Ping, End::Pong] {
-            let transit = Name::new(SYSTEM, ROUTER.0, index(end), local::TRANSIT);
-            while !has_mailbox(&self.directory(end), transit) {
-                if self.routers[usize::from(index(end))].has_ended()? || Instant::now() > give_up {
-                    let said = fs::read_to_string(self.log(end)).unwrap_or_default();
-                    let node = name_of(end);
-                    return Err(Failure::Failed(format!("the router of node `{node}` did not get ready: {said}")));
-                }
-                std::thread::sleep(LOOK_EACH);
-            }
-        }
-        Ok(())
+        spec(end, Path::new(""), Path::new(""), &self.scratch.directory()).directory()
     }
 }
 
 impl Drop for Nodes {
     fn drop(&mut self) {
-        self.routers.iter_mut().for_each(|router| router.signal(Signal::SIGTERM));
-        let give_up = Instant::now() + ENDS_WITHIN;
-        for router in &mut self.routers {
-            // One that does not end is killed when it is dropped.
-            while !router.has_ended().unwrap_or(true) && Instant::now() < give_up {
-                std::thread::sleep(LOOK_EACH);
-            }
-        }
+        end_all(&mut self.routers);
     }
 }
 
-fn has_mailbox(directory: &Path, name: Name) -> bool {
-    Node::open(directory).is_ok_and(|node| node.look_at(name).is_some())
+fn spec<'a>(end: End, command: &'a Path, config: &'a Path, scratch: &'a Path) -> RouterSpec<'a> {
+    RouterSpec { command, config, installation: INSTALLATION, node: name_of(end).into(), index: index(end), scratch }
 }
 
 /// Of the node in the configuration, and so of its router.

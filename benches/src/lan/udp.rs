@@ -5,7 +5,7 @@ use super::wire::{Wire, address};
 use crate::harness::{End, Failure, Link};
 use nix::sys::socket::{setsockopt, sockopt};
 use std::io;
-use std::net::UdpSocket;
+use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
 
 /// Of the raw floor; its relays take the next ones.
@@ -30,13 +30,21 @@ impl Datagrams {
         wire.enter(end)?;
         let (own, other) = if end == End::Ping { (0, 1) } else { (1, 0) };
         let other_end = if end == End::Ping { End::Pong } else { End::Ping };
+        Self::connect((address(end), ports[own]).into(), (address(other_end), ports[other]).into())
+    }
+
+    /// From one address to another, in the place where the calling thread is.
+    ///
+    /// # Errors
+    /// When that is refused.
+    pub fn connect(own: SocketAddr, other: SocketAddr) -> Result<Self, Failure> {
         let opened = || -> io::Result<UdpSocket> {
-            let socket = UdpSocket::bind((address(end), ports[own]))?;
+            let socket = UdpSocket::bind(own)?;
             // Only root may have more than the system's limit; who is refused keeps what that gives.
             if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
                 setsockopt(&socket, sockopt::RcvBuf, &RECEIVE_BYTES)?;
             }
-            socket.connect((address(other_end), ports[other]))?;
+            socket.connect(other)?;
             Ok(socket)
         };
         opened().map(Self).map_err(|error| Failure::of("udp socket", error))

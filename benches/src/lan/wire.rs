@@ -36,7 +36,8 @@ pub fn prepare() {
     let _ = become_able();
 }
 
-fn failure(error: LabError) -> Failure {
+/// As a case has to say it.
+pub(crate) fn failure(error: LabError) -> Failure {
     match error {
         LabError::NotAllowed(_) => Failure::Skipped(format!("no namespaces here: {error}")),
         error => Failure::of("network", error),

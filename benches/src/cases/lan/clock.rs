@@ -4,9 +4,11 @@
 //! 30 ppm, and half a ppm that comes and goes; so the true error of each reading is known, and its own bound must contain it.
 
 use crate::cases::Case;
-use crate::harness::{Child, End, Failure, Link, Placement, Scheduling, sample_in_child, settle};
+use crate::harness::{End, Failure, sample_in_child};
 use crate::lan::Wire;
+use crate::lan::load::Load;
 use crate::lan::rtnet;
+use crate::lan::skewed::{SKEW, Shown, error_us};
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::address;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
@@ -30,12 +32,6 @@ const SETTLED: u64 = 50;
 const PATIENCE: Duration = Duration::from_secs(60);
 const PORT: u16 = 20_140;
 const MTU: u16 = 1_500;
-const SKEW: Skew = Skew { offset_ns: 1_234_000_000, rate_ppb: 30_000, wander_ppb: 500.0, begin_ns: 0 };
-/// The load: datagrams of an ordinary network, about 40 000 a second.
-const LOAD_BYTES: usize = 1_400;
-const LOAD_BURST: usize = 40;
-const LOAD_EACH: Duration = Duration::from_millis(1);
-
 /// What must be reached, and what may be hoped for: µs, as p50, p99, p99.9 (none given) and maximum.
 const MUST: (&str, Summary) = ("2, 5, 15 us", Summary { p50: 2.0, p99: Some(5.0), p999: None, max: Some(15.0) });
 const HOPED: (&str, Summary) = ("0.5, 1.5, 3 us", Summary { p50: 0.5, p99: Some(1.5), p999: None, max: Some(3.0) });
@@ -60,7 +56,7 @@ impl Case for Clock {
         let contenders = [
             Contender::sampled("rohrpost", || errors_us(wire()?, settings)),
             Contender::sampled(RTNET, || {
-                let _load = Load::start(wire()?)?;
+                let _load = load(wire()?)?;
                 rtnet::errors_us(wire()?, settings.count(SYNCHRONISATIONS))
             }),
             fixed(MUST),
@@ -77,9 +73,13 @@ impl Case for Clock {
     }
 }
 
+fn load(wire: &Wire) -> Result<Load, Failure> {
+    Load::start(|| Datagrams::open(wire, End::Ping), || Datagrams::open(wire, End::Pong))
+}
+
 /// How far off the slave was at any moment, µs.
 fn errors_us(wire: &Wire, settings: &Settings) -> Result<Vec<f64>, Failure> {
-    let _load = Load::start(wire)?;
+    let _load = load(wire)?;
     sample_in_child(PATIENCE, |samples| {
         let master = Timed::start(wire, End::Ping)?;
         let slave = Timed::start(wire, End::Pong)?;
@@ -92,25 +92,10 @@ fn errors_us(wire: &Wire, settings: &Settings) -> Result<Vec<f64>, Failure> {
         }
         for _ in 0..settings.count(SAMPLES) {
             std::thread::sleep(EACH);
-            samples.push(error_us(&master, &slave)?);
+            samples.push(error_us(&master.shown(), &slave.shown())?);
         }
         Ok(())
     })
-}
-
-/// How far the slave is off the master at this moment. It must know.
-fn error_us(master: &Timed, slave: &Timed) -> Result<f64, Failure> {
-    let records = [master, slave].map(|timed| timed.service.state().snapshot().record);
-    let now_ns = monotonic_ns();
-    let [master, slave] = [records[0].at(master.skew.local_ns(now_ns)), records[1].at(slave.skew.local_ns(now_ns))];
-    if master.epoch != slave.epoch {
-        return Err(Failure::Failed(format!("epoch {} at the master, {} at the slave", master.epoch, slave.epoch)));
-    }
-    let (error, bound) = (Duration::from_nanos(master.ns.abs_diff(slave.ns)), slave.error);
-    if error > bound {
-        return Err(Failure::Failed(format!("off by {error:?}, where at most {bound:?} was promised")));
-    }
-    Ok(error.as_nanos() as f64 / 1000.0)
 }
 
 /// A node that keeps time, by a clock of its own.
@@ -124,8 +109,7 @@ impl Timed {
     fn start(wire: &Wire, end: End) -> Result<Self, Failure> {
         wire.enter(end)?;
         let own = NodeIndex::from(end == End::Pong);
-        let skew = if end == End::Ping { Skew { offset_ns: 0, rate_ppb: 0, wander_ppb: 0.0, ..SKEW } } else { SKEW };
-        let skew = Skew { begin_ns: monotonic_ns(), ..skew };
+        let skew = if end == End::Ping { Skew::default() } else { Skew { begin_ns: monotonic_ns(), ..SKEW } };
         let settings = TimeSettings {
             system: 1,
             own,
@@ -149,45 +133,12 @@ impl Timed {
         Ok(Self { service, skew })
     }
 
+    fn shown(&self) -> Shown {
+        Shown { record: self.service.state().snapshot().record, skew: self.skew }
+    }
+
     fn is_settled(&self) -> bool {
         let seen = self.service.state().snapshot();
         seen.synchronised && seen.role == Role::Slave && seen.exchanges >= SETTLED
-    }
-}
-
-/// Work on both processors, and datagrams from node to node, until it is dropped.
-struct Load {
-    _children: [Child; 4],
-}
-
-impl Load {
-    fn start(wire: &Wire) -> Result<Self, Failure> {
-        let work = || {
-            Child::start(|| {
-                loop {
-                    std::hint::black_box(monotonic_ns());
-                }
-            })
-        };
-        let swamp = Child::start(|| {
-            let mut datagrams = Datagrams::open(wire, End::Pong)?;
-            let mut message = vec![0; LOAD_BYTES];
-            loop {
-                datagrams.receive(&mut message)?;
-            }
-        })?;
-        let flooder = Child::start(|| {
-            let mut datagrams = Datagrams::open(wire, End::Ping)?;
-            settle(End::Ping, Placement::TwoCores, Scheduling::Normal)?;
-            let message = vec![7; LOAD_BYTES];
-            loop {
-                for _ in 0..LOAD_BURST {
-                    // Refused until the swamp is there.
-                    let _ = datagrams.send(&message);
-                }
-                std::thread::sleep(LOAD_EACH);
-            }
-        })?;
-        Ok(Self { _children: [work()?, work()?, swamp, flooder] })
     }
 }

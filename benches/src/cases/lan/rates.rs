@@ -80,7 +80,11 @@ impl Case for Rate {
         let ours = |ours: &Flow| {
             let (nodes, turn) = ground.turn()?;
             let [from, to] = [End::Ping, End::Pong].map(|end| nodes::bench(end, turn));
-            flow(ours, || Source::open(nodes, from, to), || Sink::open(nodes, to, self.bytes))
+            flow(
+                ours,
+                || Source::open(&nodes.directory(End::Ping), from, to),
+                || Sink::open(&nodes.directory(End::Pong), to, self.bytes),
+            )
         };
         let mut contenders = vec![
             losses.rated("rohrpost", || ours(&apart)),

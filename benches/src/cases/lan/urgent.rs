@@ -140,7 +140,7 @@ impl Flood {
         let counts = Shared::<Counts>::new()?;
         let [from, to] = [End::Ping, End::Pong].map(|end| nodes::flood(end, turn));
         let swamp = Child::start(|| {
-            let mut sink = Sink::open(nodes, to, FLOOD_BYTES)?;
+            let mut sink = Sink::open(&nodes.directory(End::Pong), to, FLOOD_BYTES)?;
             settle_low(End::Ping)?;
             counts.swamp.meet(2)?;
             let mut message = vec![0; FLOOD_BYTES];
@@ -153,7 +153,7 @@ impl Flood {
         })?;
         let flooder = Child::start(|| {
             counts.swamp.meet(2)?;
-            let mut source = Source::open(nodes, from, to)?;
+            let mut source = Source::open(&nodes.directory(End::Ping), from, to)?;
             settle_low(End::Pong)?;
             counts.flooding.meet(2)?;
             let message = vec![7; FLOOD_BYTES];

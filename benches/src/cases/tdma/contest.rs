@@ -1,0 +1,111 @@
+//! Contenders that differ in their table or in how routers run, watched in turn; and the rows that come of it.
+
+use super::goals::{Goal, figure};
+use super::observed::{Observed, Way};
+use crate::Failure;
+use crate::rounds::{Contender, Row, Subject, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::Summary;
+use crate::tdma::plan::Plan;
+use crate::tdma::stage::Stage;
+use std::cell::RefCell;
+
+/// Somebody who is watched.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Watched {
+    /// As the table calls it.
+    pub who: &'static str,
+    /// Its slots.
+    pub plan: Plan,
+    /// How its routers run.
+    pub way: Way,
+}
+
+/// Something else that was seen in a turn, besides how far off slots began.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Figure {
+    /// Follows the name of the case.
+    pub what: &'static str,
+    /// Of the figure.
+    pub unit: &'static str,
+    /// What it is.
+    pub of: fn(&Observed) -> f64,
+    /// For the first contender.
+    pub goals: &'static [Goal],
+}
+
+/// What belongs to each table: whether slots were left out, and what the computer did meanwhile.
+pub(super) const ALWAYS: [Figure; 3] = [
+    Figure {
+        what: "in another's slot",
+        unit: "%",
+        of: Observed::in_anothers_percent,
+        goals: &[Goal { name: "none", most: 0.0 }],
+    },
+    Figure { what: "steal", unit: "%", of: |seen| seen.steal_percent, goals: &[] },
+    Figure { what: "run delay", unit: "ms/s", of: |seen| seen.waited_ms_s, goals: &[] },
+];
+
+/// What was seen of a contender, round after round.
+pub(super) type Seen = Vec<Observed>;
+
+/// A case of this kind.
+pub(super) struct Contest {
+    /// Its name.
+    pub case: &'static str,
+    /// Those watched, the first of which is judged.
+    pub watched: Vec<Watched>,
+    /// What slots are held against that has a name and figures.
+    pub bounds: Vec<(&'static str, Summary)>,
+    /// Whom the first is compared with.
+    pub versus: Vec<Versus>,
+    /// What else is told.
+    pub figures: Vec<Figure>,
+}
+
+impl Contest {
+    /// Watches all, round after round. Rows, and what was seen of each contender.
+    pub(super) fn hold(&self, settings: &Settings) -> (Vec<Row>, Vec<Seen>) {
+        let stage = Stage::new();
+        let all: Vec<RefCell<Seen>> = self.watched.iter().map(|_| RefCell::default()).collect();
+        let turn = |at: usize| -> Result<Summary, Failure> {
+            let Watched { plan, way, .. } = &self.watched[at];
+            let seen = Observed::turn(stage.as_ref().map_err(Clone::clone)?, plan, *way, settings)?;
+            let summary = seen.summary()?;
+            all[at].borrow_mut().push(seen);
+            Ok(summary)
+        };
+        let turn = &turn;
+        let contender =
+            |(at, watched): (usize, &Watched)| Contender { name: watched.who, turn: Box::new(move || turn(at)) };
+        let fixed = |(name, bounds): &(&'static str, Summary)| {
+            let bounds = *bounds;
+            Contender { name, turn: Box::new(move || Ok(bounds)) }
+        };
+        let contenders = self.watched.iter().enumerate().map(contender);
+        let contenders: Vec<Contender> = contenders.chain(self.bounds.iter().map(fixed)).collect();
+        let mut rows = compare(settings, &self.subject("us", None), &contenders, &self.versus);
+        drop(contenders);
+        let seen: Vec<Seen> = all.into_iter().map(RefCell::into_inner).collect();
+        for figure in &self.figures {
+            rows.extend(self.told(figure, &seen));
+        }
+        (rows, seen)
+    }
+
+    /// The rows of a figure: the first contender's beside its goals, those of the others alone.
+    fn told(&self, told: &Figure, seen: &[Seen]) -> Vec<Row> {
+        let subject = self.subject(told.unit, Some(told.what));
+        let rows = self.watched.iter().zip(seen).enumerate().map(|(at, (watched, seen))| {
+            let rounds: Vec<f64> = seen.iter().map(told.of).collect();
+            figure(&subject, watched.who, &rounds, if at == 0 { told.goals } else { &[] })
+        });
+        rows.flatten().collect()
+    }
+
+    /// As rows name it.
+    pub(super) fn subject(&self, unit: &'static str, what: Option<&str>) -> Subject {
+        let case = what.map_or_else(|| self.case.into(), |what| format!("{}, {what}", self.case));
+        Subject { case, bytes: None, unit }
+    }
+}

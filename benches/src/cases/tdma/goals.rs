@@ -1,0 +1,59 @@
+//! Rows that stand beside what must be reached, and beside what may be hoped for.
+
+use crate::rounds::{Row, Subject, Target, Versus};
+use crate::statistics::{Ratio, Summary, median};
+
+/// A bound of a figure.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Goal {
+    /// As the table has it: `must 0.5 %`.
+    pub name: &'static str,
+    /// At most so much.
+    pub most: f64,
+}
+
+/// A figure that is there once in a round, beside each of its goals; without goals, alone. None without any round.
+pub(super) fn figure(subject: &Subject, who: &'static str, rounds: &[f64], goals: &[Goal]) -> Vec<Row> {
+    let Some(middle) = median(rounds.iter().copied()) else { return Vec::new() };
+    let row = |goal: Option<&Goal>| {
+        let ratio = goal.and_then(|goal| Ratio::of(rounds.iter().map(|value| value / base(goal))));
+        Row {
+            case: subject.case.clone(),
+            bytes: subject.bytes,
+            who,
+            unit: subject.unit,
+            result: Ok(Summary::single(middle)),
+            versus: goal.map(|goal| Versus { name: goal.name, p50: Some(target(goal)), p99: None }),
+            ratio_p50: ratio,
+            ratio_p99: None,
+        }
+    };
+    if goals.is_empty() { vec![row(None)] } else { goals.iter().map(Some).map(row).collect() }
+}
+
+/// What the ratio is taken to: where nothing at all is allowed, one.
+fn base(goal: &Goal) -> f64 {
+    if goal.most == 0.0 { 1.0 } else { goal.most }
+}
+
+fn target(goal: &Goal) -> Target {
+    Target::AtMost(if goal.most == 0.0 { 0.0 } else { 1.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_meets_what_it_is_within_and_nothing_is_within_nothing() {
+        let subject = Subject { case: "slots, omitted".into(), bytes: None, unit: "%" };
+        let goals = [Goal { name: "must 0.5 %", most: 0.5 }, Goal { name: "none", most: 0.0 }];
+        let met = |rounds: &[f64]| figure(&subject, "loaded", rounds, &goals).iter().map(Row::met).collect::<Vec<_>>();
+        assert_eq!(met(&[0.1, 0.4, 9.0]), [Some(true), Some(false)]);
+        assert_eq!(met(&[0.0, 0.0, 0.0]), [Some(true), Some(true)]);
+        assert_eq!(met(&[0.6]), [Some(false), Some(false)]);
+        assert!(met(&[]).is_empty());
+        let ratio = figure(&subject, "loaded", &[0.25], &goals)[0].ratio_p50.unwrap();
+        assert_eq!(ratio.median, 0.5);
+    }
+}

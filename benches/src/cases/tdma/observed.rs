@@ -1,0 +1,103 @@
+//! A turn of three nodes that always have something to send, watched from outside.
+
+use crate::Failure;
+use crate::settings::Settings;
+use crate::statistics::Summary;
+use crate::tdma::capture::Capture;
+use crate::tdma::counts::Counts;
+use crate::tdma::kept::Kept;
+use crate::tdma::plan::Plan;
+use crate::tdma::rights::Rights;
+use crate::tdma::routers::Routers;
+use crate::tdma::stage::{NODES, Stage};
+use crate::tdma::traffic::Traffic;
+use std::time::Duration;
+
+/// So long a turn is watched.
+const WATCHED: Duration = Duration::from_secs(30);
+const WATCHED_QUICK: Duration = Duration::from_secs(2);
+/// Until routers know how long their datagrams take to the wire, and everybody what the load is.
+const SETTLES: Duration = Duration::from_secs(1);
+
+/// All nodes.
+pub(super) const ALL: [u8; NODES as usize] = [0, 1, 2];
+
+/// How routers run in a turn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    /// How they may be scheduled.
+    pub rights: Rights,
+    /// Whether everything else is busy, too.
+    pub loaded: bool,
+}
+
+/// What was seen.
+#[derive(Clone, Debug)]
+pub(super) struct Observed {
+    /// By the capture.
+    pub kept: Kept,
+    /// By the routers themselves.
+    pub counts: Counts,
+    /// Of the processors' time, the hypervisor's, percent.
+    pub steal_percent: f64,
+    /// Threads of slots waited so long for a processor, all together, ms for each second.
+    pub waited_ms_s: f64,
+}
+
+/// How long a turn is watched.
+pub(super) fn watched(settings: &Settings) -> Duration {
+    if settings.quick { WATCHED_QUICK } else { WATCHED }
+}
+
+impl Observed {
+    /// One turn, with routers of its own.
+    ///
+    /// # Errors
+    /// When a part of it fails, or routers are not scheduled as they should be.
+    pub(super) fn turn(stage: &Stage, plan: &Plan, way: Way, settings: &Settings) -> Result<Self, Failure> {
+        let routers = Routers::start(stage, plan, way.rights, settings)?;
+        let mut capture = Capture::start(stage)?;
+        let _traffic = Traffic::start(&routers)?;
+        routers.await_packages(&ALL, &mut capture)?;
+        let _load = way.loaded.then(|| stage.load()).transpose()?;
+        std::thread::sleep(SETTLES);
+        let time = routers.clock(0)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;
+        let (counts, machine, first) = (routers.counts()?, routers.machine(), capture.len());
+        std::thread::sleep(watched(settings));
+        let (frames, machine_after) = (capture.since(first), routers.machine());
+        let counts = Counts::between(&counts, &routers.counts()?);
+        capture.check()?;
+        if (way.rights == Rights::Ordinary) != (counts.scheduled == "ordinary") {
+            return Err(Failure::Failed(format!("the kernel schedules slots as `{}`", counts.scheduled)));
+        }
+        Ok(Self {
+            kept: Kept::of(&frames, &plan.table()?, &time),
+            steal_percent: machine_after.steal_percent(&machine),
+            waited_ms_s: machine_after.waited_ms(&machine) / watched(settings).as_secs_f64(),
+            counts,
+        })
+    }
+
+    /// How far off first frames were, µs.
+    ///
+    /// # Errors
+    /// When there was none.
+    pub(super) fn summary(&self) -> Result<Summary, Failure> {
+        Summary::of(&mut self.kept.off_us.clone()).ok_or_else(|| Failure::Failed("no slot was used".into()))
+    }
+
+    /// Slots that were left out, percent.
+    pub(super) fn omitted_percent(&self) -> f64 {
+        self.counts.omitted() as f64 * 100.0 / self.counts.all().max(1) as f64
+    }
+
+    /// Slots whose first frame was further off than this, percent of those that were used.
+    pub(super) fn further_off_percent(&self, than_us: f64) -> f64 {
+        self.kept.further_off(than_us) as f64 * 100.0 / self.kept.off_us.len().max(1) as f64
+    }
+
+    /// Frames in another's slot, percent.
+    pub(super) fn in_anothers_percent(&self) -> f64 {
+        self.kept.in_anothers as f64 * 100.0 / self.kept.frames.max(1) as f64
+    }
+}

@@ -1,0 +1,125 @@
+//! How far off their nominal beginning slots begin, with everything else at work, without, and with routers that the kernel denies real time.
+
+use super::contest::{ALWAYS, Contest, Figure, Seen, Watched};
+use super::goals::{Goal, figure};
+use super::observed::{Observed, Way};
+use super::plans::LOADED;
+use crate::cases::Case;
+use crate::harness::Failure;
+use crate::rounds::{Row, Target, Versus};
+use crate::settings::Settings;
+use crate::statistics::Summary;
+use crate::tdma::rights::Rights;
+
+const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
+    Summary { p50, p99: Some(p99), p999: Some(p999), max: None }
+}
+
+const MUST: (&str, Summary) = ("20, 50, 150 us", bounds(20.0, 50.0, 150.0));
+const HOPED: (&str, Summary) = ("5, 25, 60 us", bounds(5.0, 25.0, 60.0));
+pub(super) const UNLOADED: &str = "unloaded";
+const ORDINARY: &str = "ordinary";
+/// Off by more, a slot would meet the next one also with a wide guard.
+const FAR_US: f64 = 250.0;
+
+/// How far off the last of 1000 is, µs.
+fn p999_us(seen: &Observed) -> f64 {
+    seen.summary().ok().and_then(|summary| summary.p999).unwrap_or_default()
+}
+
+/// Of the routers' own counts.
+pub(super) const OMITTED: Figure = Figure {
+    what: "omitted",
+    unit: "%",
+    of: Observed::omitted_percent,
+    goals: &[Goal { name: "must 0.5 %", most: 0.5 }, Goal { name: "hoped 0.2 %", most: 0.2 }],
+};
+
+const FIGURES: [Figure; 3] = [
+    Figure {
+        what: "p99.9",
+        unit: "us",
+        of: p999_us,
+        goals: &[Goal { name: "must 150 us", most: 150.0 }, Goal { name: "hoped 60 us", most: 60.0 }],
+    },
+    OMITTED,
+    Figure {
+        what: "over 100 us off",
+        unit: "%",
+        of: |seen| seen.further_off_percent(100.0),
+        goals: &[Goal { name: "must 0.1 %", most: 0.1 }, Goal { name: "hoped 0.02 %", most: 0.02 }],
+    },
+];
+
+/// What the same code must do to that without real time.
+const FEWER: [Goal; 2] =
+    [Goal { name: "must 1/50", most: 1.0 / 50.0 }, Goal { name: "hoped 1/100", most: 1.0 / 100.0 }];
+
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    vec![Box::new(Slots)]
+}
+
+struct Slots;
+
+impl Case for Slots {
+    fn name(&self) -> String {
+        "slots".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let watched = |who, rights, loaded| Watched { who, plan: LOADED, way: Way { rights, loaded } };
+        let at_most = |p50: Option<f64>, p99: f64| (p50.map(Target::AtMost), Some(Target::AtMost(p99)));
+        let versus = [
+            (MUST.0, at_most(Some(1.0), 1.0)),
+            (HOPED.0, at_most(Some(1.0), 1.0)),
+            (UNLOADED, at_most(None, 2.5)),
+            (UNLOADED, at_most(None, 1.5)),
+            (ORDINARY, (None, None)),
+        ];
+        let contest = Contest {
+            case: "slots",
+            watched: vec![
+                watched("loaded", Rights::RealTime, true),
+                watched(UNLOADED, Rights::RealTime, false),
+                watched(ORDINARY, Rights::Ordinary, true),
+            ],
+            bounds: vec![MUST, HOPED],
+            versus: versus.map(|(name, (p50, p99))| Versus { name, p50, p99 }).into(),
+            figures: [&FIGURES[..], &ALWAYS[..]].concat(),
+        };
+        let (mut rows, seen) = contest.hold(settings);
+        let [loaded, _, ordinary] = seen.as_slice() else { return Ok(rows) };
+        for (what, far) in [("over 250 us off", far_off as Far), ("left out or over 250 us off", not_kept)] {
+            rows.extend(figure(
+                &contest.subject("of ordinary", Some(what)),
+                "loaded",
+                &ratios(loaded, ordinary, far),
+                &FEWER,
+            ));
+        }
+        Ok(rows)
+    }
+}
+
+/// Slots that were not what they should be, of how many.
+type Far = fn(&Observed) -> (u64, u64);
+
+/// Of those that were used.
+fn far_off(seen: &Observed) -> (u64, u64) {
+    (seen.kept.further_off(FAR_US) as u64, seen.kept.off_us.len() as u64)
+}
+
+/// Of all. What wakes up too late does not send, so without real time most slots are left out, and few are begun late.
+fn not_kept(seen: &Observed) -> (u64, u64) {
+    let counts = &seen.counts;
+    (far_off(seen).0 + counts.omitted() + counts.silent, counts.all() + counts.silent)
+}
+
+/// Share of ours by that of the other, in each round. Who had none is taken to have had one.
+fn ratios(ours: &Seen, others: &Seen, far: Far) -> Vec<f64> {
+    let share = |seen| {
+        let (some, all) = far(seen);
+        some.max(1) as f64 / all.max(1) as f64
+    };
+    ours.iter().zip(others).map(|(our, other)| share(our) / share(other)).collect()
+}

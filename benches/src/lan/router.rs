@@ -1,0 +1,136 @@
+//! One real router, as launch would start it: `rohrpost router`, in the place that its node has on the network.
+
+use crate::Failure;
+use crate::harness::Child;
+use nix::sys::signal::Signal;
+use rohrpost_mailbox::{Class, Name, Node, local, node_directory};
+use std::fs;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Of every configuration here.
+pub const SYSTEM: u8 = 1;
+/// Class of routers.
+pub const ROUTER: Class = Class(250);
+/// Reading a configuration and making a mailbox takes milliseconds, on a busy computer a second.
+const READY_WITHIN: Duration = Duration::from_secs(20);
+/// Within this a router that is told to end has told its peers.
+const ENDS_WITHIN: Duration = Duration::from_secs(5);
+const LOOK_EACH: Duration = Duration::from_millis(5);
+
+/// Which router.
+pub struct RouterSpec<'a> {
+    /// The `rohrpost` command.
+    pub command: &'a Path,
+    /// The configuration.
+    pub config: &'a Path,
+    /// Name of the installation in it.
+    pub installation: &'a str,
+    /// The node in it.
+    pub node: String,
+    /// Place of the node in it, from 0.
+    pub index: u8,
+    /// Where directories of nodes and what routers say goes.
+    pub scratch: &'a Path,
+}
+
+impl RouterSpec<'_> {
+    /// The directory of its node.
+    pub fn directory(&self) -> PathBuf {
+        let file = node_directory(self.installation, &self.node);
+        self.scratch.join(file.file_name().unwrap_or_default())
+    }
+
+    /// What the router says.
+    fn log(&self) -> PathBuf {
+        self.scratch.join(format!("router-{}.log", self.node))
+    }
+}
+
+/// A router's process; killed when this is dropped.
+pub struct Router {
+    child: Child,
+    index: u8,
+    node: String,
+    directory: PathBuf,
+    log: PathBuf,
+    transit: Name,
+}
+
+impl Router {
+    /// Starts it; `prepare` is done in its process before, to put it where it belongs.
+    ///
+    /// # Errors
+    /// When there can be no further process.
+    pub fn start(spec: &RouterSpec<'_>, prepare: impl FnOnce() -> Result<(), Failure>) -> Result<Self, Failure> {
+        let child = Child::start(|| {
+            prepare()?;
+            let log = fs::File::create(spec.log()).map_err(|error| Failure::of("router's log", error))?;
+            let error = Command::new(spec.command)
+                .args(["router", "--config"])
+                .arg(spec.config)
+                .args(["--name", &format!("router.{}", spec.index)])
+                .env("ROHRPOST_DIR", spec.scratch)
+                .stdin(Stdio::null())
+                .stdout(Stdio::null())
+                .stderr(log)
+                .exec();
+            Err(Failure::of("rohrpost router", error))
+        })?;
+        let transit = Name::new(SYSTEM, ROUTER.0, spec.index, local::TRANSIT);
+        let (index, node) = (spec.index, spec.node.clone());
+        Ok(Self { child, index, node, directory: spec.directory(), log: spec.log(), transit })
+    }
+
+    /// Until its mailbox for others' packages is there, which it makes last.
+    ///
+    /// # Errors
+    /// What it said, if it ended or did not get ready.
+    pub fn await_ready(&mut self) -> Result<(), Failure> {
+        let give_up = Instant::now() + READY_WITHIN;
+        while !has_mailbox(&self.directory, self.transit) {
+            if self.child.has_ended()? || Instant::now() > give_up {
+                return Err(Failure::Failed(format!(
+                    "the router of node `{}` did not get ready: {}",
+                    self.node,
+                    self.said()
+                )));
+            }
+            std::thread::sleep(LOOK_EACH);
+        }
+        Ok(())
+    }
+
+    /// Place of its node in the configuration.
+    pub fn index(&self) -> u8 {
+        self.index
+    }
+
+    /// What it has said.
+    pub fn said(&self) -> String {
+        fs::read_to_string(&self.log).unwrap_or_default()
+    }
+
+    /// Its process.
+    pub fn pid(&self) -> i32 {
+        self.child.pid()
+    }
+}
+
+/// Ends all, and waits until they have told their peers.
+pub fn end_all(routers: &mut [Router]) {
+    routers.iter_mut().for_each(|router| router.child.signal(Signal::SIGTERM));
+    let give_up = Instant::now() + ENDS_WITHIN;
+    for router in routers {
+        // One that does not end is killed when it is dropped.
+        while !router.child.has_ended().unwrap_or(true) && Instant::now() < give_up {
+            std::thread::sleep(LOOK_EACH);
+        }
+    }
+}
+
+fn has_mailbox(directory: &Path, name: Name) -> bool {
+    Node::open(directory).is_ok_and(|node| node.look_at(name).is_some())
+}

@@ -1,0 +1,242 @@
+//! What crosses the bridge, and when: the kernel stamps each frame as it comes in by the port of its sender.
+
+use super::filter::{self, HEADS_BYTES};
+use super::plan::PORT;
+use super::stage::Stage;
+use crate::Failure;
+use crate::harness::{Child, Gate, Shared, Zeroable};
+use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg};
+use nix::sys::time::{TimeSpec, TimeValLike};
+use rohrpost_mailbox::{Name, Type, monotonic_ns, realtime_ns};
+use rohrpost_routers::frame::Frame;
+use rohrpost_routers::time::message::Message;
+use std::io::IoSliceMut;
+use std::os::fd::{AsRawFd, OwnedFd};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Most frames, and most packages of declared flows, of one turn.
+const FRAMES_MAX: usize = 1 << 20;
+const ARRIVALS_MAX: usize = 1 << 17;
+/// What is there is read this often.
+const PATIENCE: Duration = Duration::from_millis(20);
+/// Readings of two clocks; the closest pair counts.
+const READINGS: usize = 100;
+/// Type of packages that say when they were published.
+pub const STAMPED: Type = Type::data(7);
+/// Bytes that they end with: monotonic ns.
+pub const STAMP_BYTES: usize = 8;
+
+/// What a frame is, as far as it matters here.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum What {
+    /// Packages, or a part of one.
+    Packages,
+    /// A master's synchronisation.
+    Sync,
+    /// A backup's synchronisation in the place of a silent master's.
+    Replacement,
+    /// What routers say to each other besides.
+    Said,
+}
+
+/// A frame of a router.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Crossed {
+    /// When it came to the bridge, monotonic ns.
+    pub at_ns: u64,
+    /// Node that sent it.
+    pub from: u8,
+    /// What it is.
+    pub what: What,
+}
+
+/// A package that said when it was published.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Arrived {
+    /// When its last part came to the bridge, monotonic ns.
+    pub at_ns: u64,
+    /// When it was published, monotonic ns.
+    pub published_ns: u64,
+    /// Class of its sender.
+    pub class: u8,
+    /// Node that sent it.
+    pub from: u8,
+}
+
+#[repr(C)]
+struct Seen {
+    gate: Gate,
+    frames: AtomicU64,
+    arrivals: AtomicU64,
+    /// When; and who and what.
+    frame: [[AtomicU64; 2]; FRAMES_MAX],
+    /// When; when it was published; whose.
+    arrival: [[AtomicU64; 3]; ARRIVALS_MAX],
+}
+
+// SAFETY: atomics only.
+unsafe impl Zeroable for Seen {}
+
+/// Watches, in a process of its own, until it is dropped.
+pub struct Capture {
+    seen: Shared<Seen>,
+    /// One process.
+    watcher: Vec<Child>,
+}
+
+impl Capture {
+    /// Begins.
+    ///
+    /// # Errors
+    /// When the system lets nobody watch.
+    pub fn start(stage: &Stage) -> Result<Self, Failure> {
+        let seen = Shared::<Seen>::new()?;
+        let mut watcher = vec![Child::start(|| {
+            stage.enter_bridge()?;
+            let socket = filter::open([PORT, PORT + 1], PATIENCE)?;
+            seen.gate.meet(2)?;
+            watch(&socket, &seen)
+        })?];
+        seen.gate.meet_children(&mut watcher)?;
+        Ok(Self { seen, watcher })
+    }
+
+    /// How many frames there are by now; what comes from here on follows them.
+    pub fn len(&self) -> usize {
+        self.seen.frames.load(Ordering::Acquire) as usize
+    }
+
+    /// Whether there are none yet.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The frames from the given one on.
+    pub fn since(&self, first: usize) -> Vec<Crossed> {
+        let frames = self.seen.frame.get(first..self.len()).unwrap_or_default();
+        frames.iter().filter_map(crossed).collect()
+    }
+
+    /// The stamped packages that came so far.
+    pub fn arrivals(&self) -> Vec<Arrived> {
+        let count = self.seen.arrivals.load(Ordering::Acquire) as usize;
+        self.seen.arrival[..count].iter().map(arrived).collect()
+    }
+
+    /// Fails if it does not watch any more, or had no room.
+    ///
+    /// # Errors
+    /// Why.
+    pub fn check(&mut self) -> Result<(), Failure> {
+        if self.len() == FRAMES_MAX || self.seen.arrivals.load(Ordering::Acquire) as usize == ARRIVALS_MAX {
+            return Err(Failure::Failed("more crossed the bridge than there is room for".into()));
+        }
+        for watcher in self.watcher.extract_if(.., |watcher| watcher.has_ended() != Ok(false)) {
+            watcher.finish(Instant::now())?;
+        }
+        Ok(())
+    }
+}
+
+fn crossed(words: &[AtomicU64; 2]) -> Option<Crossed> {
+    let [at_ns, what] = words.each_ref().map(|word| word.load(Ordering::Relaxed));
+    let [from, what, ..] = what.to_le_bytes();
+    let all = [What::Packages, What::Sync, What::Replacement, What::Said];
+    let what = all.into_iter().find(|known| *known as u8 == what)?;
+    Some(Crossed { at_ns, from, what })
+}
+
+fn arrived(words: &[AtomicU64; 3]) -> Arrived {
+    let [at_ns, published_ns, whose] = words.each_ref().map(|word| word.load(Ordering::Relaxed));
+    let [from, class, ..] = whose.to_le_bytes();
+    Arrived { at_ns, published_ns, class, from }
+}
+
+impl Seen {
+    fn frame(&self, frame: &Crossed) {
+        let what = u64::from_le_bytes([frame.from, frame.what as u8, 0, 0, 0, 0, 0, 0]);
+        append(&self.frames, &self.frame, [frame.at_ns, what]);
+    }
+
+    fn arrival(&self, arrival: &Arrived) {
+        let whose = u64::from_le_bytes([arrival.from, arrival.class, 0, 0, 0, 0, 0, 0]);
+        append(&self.arrivals, &self.arrival, [arrival.at_ns, arrival.published_ns, whose]);
+    }
+}
+
+/// Adds one; what is too many is left out, and [`Capture::check`] says so.
+fn append<const WORDS: usize>(count: &AtomicU64, all: &[[AtomicU64; WORDS]], words: [u64; WORDS]) {
+    let at = count.load(Ordering::Relaxed);
+    let Some(free) = all.get(at as usize) else { return };
+    free.iter().zip(words).for_each(|(free, word)| free.store(word, Ordering::Relaxed));
+    // ORDERING: publishes the words; pairs with `len` and `arrivals`.
+    count.store(at + 1, Ordering::Release);
+}
+
+fn watch(socket: &OwnedFd, seen: &Seen) -> Result<(), Failure> {
+    // Both clocks are slewed alike, so it stays as it is unless somebody sets one.
+    let ahead_ns = realtime_ahead_ns();
+    let (mut bytes, mut space) = ([0; 2048], nix::cmsg_space!(TimeSpec));
+    loop {
+        let mut parts = [IoSliceMut::new(&mut bytes)];
+        let message = match recvmsg::<()>(socket.as_raw_fd(), &mut parts, Some(&mut space), MsgFlags::empty()) {
+            Ok(message) => message,
+            Err(nix::Error::EAGAIN | nix::Error::EINTR) => continue,
+            Err(error) => return Err(Failure::of("packet socket", error)),
+        };
+        let stamps = message.cmsgs().map_err(|error| Failure::of("receive stamp", error))?;
+        let stamp = stamps.into_iter().find_map(|stamp| match stamp {
+            ControlMessageOwned::ScmTimestampns(time) => Some(time.num_nanoseconds()),
+            _ => None,
+        });
+        let stamp = stamp.ok_or_else(|| Failure::Failed("the kernel stamps no frames".into()))?;
+        let len = message.bytes;
+        note(seen, (stamp - ahead_ns).cast_unsigned(), bytes.get(HEADS_BYTES..len).unwrap_or_default());
+    }
+}
+
+/// Remembers a datagram, and the stamped packages in it.
+fn note(seen: &Seen, at_ns: u64, datagram: &[u8]) {
+    let Ok((head, frame)) = Frame::parse(datagram) else { return };
+    let from = head.from;
+    let what = match frame {
+        Frame::Packages(packages) => {
+            for (package, body) in packages.filter(|(package, _)| package.kind == STAMPED) {
+                arrive(seen, at_ns, from, package.from, body);
+            }
+            What::Packages
+        }
+        Frame::Fragment(part) => {
+            // Parts leave in their order.
+            if part.head.kind == STAMPED && part.index + 1 == part.count {
+                arrive(seen, at_ns, from, part.head.from, part.bytes);
+            }
+            What::Packages
+        }
+        Frame::Time(rest) => match Message::parse(head.kind, rest) {
+            Ok(Message::Sync(sync)) if sync.replacement => What::Replacement,
+            Ok(Message::Sync(_)) => What::Sync,
+            _ => What::Said,
+        },
+        Frame::Alive(_) | Frame::Refusal(_) => What::Said,
+    };
+    seen.frame(&Crossed { at_ns, from, what });
+}
+
+fn arrive(seen: &Seen, at_ns: u64, from: u8, sender: Name, end: &[u8]) {
+    if let Some((_, published)) = end.split_last_chunk() {
+        let (published_ns, class) = (u64::from_le_bytes(*published), sender.class().0);
+        seen.arrival(&Arrived { at_ns, published_ns, class, from });
+    }
+}
+
+/// By how much the clock of stamps is ahead of the monotonic one, ns: from the readings that were closest to each other.
+fn realtime_ahead_ns() -> i64 {
+    let read = |_| {
+        let (before, real, after) = (monotonic_ns(), realtime_ns(), monotonic_ns());
+        (after - before, real.cast_signed() - ((before + after) / 2).cast_signed())
+    };
+    (0..READINGS).map(read).min().map_or(0, |(_, ahead_ns)| ahead_ns)
+}

@@ -1,0 +1,98 @@
+//! What routers say of their slots, by `rohrpost net`, as a user would ask.
+
+use super::stage::{NODES, Place};
+use crate::Failure;
+use serde::Deserialize;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+/// Data `slots` of a router, as far as it matters here. Counts only grow.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+pub struct Counts {
+    /// Slots in which something was sent.
+    pub used: u64,
+    /// Slots in which nothing had to be sent.
+    pub empty: u64,
+    /// Slots left out since the wake-up came too late.
+    pub late: u64,
+    /// Slots that went by without a wake-up.
+    pub skipped: u64,
+    /// Slots without packages since the time was not sure enough.
+    pub silent: u64,
+    /// `deadline`, `fifo` or `ordinary`.
+    pub scheduled: String,
+}
+
+#[derive(Deserialize)]
+struct Told {
+    slots: Option<Counts>,
+    failure: Option<String>,
+}
+
+impl Counts {
+    /// Of each node; asked on the node itself, so that nothing of it crosses the network.
+    ///
+    /// # Errors
+    /// When a router does not answer.
+    pub fn ask(command: &Path, config: &Path, scratch: &Path) -> Result<Vec<Self>, Failure> {
+        let ask = |node| {
+            let mut asked = Command::new(command);
+            asked.args(["net", "--json", "--node", &Place::Node(node).name(), "--config"]).arg(config);
+            asked.env("ROHRPOST_DIR", scratch).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+            asked.spawn().map_err(|error| Failure::of("rohrpost net", error))
+        };
+        let asked = (0..NODES).map(ask).collect::<Result<Vec<_>, Failure>>()?;
+        let answer = |child: std::process::Child| {
+            let output = child.wait_with_output().map_err(|error| Failure::of("rohrpost net", error))?;
+            let said = || format!("rohrpost net: {}", String::from_utf8_lossy(&output.stderr));
+            // It fails if a peer is silent, which is no concern of ours.
+            let told: Vec<Told> =
+                serde_json::from_slice(&output.stdout).map_err(|error| Failure::of(&said(), error))?;
+            let told = told.into_iter().next().ok_or_else(|| Failure::Failed(said()))?;
+            told.slots.ok_or_else(|| Failure::Failed(told.failure.unwrap_or_else(said)))
+        };
+        asked.into_iter().map(answer).collect()
+    }
+
+    /// What has happened since `before`, on all nodes.
+    pub fn between(before: &[Self], after: &[Self]) -> Self {
+        let since = |figure: fn(&Self) -> u64| {
+            before.iter().zip(after).map(|(before, after)| figure(after).saturating_sub(figure(before))).sum()
+        };
+        Self {
+            used: since(|counts| counts.used),
+            empty: since(|counts| counts.empty),
+            late: since(|counts| counts.late),
+            skipped: since(|counts| counts.skipped),
+            silent: since(|counts| counts.silent),
+            scheduled: after.first().map(|counts| counts.scheduled.clone()).unwrap_or_default(),
+        }
+    }
+
+    /// Slots that were left out.
+    pub fn omitted(&self) -> u64 {
+        self.late + self.skipped
+    }
+
+    /// All slots, but those in which the node did not know the time.
+    pub fn all(&self) -> u64 {
+        self.used + self.empty + self.omitted()
+    }
+}
+
+/// Routers tell how they are twice a second: after this, what they tell is of what is measured.
+pub const TOLD_EACH: Duration = Duration::from_millis(500);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_routers_left_out_is_counted_over_all_nodes() {
+        let counts = |used, late, skipped| Counts { used, late, skipped, ..Counts::default() };
+        let (before, after) = ([counts(10, 1, 0), counts(20, 0, 0)], [counts(110, 3, 1), counts(121, 0, 1)]);
+        let since = Counts::between(&before, &after);
+        assert_eq!((since.used, since.omitted(), since.all()), (201, 4, 205));
+    }
+}

@@ -1,0 +1,23 @@
+//! Three nodes that send in time slots, and what sees from outside how they do.
+//!
+//! ```text
+//!  n0: feeder ─▶ router ═══╗            ╔═══ flooder ┐
+//!  n1: feeder ─▶ router ═══╬═══ bridge ═╣            │ bystanders: the load, with work on all processors
+//!  n2: feeder ─▶ router ═══╝      │     ╚═══ swamp ◀─┘
+//!                                 └─▶ capture: the kernel's stamp of each frame of a router
+//! ```
+//! All have this computer's clock, so a stamp of the capture and the master's page of time say how long after the beginning of
+//! its slot a frame really came. Routers are the real ones ([`routers`]); where clocks have to be wrong, to be judged, they are threads of a child
+//! ([`shells`]).
+
+pub mod capture;
+pub mod counts;
+pub mod filter;
+pub mod kept;
+pub mod machine;
+pub mod plan;
+pub mod rights;
+pub mod routers;
+pub mod shells;
+pub mod stage;
+pub mod traffic;

@@ -1,0 +1,116 @@
+//! Routers of three nodes as threads of one process, whose clocks are made wrong: so the true error of each is known.
+
+use super::plan::Plan;
+use super::stage::{NODES, Place, Stage};
+use crate::Failure;
+use crate::harness::Scratch;
+use crate::lan::router::{ROUTER, SYSTEM};
+use crate::lan::skewed::{SKEW, Shown};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Name, Node, SystemClock, monotonic_ns, realtime_ns};
+use rohrpost_routers::settings::Settings;
+use rohrpost_routers::shell::clock::{ClockParts, Skew};
+use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
+use rohrpost_routers::time::Role;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// As many exchanges as the filter of a clock remembers.
+const SETTLED: u64 = 64;
+const SETTLES_WITHIN: Duration = Duration::from_secs(60);
+const LOOK_EACH: Duration = Duration::from_millis(5);
+
+/// Nobody commands anything here.
+struct Silence;
+
+impl Faults for Silence {
+    fn write(&self, _: &[u8], _: &Undelivered<'_>, _: &mut Vec<u8>) -> bool {
+        false
+    }
+}
+
+/// One node: how wrong its clock is, its page, and its router while it runs.
+struct Member {
+    skew: Skew,
+    page: SystemClock,
+    shell: Option<Shell>,
+}
+
+/// Three of them, until this is dropped.
+pub struct Shells {
+    members: Vec<Member>,
+}
+
+impl Shells {
+    /// Starts them, in a process that nothing else happens in: it goes from node to node. The first node's clock is right.
+    ///
+    /// # Errors
+    /// When a router does not start.
+    pub fn start(stage: &Stage, plan: &Plan, scratch: &Scratch) -> Result<Self, Failure> {
+        let installation = plan.installation()?;
+        let members = (0..NODES).map(|node| Member::start(stage, &installation, node, scratch));
+        Ok(Self { members: members.collect::<Result<_, _>>()? })
+    }
+
+    /// Until all follow the first one, and have measured enough.
+    ///
+    /// # Errors
+    /// What the others show, if one does not.
+    pub fn await_settled(&self) -> Result<(), Failure> {
+        let give_up = Instant::now() + SETTLES_WITHIN;
+        while !self.members.iter().skip(1).all(Member::is_settled) {
+            if Instant::now() > give_up {
+                let shells = self.members.iter().filter_map(|member| member.shell.as_ref()?.clock());
+                let seen: Vec<_> = shells.map(|clock| clock.snapshot()).collect();
+                return Err(Failure::Failed(format!("a slave has no time: {seen:?}")));
+            }
+            std::thread::sleep(LOOK_EACH);
+        }
+        Ok(())
+    }
+
+    /// Ends the routers of these nodes; their pages stay.
+    pub fn end(&mut self, nodes: std::ops::Range<u8>) {
+        for member in &mut self.members[usize::from(nodes.start)..usize::from(nodes.end)] {
+            member.shell = None;
+        }
+    }
+
+    /// What the page of a node shows.
+    ///
+    /// # Errors
+    /// When it shows nothing.
+    pub fn shown(&self, node: u8) -> Result<Shown, Failure> {
+        let Member { skew, page, .. } = &self.members[usize::from(node)];
+        let record = page.record().ok_or_else(|| Failure::Failed(format!("node {node} shows no time")))?;
+        Ok(Shown { record, skew: *skew })
+    }
+}
+
+impl Member {
+    fn start(stage: &Stage, installation: &Installation, own: u8, scratch: &Scratch) -> Result<Self, Failure> {
+        let place = Place::Node(own);
+        stage.enter(place)?;
+        let node = Node::create(&scratch.directory().join(place.name()), 0o700);
+        let node = node.map_err(|error| Failure::of("node", error))?;
+        let settings = Settings::new(installation, &place.name(), realtime_ns());
+        let settings = settings.map_err(|error| Failure::of("configuration", error))?;
+        let skew = if own == 0 {
+            Skew::default()
+        } else {
+            Skew { begin_ns: monotonic_ns(), offset_ns: u64::from(own) * SKEW.offset_ns, ..SKEW }
+        };
+        let clock =
+            ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { skew: Some(skew), ..parts });
+        let name = Name::new(SYSTEM, ROUTER.0, own, 0);
+        let shell = Shell::start(Parts { node: &node, name, settings, faults: Arc::new(Silence), impair: None, clock });
+        let shell = shell.map_err(|error| Failure::of("router", error))?;
+        Ok(Self { skew, page: SystemClock::open(&node), shell: Some(shell) })
+    }
+
+    fn is_settled(&self) -> bool {
+        let clock = self.shell.as_ref().and_then(Shell::clock);
+        let seen = clock.map(|clock| clock.snapshot());
+        seen.is_some_and(|seen| seen.synchronised && seen.role == Role::Slave && seen.exchanges >= SETTLED)
+    }
+}

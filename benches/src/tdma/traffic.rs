@@ -1,0 +1,50 @@
+//! Those who always have packages for others, on each node: one process that floods the next node, and takes what it is flooded with.
+
+use super::plan::flood;
+use super::routers::Routers;
+use super::stage::NODES;
+use crate::Failure;
+use crate::harness::{Child, Gate, Shared};
+use crate::lan::ends::{Sink, Source};
+use std::time::Duration;
+
+/// Fills a datagram of 1500 bytes, all heads counted.
+const BYTES: usize = 1_420;
+/// More than slots carry: what waits in the queue lasts for a while when this process gets no processor.
+const BURST: usize = 4;
+const EACH: Duration = Duration::from_millis(1);
+
+/// Feeders of all nodes, until this is dropped.
+pub struct Traffic {
+    _feeders: Vec<Child>,
+}
+
+impl Traffic {
+    /// Starts them.
+    ///
+    /// # Errors
+    /// When a mailbox cannot be made.
+    pub fn start(routers: &Routers<'_>) -> Result<Self, Failure> {
+        let ready = Shared::<Gate>::new()?;
+        let all = u32::from(NODES) + 1;
+        let feeder = |node: u8| {
+            Child::start(|| {
+                let mut sink = Sink::open(&routers.directory(node), flood(node), BYTES)?;
+                let to = flood((node + 1) % NODES);
+                let mut source = Source::open(&routers.directory(node), flood(node), to)?;
+                ready.meet(all)?;
+                let package = [7; BYTES];
+                loop {
+                    sink.drain();
+                    for _ in 0..BURST {
+                        source.offer(&package)?;
+                    }
+                    std::thread::sleep(EACH);
+                }
+            })
+        };
+        let mut feeders = (0..NODES).map(feeder).collect::<Result<Vec<_>, Failure>>()?;
+        ready.meet_children(&mut feeders)?;
+        Ok(Self { _feeders: feeders })
+    }
+}
