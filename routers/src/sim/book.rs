@@ -60,7 +60,8 @@ pub enum Promise {
     TimeBound,
     /// System time never goes back within an epoch.
     TimeForward,
-    /// One master in a term, and one master a while after the last fault.
+    /// One master in a term, and one master a while after the last fault; who sends in its place does so only when it was not heard, and
+    /// nobody goes by it.
     OneMaster,
     /// With time slots no two nodes transmit at once, unless a fault has divided them for longer than [`HOLDOVER_NS`], or the
     /// router of one began meanwhile, and until [`HEALED_CYCLES`] cycles after it.

@@ -1,4 +1,4 @@
-//! A small network in which all goes wrong that can, so that a mistake shows soon.
+//! Small networks in which all goes wrong that can, so that a mistake shows soon.
 
 use super::chance::Chance;
 use super::link::Quality;
@@ -9,6 +9,8 @@ use rohrpost_mailbox::local;
 const MENDED_NS: u64 = 7 * S;
 /// A frame that is late on one of the two ways only: the worst that may happen to clocks.
 const SLOW: Quality = Quality { delay_ns: 8 * MS, reorder_ppm: 200_000, ..QUALITY };
+/// Ten times as many wake-ups as usual are too late, of a million.
+const LATE_PPM: u32 = 20_000;
 const QUALITY: Quality = Quality {
     delay_ns: 50 * US,
     jitter_ns: 100 * US,
@@ -84,5 +86,46 @@ impl Plan {
         let at_ms = 2600 + chance.below(600);
         fault(at_ms, at_ms + 800, Fault::Freeze { node: 1, whole: false });
         fault(at_ms + 1700, at_ms + 3400, Fault::Freeze { node: 1, whole: false });
+    }
+
+    /// With time slots: frames are lost, copied and overtaken all the time, threads wake too late again and again, every router stands still
+    /// and dies, and what the first master says comes too late. After so much two nodes may transmit at once only where the plan says that
+    /// the network is divided; all else that is promised holds at any time.
+    pub fn rough_slotted(seed: u64) -> Self {
+        let mut plan = Self::slotted(seed);
+        let mut chance = Chance::new(seed ^ 0x10_06);
+        let Quality { delay_ns, jitter_ns, .. } = plan.quality;
+        plan.quality = Quality { delay_ns, jitter_ns, reorder_ppm: 20_000, ..QUALITY };
+        plan.checksum = false;
+        if let Some(slots) = &mut plan.slots {
+            slots.late_ppm = LATE_PPM;
+        }
+        plan.rough_slotted_faults(&mut chance);
+        plan.divide();
+        plan
+    }
+
+    fn rough_slotted_faults(&mut self, chance: &mut Chance) {
+        self.faults.clear();
+        let nodes = self.nodes.len();
+        let last_ns = self.mended_ns - S / 2;
+        let mut fault = |longest_ns: u64, chance: &mut Chance, fault| {
+            let from_ns = chance.between(S / 2, last_ns);
+            let until_ns = from_ns + chance.between(3 * MS, longest_ns);
+            self.faults.push(Planned { from_ns, until_ns, fault });
+        };
+        for node in 0..nodes {
+            let (other, far) = ((node + 1) % nodes, (node + nodes - 1) % nodes);
+            fault(S / 4, chance, Fault::Restart { node });
+            let whole = chance.percent(30);
+            fault(S / 4, chance, Fault::Freeze { node, whole });
+            fault(50 * MS, chance, Fault::Freeze { node, whole: false });
+            // Shorter than what divides a network.
+            fault(40 * MS, chance, Fault::Cut { from: node, to: other });
+            fault(MS * 4, chance, Fault::Replay { to: far, count: 40 });
+            fault(MS * 4, chance, Fault::Foreign { to: other, count: 40 });
+        }
+        let master = usize::from(self.masters[0]);
+        fault(S / 2, chance, Fault::Bad { from: master, to: (master + 1) % nodes, quality: SLOW });
     }
 }

@@ -22,6 +22,8 @@ pub const HEALED_CYCLES: u32 = 16;
 const CYCLE_NS_MAX: u64 = 20 * MS;
 /// A master is given so long at least to answer.
 const DEAF_NS: u64 = 200 * MS;
+/// Wake-ups beyond what the late gate lets through, of a million.
+const LATE_PPM: u32 = 2000;
 /// A thread wakes so late at most, unless it is frozen.
 const LATE_NS_MAX: u64 = 5 * MS;
 /// Bytes of the largest datagram there may be, with all around it.
@@ -69,10 +71,10 @@ impl Slots {
         Some(begin_ns..begin_ns + length_ns - ns(table.guard))
     }
 
-    /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late that others
-    /// take over from a master.
+    /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late nor so often
+    /// that others take over from a master.
     pub fn late_ns(&self, mended: bool, chance: &mut Chance) -> u64 {
-        if chance.per_million(self.late_ppm) {
+        if chance.per_million(if mended { self.late_ppm.min(LATE_PPM) } else { self.late_ppm }) {
             let late_ns = chance.scale(50 * US, LATE_NS_MAX);
             return if mended { late_ns.min(self.table.cycle.as_nanos() as u64) } else { late_ns };
         }
@@ -99,7 +101,7 @@ impl Plan {
         plan.shape.interval_ns = table.cycle.as_nanos() as u64;
         plan.shape.rate_bytes_s = (0..plan.nodes.len()).map(|node| node_bytes_s(&table, node)).min().unwrap_or(0);
         plan.mended_ns = chance.between(2 * S, 4 * S);
-        plan.slots = Some(Slots { table, masters: plan.masters.clone(), late_ppm: 2000, divided: Vec::new() });
+        plan.slots = Some(Slots { table, masters: plan.masters.clone(), late_ppm: LATE_PPM, divided: Vec::new() });
         plan.time();
         // Who joins hears some Syncs before it asks, and so long a master is given to answer.
         plan.timed_ns += 2 * u64::from(JOINING_SYNCS) * plan.shape.interval_ns + DEAF_NS;
@@ -126,7 +128,7 @@ impl Plan {
     }
 
     /// When faults divide the network.
-    fn divide(&mut self) {
+    pub(super) fn divide(&mut self) {
         let healed_ns = u64::from(HEALED_CYCLES) * self.shape.interval_ns;
         let divides =
             |planned: &&Planned| matches!(planned.fault, Fault::Cut { .. } | Fault::Split { .. } | Fault::Bad { .. });

@@ -3,7 +3,7 @@
 use super::book::Promise;
 use super::clock::Now;
 use super::packages::Packages;
-use super::plan::{MS, RECOVERY_NS};
+use super::plan::{Plan, RECOVERY_NS};
 use super::station::{Arrived, Io, Layer, PORTS, Port, Sent};
 use super::ticking::{self, Ticking};
 use crate::frame::{FrameHead, Kind};
@@ -13,9 +13,6 @@ use std::collections::VecDeque;
 
 /// The thread wakes so long before its call, to spin.
 const SPIN_NS: u64 = 100_000;
-/// Who is so far off has not been able to slew while all recovered: it says nothing until a master begins an epoch, see
-/// [`EPOCH_PAUSE_NS`](super::plan::EPOCH_PAUSE_NS).
-const FAR_NS: u64 = 4 * MS;
 /// First datagrams of windows whose stamps are waited for at a time.
 const AWAITED_MAX: usize = 16;
 
@@ -83,7 +80,7 @@ impl Slotted {
     /// Whether this node may be off by half of the guard at most, as it says.
     fn is_sure(&mut self, io: &Io<'_>) -> bool {
         let now_ns = io.now.monotonic_ns;
-        let allowed_ns = io.plan.slots.as_ref().map_or(0, |slots| slots.table.guard.as_nanos() as u64 / 2);
+        let allowed_ns = allowance_ns(io.plan);
         self.time.clock().reckoning().is_some_and(|reckoning| reckoning.bound_ns(now_ns) <= allowed_ns)
     }
 }
@@ -142,8 +139,14 @@ impl Layer for Slotted {
     }
 
     fn check(&mut self, io: &mut Io<'_>, well: bool) {
-        let off_ns = io.book.times.off_ns(io.now, io.node, self.time.clock().term());
-        if off_ns.is_some_and(|off_ns| off_ns > FAR_NS) && io.now.true_ns < io.plan.stepped_ns {
+        let clock = self.time.clock();
+        let off_ns = io.book.times.off_ns(io.now, io.node, clock.term());
+        let masters = clock.master().and_then(|master| io.book.times.page(master.into()));
+        let is_of_later_epoch = masters.is_some_and(|page| page.epoch < clock.record().epoch);
+        // Who is further off than it may be says nothing, and slews for up to five seconds, or waits until a master begins an epoch, see
+        // [`EPOCH_PAUSE_NS`](super::plan::EPOCH_PAUSE_NS).
+        let waits = is_of_later_epoch || off_ns.is_some_and(|off_ns| off_ns > allowance_ns(io.plan));
+        if waits && io.now.true_ns < io.plan.stepped_ns {
             io.book.saw("waits for an epoch");
             io.book.well_ns = io.book.well_ns.max(io.now.true_ns + RECOVERY_NS);
         }
@@ -155,6 +158,11 @@ impl Layer for Slotted {
         self.time.close(io);
         self.packages.close(io);
     }
+}
+
+/// Who sends may be off by half of the guard.
+fn allowance_ns(plan: &Plan) -> u64 {
+    plan.slots.as_ref().map_or(0, |slots| slots.table.guard.as_nanos() as u64 / 2)
 }
 
 /// Whether a datagram asks what time it is.

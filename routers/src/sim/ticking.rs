@@ -119,11 +119,17 @@ impl Layer for Ticking {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let stamp = self.stamp(io, arrived.stamp);
         let Ok((head, rest)) = FrameHead::parse(&arrived.bytes) else { return io.book.saw("time: no frame") };
-        let taken = self.clock.handle(io.now.monotonic_ns, stamp, &head, rest);
+        let now_ns = io.now.monotonic_ns;
+        let heard_before = self.clock.coarse(now_ns);
+        let taken = self.clock.handle(now_ns, stamp, &head, rest);
         io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));
         io.book.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
         if let (Ok(()), Ok(Message::Sync(sync))) = (taken, Message::parse(head.kind, rest)) {
             self.heard = if sync.replacement { self.heard } else { (sync.term, sync.cycle) };
+            if sync.replacement && self.clock.coarse(now_ns) != heard_before {
+                let text = format!("node {} goes by what {} says in the place of the master", io.node, head.from);
+                io.book.broken(io.now, Promise::OneMaster, text);
+            }
         }
         self.look(io);
     }

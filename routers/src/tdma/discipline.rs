@@ -48,8 +48,10 @@ pub enum Silent {
         /// Syncs that count, so far.
         heard: u8,
     },
-    /// It began a time, and waits whether another did so, too.
-    #[error("begins a time: in the first {JOINING_SYNCS} cycles it sends nothing but Syncs")]
+    /// It is master, by a time that others may not go by yet.
+    #[error(
+        "new master without system time of its own: in the first {JOINING_SYNCS} cycles it sends nothing but Syncs"
+    )]
     Beginning,
     /// Its time may be too far off: no master was heard for too long, or the network is too slow for such a guard.
     #[error("its clock may be {bound_ns} ns off, and {allowance_ns} ns are allowed: half of the guard")]

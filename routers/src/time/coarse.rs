@@ -14,7 +14,6 @@ const SYNCS: usize = JOINING_SYNCS as usize;
 struct Came {
     local_ns: u64,
     system_ns: u64,
-    error_ns: u64,
 }
 
 /// The last frames that told the time.
@@ -35,12 +34,12 @@ impl Coarse {
         self.count
     }
 
-    /// A frame that said `system_ns` when it was handed over came at `local_ns`; whoever sent it may be off by `error_ns`.
-    pub(super) fn add(&mut self, epoch: u64, system_ns: u64, local_ns: u64, error_ns: u64) {
+    /// A frame that said `system_ns` when it was handed over came at `local_ns`.
+    pub(super) fn add(&mut self, epoch: u64, system_ns: u64, local_ns: u64) {
         if epoch != self.epoch {
             *self = Self { epoch, ..Self::default() };
         }
-        self.syncs[self.next] = Came { local_ns, system_ns, error_ns };
+        self.syncs[self.next] = Came { local_ns, system_ns };
         self.next = (self.next + 1) % SYNCS;
         self.count = (self.count + 1).min(JOINING_SYNCS);
     }
@@ -68,7 +67,7 @@ impl Coarse {
             monotonic_ns: best.local_ns,
             system_ns: best.system_ns,
             pace_ppb: EVEN_PPB,
-            error_ns: delay_max_ns.saturating_add(best.error_ns),
+            error_ns: delay_max_ns,
             drift_ns_s: RATE_MAX_PPB.unsigned_abs(),
         }))
     }

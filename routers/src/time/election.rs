@@ -2,12 +2,13 @@
 
 use super::message::{Request, Sync};
 use super::{TAKEOVER_HALF_INTERVALS, Term};
+use crate::broken::broken;
 use crate::frame::NodeIndex;
 
 /// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
 const DEAF_NS_MIN: u64 = 200_000_000;
-/// In time slots others may be unheard for so long, and send by a time that they have.
-const BEGINS_AFTER_NS_MIN: u64 = 100_000_000;
+/// In time slots others may be unheard for so long since the last frame was due, and send by a time that they have.
+const BEGINS_AFTER_NS: u64 = 100_000_000;
 
 /// By what time a node would reign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -101,7 +102,7 @@ impl Election {
     /// only where for so long nobody that has one was heard.
     pub(super) fn asks_after(&mut self, intervals: u64) {
         self.deaf_ns = DEAF_NS_MIN.max(self.interval_ns.saturating_mul(2 * intervals));
-        self.begins_after_ns = BEGINS_AFTER_NS_MIN.max(self.interval_ns.saturating_mul(intervals));
+        self.begins_after_ns = BEGINS_AFTER_NS.saturating_add(self.interval_ns.saturating_mul(intervals));
     }
 
     pub(super) fn state(&self) -> State {
@@ -281,7 +282,8 @@ impl Election {
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = before + if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
-        let (since_ns, patience_ns) = match (origin, self.begins_after_ns, self.state) {
+        let begins_after_ns = if broken!(BeginsAtOnce) { 0 } else { self.begins_after_ns };
+        let (since_ns, patience_ns) = match (origin, begins_after_ns, self.state) {
             (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => (since_ns, patience_ns),
             (Origin::New, begins_ns, State::Slave(master)) => (master.heard_ns, patience_ns.max(begins_ns)),
             (Origin::New, begins_ns, _) => (since_ns.max(self.timed_heard_ns.unwrap_or(0)), patience_ns.max(begins_ns)),

@@ -13,7 +13,7 @@ use crate::time::message::{Request, Sync};
 use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES};
 use rohrpost_mailbox::TimeRecord;
 
-/// Who begins a time sends nothing but Syncs in so many cycles: who else began one meanwhile hears of it.
+/// Who reigns by a time that is not its own sends nothing but Syncs in so many cycles: who goes by another hears of it meanwhile.
 const BEGINNING_CYCLES: u8 = JOINING_SYNCS;
 
 /// What of time may leave now.
@@ -49,7 +49,7 @@ pub(super) struct Slots {
     synced_cycle: u64,
     next: usize,
     is_warm: bool,
-    /// Cycles in which this node has only to say that it began a time.
+    /// Cycles in which this node has only to say what time it is.
     beginning: u8,
     /// When this node was awake last, local ns.
     advanced_ns: u64,
@@ -64,7 +64,7 @@ impl Slots {
     /// This node reigns by such a time, which may be so far off that of an earlier term.
     pub(super) fn reigns(&mut self, error_ns: u64, origin: Origin) {
         self.goes_by(error_ns);
-        self.beginning = if origin == Origin::New { BEGINNING_CYCLES } else { 0 };
+        self.beginning = if origin == Origin::Own { 0 } else { BEGINNING_CYCLES };
     }
 }
 
@@ -209,7 +209,7 @@ impl Clock {
             slots.coarse.clear();
             slots.heard_cycle = 0;
         }
-        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
+        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
         // Until it is measured, its time may be another: to go on by the old one is to send in the slots of those who follow it.
         let is_measured = self.timeline == sync.began;
         let off_ns = slots.coarse.off_ns(received.ns, self.line.at(received.ns).ns);
@@ -225,7 +225,7 @@ impl Clock {
     /// Somebody hears no master either, and has time: whoever takes over goes on by that.
     pub(super) fn hello_in_slots(&mut self, received: Stamp, hello: &Request) {
         if let (Some(slots), State::Listening, true) = (&mut self.slots, self.election.state(), hello.timed) {
-            slots.coarse.add(hello.epoch, hello.sent_ns, received.ns, hello.error_ns);
+            slots.coarse.add(hello.epoch, hello.sent_ns, received.ns);
         }
     }
 
@@ -239,9 +239,9 @@ impl Clock {
         }
         self.election.replaced(received.ns);
         slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
-        slots.lives_cycle = sync.cycle;
+        slots.lives_cycle = slots.lives_cycle.max(sync.cycle);
         if broken!(ReplacementCalibrates) {
-            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
+            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
         }
         Ok(())
     }
@@ -269,7 +269,7 @@ impl Clock {
             || self.coarse(now_ns).is_some_and(|heard| heard.bound_ns(now_ns) <= slots.settings.allowance_ns);
         match self.sure(now_ns) {
             Some(_) => Origin::Own,
-            None if is_heard() => Origin::Heard,
+            None if is_heard() && !broken!(BeginsAtOnce) => Origin::Heard,
             None => Origin::New,
         }
     }
@@ -288,10 +288,10 @@ impl Clock {
         self.line.step(now_ns, epoch, system_ns, EVEN_PPB, heard.bound_ns(now_ns), 0);
     }
 
-    /// Whether this node began a time, and others may have begun one as well: it sends nothing but Syncs.
+    /// Whether this node reigns by a time that others may not go by yet: it sends nothing but Syncs.
     pub fn is_beginning(&self) -> bool {
         let is_master = matches!(self.election.state(), State::Master(_));
-        is_master && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
+        is_master && !broken!(BeginsLoudly) && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
     }
 
     /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.
