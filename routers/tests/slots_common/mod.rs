@@ -9,7 +9,8 @@ use nix::sys::socket::{
 use nix::sys::time::{TimeVal, TimeValLike};
 use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
 use rohrpost_mailbox::{
-    Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type, monotonic_ns, realtime_ns,
+    HEAD_BYTES, Head, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type,
+    monotonic_ns, realtime_ns,
 };
 use rohrpost_routers::frame::{Alive, FrameHead, Kind};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
@@ -261,12 +262,24 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
 }
 
 /// A frame of ours that crossed the bridge.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Crossed {
     /// When it left its sender's device, monotonic ns.
     pub(crate) at_ns: u64,
     pub(crate) from: u8,
     pub(crate) kind: Kind,
+    /// Of the whole packages in it.
+    pub(crate) heads: Vec<Head>,
+}
+
+/// Heads of the packages that lie one behind the other.
+fn heads(kind: Kind, mut packages: &[u8]) -> Vec<Head> {
+    let next = || {
+        let head = Head::from_bytes(packages).ok()?;
+        packages = packages.get(HEAD_BYTES + usize::from(head.len)..)?;
+        Some(head)
+    };
+    if kind == Kind::Packages { std::iter::from_fn(next).collect() } else { Vec::new() }
 }
 
 /// Watches the bridge.
@@ -322,9 +335,10 @@ fn watch(socket: &OwnedFd, ends: &AtomicBool) -> Vec<Crossed> {
         let frame = &bytes[..len];
         let is_ipv4_udp = len > HEADS && frame[12..14] == [8, 0] && frame[23] == 17;
         if let (true, true, Some(stamp)) = (came_in, is_ipv4_udp, stamp)
-            && let Ok((head, _)) = FrameHead::parse(&frame[HEADS..])
+            && let Ok((head, inside)) = FrameHead::parse(&frame[HEADS..])
         {
-            seen.push(Crossed { at_ns: stamp - ahead_ns, from: frame[29] - 1, kind: head.kind });
+            let heads = heads(head.kind, inside);
+            seen.push(Crossed { at_ns: stamp - ahead_ns, from: frame[29] - 1, kind: head.kind, heads });
         }
     }
 }
