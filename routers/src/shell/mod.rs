@@ -119,8 +119,9 @@ impl Shell {
     /// [`ShellError`]
     pub fn start(parts: Parts<'_>) -> Result<Self, ShellError> {
         let Parts { node, name, mut settings, faults, impair, clock } = parts;
-        if settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some()) {
-            // What comes through the tunnel comes from the router.
+        let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
+        if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
+            // What comes through the tunnel comes from the router, and is not to share the quota of those whom nobody knows.
             settings.senders.push(vec![name]);
         }
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
