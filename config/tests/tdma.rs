@@ -143,3 +143,32 @@ fn without_slots_there_are_no_bounds() {
     let free = include_str!("full.toml");
     assert_eq!(bounds(&parse(free)), []);
 }
+
+/// Nothing of this is what anybody needs: it is refused with words, or has bounds, but nothing overflows or goes on for ever.
+#[test]
+fn absurd_flows_are_judged_in_time() {
+    let flow = SLOTS
+        .split_once("[[flow]]")
+        .unwrap()
+        .0
+        .replace("program = \"./pilot\"", "program = \"./pilot\"\nmailbox.data.size = \"65519 B\"");
+    let periods = ["1 ns", "1 us", "99 us", "100 us", "1 ms", "24 h", "5000000 h"];
+    let mut accepted = Vec::new();
+    for (period, quick) in periods.iter().flat_map(|period| periods.iter().map(move |quick| (period, quick))) {
+        for size in ["1 B", "65519 B"] {
+            let text = format!(
+                "{flow}[[flow]]\nfrom = \"laser.0\"\nto = \"pilot.0\"\nsize = \"{size}\"\nperiod = \"{period}\"\n\
+                 [[flow]]\nfrom = \"pilot.0\"\nto = \"motor.0\"\nsize = \"1 B\"\nperiod = \"{quick}\"\n\
+                 [[flow]]\nfrom = \"motor.0\"\nto = \"pilot.0\"\nsize = \"1 B\"\nperiod = \"{quick}\"\n"
+            );
+            match Installation::parse(&text, Path::new("absurd.toml")) {
+                Ok(installation) => {
+                    assert!(rohrpost_config::explain(&installation, None).contains("Time slots"));
+                    accepted.push((*period, *quick, size));
+                }
+                Err(errors) => assert!(errors.to_string().contains("absurd.toml:"), "{errors}"),
+            }
+        }
+    }
+    assert_eq!(accepted, [("24 h", "24 h", "1 B"), ("24 h", "24 h", "65519 B")]);
+}

@@ -20,6 +20,9 @@ use super::mistakes::mistake;
 
 /// Moments at which a package may come that are tried for one slot v: whatever takes more has no bound worth knowing.
 const TRIES_MAX: usize = 5_000;
+/// Slots of a chain, at most, for the same reason.
+const CHAIN_MAX: usize = 20_000;
+const SECOND_NS: u64 = 1_000_000_000;
 
 /// What slots of a node have room for, over and over.
 #[derive(Clone, Debug)]
@@ -59,7 +62,7 @@ pub(crate) struct Stream {
     pub(crate) last_ns: u64,
 }
 
-/// What there is to carry, or what a slot carries at least.
+/// What there is to carry, or what a slot carries at least. What is more than can be told is told as the most that can: no slot carries that.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Work {
     ns: u64,
@@ -68,8 +71,8 @@ struct Work {
 
 impl std::ops::AddAssign for Work {
     fn add_assign(&mut self, more: Self) {
-        self.ns += more.ns;
-        self.datagrams += more.datagrams;
+        self.ns = self.ns.saturating_add(more.ns);
+        self.datagrams = self.datagrams.saturating_add(more.datagrams);
     }
 }
 
@@ -149,7 +152,7 @@ impl Supply {
 
 impl Stream {
     fn work(&self, packages: u64) -> Work {
-        Work { ns: packages * self.takes_ns, datagrams: packages * self.datagrams }
+        Work { ns: packages.saturating_mul(self.takes_ns), datagrams: packages.saturating_mul(self.datagrams) }
     }
 }
 
@@ -173,6 +176,15 @@ pub(crate) fn worst(
 
 fn worse(one: Option<Worst>, other: Worst) -> Option<Worst> {
     Some(one.filter(|one| one.latency_ns >= other.latency_ns).unwrap_or(other))
+}
+
+/// Thousandths of what comes or leaves in a second, since there may be less than one datagram, rounded by `divide`.
+fn a_second(work: Work, period_ns: u64, divide: impl Fn(u128, u128) -> u128) -> Work {
+    let thousandths = |all: u64| {
+        let all = divide(u128::from(all) * u128::from(1000 * SECOND_NS), period_ns.into());
+        u64::try_from(all).unwrap_or(u64::MAX)
+    };
+    Work { ns: thousandths(work.ns), datagrams: thousandths(work.datagrams) }
 }
 
 struct Analysis<'a> {
@@ -220,17 +232,11 @@ impl Analysis<'_> {
         if carried.datagrams == 0 {
             return Err(Never::NoRoom);
         }
-        let a_second = |all: u64, period_ns: u64| (u128::from(all) * 1_000_000_000_000 / u128::from(period_ns)) as u64;
-        let asked = self.streams().map(|stream| {
-            let Work { ns, datagrams } = stream.work(1);
-            // Thousandths, since there may be less than one datagram a second.
-            Work { ns: a_second(ns, stream.period_ns), datagrams: a_second(datagrams, stream.period_ns) }
-        });
+        let asked = self.streams().map(|stream| a_second(stream.work(1), stream.period_ns, u128::div_ceil));
         let asked: Work = asked.sum();
-        let repeats_ns = self.supply.repeats_ns;
-        let (ns, datagrams) = (a_second(carried.ns, repeats_ns), a_second(carried.datagrams, repeats_ns));
-        if asked.ns >= ns && asked.datagrams >= datagrams {
-            return Err(Never::Overload { asked_ns_s: asked.ns / 1000, carried_ns_s: ns / 1000 });
+        let carried = a_second(carried, self.supply.repeats_ns, std::ops::Div::div);
+        if asked.ns >= carried.ns && asked.datagrams >= carried.datagrams {
+            return Err(Never::Overload { asked_ns_s: asked.ns / 1000, carried_ns_s: carried.ns / 1000 });
         }
         Ok(())
     }
@@ -240,10 +246,14 @@ impl Analysis<'_> {
         let misses = usize::from(!mistake!(CatchesTheSlot));
         let from_ns = self.supply.takes_until_ns(first);
         let mut chain = Chain { from_ns, index: first + misses, carried: Work::default() };
-        let (mut worst, mut later_ns) = (None, 0);
+        let (mut worst, mut later_ns) = (None, 0_u64);
         for _ in 0..TRIES_MAX {
+            let published_ns = from_ns.saturating_add(later_ns);
             // What slots found and left before ours was published.
-            while self.supply.takes_until_ns(chain.index) < from_ns + later_ns + misses as u64 {
+            while self.supply.takes_until_ns(chain.index) < published_ns.saturating_add(misses as u64) {
+                if chain.index - first > CHAIN_MAX {
+                    return Err(Never::Late);
+                }
                 let found = self.published(self.supply.takes_until_ns(chain.index) - from_ns);
                 if self.left_ns(found, chain.carried) <= self.supply.room_ns(chain.index) {
                     return worst.ok_or(Never::NoRoom);
@@ -266,7 +276,7 @@ impl Analysis<'_> {
     /// When the next package could be published that goes before later ones of ours: nothing else makes it worse to be later.
     fn next_ns(&self, later_ns: u64) -> u64 {
         let earlier = self.others.iter().filter(|(_, ahead)| *ahead == Ahead::Earlier).map(|(stream, _)| stream);
-        let next = |stream: &Stream| (later_ns / stream.period_ns + 1) * stream.period_ns;
+        let next = |stream: &Stream| (later_ns / stream.period_ns + 1).saturating_mul(stream.period_ns);
         earlier.chain([self.own]).map(next).min().unwrap_or(u64::MAX)
     }
 
@@ -314,7 +324,7 @@ impl Analysis<'_> {
             ahead += others;
             ahead += Work { ns: self.own.takes_ns - self.own.end_ns, datagrams: self.own.datagrams - 1 };
             let left_ns = self.left_ns(ahead, chain.carried);
-            if left_ns + self.own.end_ns > room_ns {
+            if left_ns.saturating_add(self.own.end_ns) > room_ns {
                 return None;
             }
             if said_ns + left_ns <= starts_ns {

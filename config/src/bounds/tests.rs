@@ -122,6 +122,37 @@ proptest! {
     }
 }
 
+/// What no file says, and the ends of what files can say.
+fn extremes() -> impl Strategy<Value = u64> {
+    prop_oneof![Just(1), Just(2), 1..1000_u64, 1..3 * MS, Just(u64::MAX / 2), u64::MAX - 5..=u64::MAX]
+}
+
+proptest! {
+    #[test]
+    fn whatever_is_asked_the_answer_comes_without_overflow(
+        streams in prop::collection::vec((extremes(), 1..1000 * MS, 1..1000_u64, any::<bool>()), 1..6),
+        sends_us in 1..900_u64,
+        repeats_ms in prop_oneof![Just(1_u64), Just(5), Just(64_000)],
+    ) {
+        let windows = vec![Window { begin_ns: 50 * US, sends_ns: sends_us * US, slot: 0 }];
+        let (repeats_ns, said_ns) = (repeats_ms * MS, 20 * US);
+        let supply = Supply { windows, repeats_ns, said_ns, taken_before_ns: 50 * US, late_ns: 20 * US };
+        let streams: Vec<_> = streams
+            .into_iter()
+            .map(|(period_ns, takes_ns, datagrams, always)| {
+                let end_ns = takes_ns.div_ceil(datagrams);
+                let stream =
+                    Stream { period_ns, takes_ns, datagrams, largest_ns: end_ns, end_ns, last_ns: end_ns };
+                (stream, if always { Ahead::Always } else { Ahead::Earlier })
+            })
+            .collect();
+        if let Ok(worst) = worst(&supply, &streams[0].0, &streams[1..], LONGEST_NS) {
+            // What waits for as long at most has begun to leave by then.
+            prop_assert!(worst.latency_ns <= LONGEST_NS + repeats_ns + streams[0].0.takes_ns, "{worst:?}");
+        }
+    }
+}
+
 /// The same systems in each run.
 fn some_systems(count: usize) -> Vec<System> {
     let mut runner = TestRunner::deterministic();

@@ -2,6 +2,7 @@
 
 use super::{LATE, Tdma, TimeSlot, common};
 use crate::bounds::{self, Unbounded};
+use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::node::Node;
 use crate::reader::Reader;
@@ -27,6 +28,9 @@ pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
     judge.places();
     judge.lengths();
     judge.nodes();
+    if reader.is_content() {
+        judge.periods_of_flows();
+    }
     if reader.is_content() {
         judge.flows();
     }
@@ -209,6 +213,42 @@ impl Judge<'_> {
             let message = format!("node `{}` has no slot{master}, so it can send nothing; {right}", node.name);
             self.reader.report(node.line, message);
         }
+    }
+
+    /// No flow publishes so quickly that a package could not even be sure of a slot that begins when the next one comes.
+    fn periods_of_flows(&self) {
+        let node = |name| self.installation.node_of(name);
+        let is_too_quick = |flow: &&Flow| flow.period < bounds::TAKEN_BEFORE && node(flow.from) != node(flow.to);
+        for flow in self.installation.flows.iter().filter(is_too_quick) {
+            let right = self
+                .period_that_holds(flow)
+                .map_or_else(String::new, |period| format!(" of {}", duration_decimal(period)));
+            let text = |name| self.installation.classes.format(name);
+            let message = format!(
+                "[[flow]] from `{}` to `{}`: `period` {} is less than the {} that a package must be there before its slot, and a cycle is {}; put \
+                 what comes meanwhile into one package, with a `period`{right} or more",
+                text(flow.from),
+                text(flow.to),
+                duration_decimal(flow.period),
+                duration_decimal(bounds::TAKEN_BEFORE),
+                duration_decimal(self.tdma.cycle)
+            );
+            self.reader.report(flow.line, message);
+        }
+    }
+
+    /// So many cycles that a flow keeps them as its deadline, if all quicker ones are as slow: found by trying.
+    fn period_that_holds(&self, flow: &Flow) -> Option<Duration> {
+        let index = self.installation.flows.iter().position(|other| other == flow)?;
+        let holds = |period: &Duration| {
+            let mut slower = self.installation.clone();
+            for flow in slower.flows.iter_mut().filter(|flow| flow.period < *period) {
+                (flow.period, flow.deadline) = (*period, *period);
+            }
+            let bound = bounds::bounds(&slower).into_iter().find(|bound| bound.flow == index);
+            bound.is_some_and(|bound| bound.latency.is_ok_and(|bound| bound.latency <= *period))
+        };
+        (1..=CYCLES_MAX as u32).map(|cycles| self.tdma.cycle * cycles).find(holds)
     }
 
     /// Each flow keeps its deadline.

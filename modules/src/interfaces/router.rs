@@ -144,7 +144,7 @@ pub struct Links {
 /// Why datagrams could not be sent.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct SocketFailure {
-    /// In a word: `nobody-there` (of an earlier one), `no-way`, `too-long`, `no-room`, `other`.
+    /// In a word: `nobody-there` (of an earlier one), `no-way`, `too-long`, `no-room`, `full`, `other`.
     pub cause: String,
     /// How often.
     pub times: u64,

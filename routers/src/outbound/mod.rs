@@ -177,6 +177,11 @@ impl Outbound {
         self.queue.used_bytes() >= enough as u64
     }
 
+    /// Bytes of memory that packages take of those who share a quota with this one.
+    pub fn waiting_bytes_of(&self, sender: Name) -> u64 {
+        self.queue.used_by(self.sender_of(sender))
+    }
+
     /// What waits has at most this priority: only what is above it may leave before what waits.
     pub fn waits_up_to(&self) -> Priority {
         let level = self.queue.first().map(|place| self.queue.at(place).level);

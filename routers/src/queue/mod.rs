@@ -118,6 +118,11 @@ impl Queue {
         u64::from(self.used_blocks) * BLOCK_BYTES as u64
     }
 
+    /// Bytes of memory in use for a sender.
+    pub fn used_by(&self, sender: u16) -> u64 {
+        self.senders.get(usize::from(sender)).map_or(0, |sender| u64::from(sender.used) * BLOCK_BYTES as u64)
+    }
+
     /// Lets a package wait. What has to give way for it is handed to `gone`; if nothing less important of the same sender can make room,
     /// the package itself is not taken.
     #[must_use]

@@ -16,6 +16,8 @@ use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
 use crate::report::Report;
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
+use rohrpost_config::Tdma;
+use rohrpost_config::wire::HAND_OVER;
 use rohrpost_mailbox::{Head, Receiver, monotonic_ns, wait_above, wait_any};
 use std::io::IoSlice;
 use std::sync::Arc;
@@ -24,6 +26,11 @@ use std::time::{Duration, Instant};
 
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
 const BURST: usize = 64;
+
+/// For a small datagram that waits the kernel counts about a KiB, and it doubles the room that it is asked for.
+const DATAGRAM_KEPT_BYTES: usize = 512;
+/// The longest slot of the quickest link fills more than a computer should keep.
+const SLOT_BYTES_MAX: usize = 16 << 20;
 
 /// What the sending thread has.
 pub(super) struct Departures {
@@ -132,9 +139,14 @@ pub(super) struct Wire {
 impl Wire {
     pub(super) fn new(settings: &Arc<Settings>, impair: Option<impair::Settings>, failures: &Arc<Failures>) -> Self {
         let own = settings.nodes[usize::from(settings.own)].address;
+        // In a slot the thread must not sleep until the device has room.
+        let waiting_bytes = settings.tdma.as_ref().map(|tdma| slot_bytes_max(tdma, settings.own));
         let socket = |node: NodeIndex| {
-            let peer = settings.nodes[usize::from(node)].address;
-            (node != settings.own).then(|| OutSocket::new(own, (peer, settings.network.port).into()))
+            let peer = (settings.nodes[usize::from(node)].address, settings.network.port).into();
+            (node != settings.own).then(|| match waiting_bytes {
+                Some(bytes) => OutSocket::that_never_waits(own, peer, bytes),
+                None => OutSocket::new(own, peer),
+            })
         };
         Self {
             sockets: (0..settings.nodes.len() as NodeIndex).map(socket).collect(),
@@ -186,6 +198,14 @@ impl Wire {
         }
         sent
     }
+}
+
+/// What the kernel keeps at most of what a node hands over in one of its slots, as it counts: small datagrams with what it needs for each.
+fn slot_bytes_max(tdma: &Tdma, own: NodeIndex) -> usize {
+    let own = tdma.slots.iter().filter(|slot| slot.node == own);
+    let longest = own.map(|slot| slot.length).max().unwrap_or_default();
+    let datagrams = longest.as_nanos().div_ceil(HAND_OVER.as_nanos()) as usize;
+    (tdma.budget_bytes(longest) as usize).max(datagrams * DATAGRAM_KEPT_BYTES).min(SLOT_BYTES_MAX)
 }
 
 const _: () = assert!(DIRECT_HEAD_BYTES < 128);

@@ -14,13 +14,15 @@ pub enum Failure {
     TooLong,
     /// The kernel or the network card had no room.
     NoRoom,
+    /// So much waits already for its device: who sends in time slots does not wait for that.
+    Full,
     /// Anything else.
     Other,
 }
 
 impl Failure {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Other];
+    pub const ALL: [Self; 6] = [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Full, Self::Other];
 
     pub(super) fn of(error: &io::Error) -> Self {
         use nix::errno::Errno;
@@ -35,7 +37,8 @@ impl Failure {
             | Errno::EACCES
             | Errno::EPERM => Self::NoWay,
             Errno::EMSGSIZE => Self::TooLong,
-            Errno::ENOBUFS | Errno::ENOMEM | Errno::EAGAIN => Self::NoRoom,
+            Errno::ENOBUFS | Errno::ENOMEM => Self::NoRoom,
+            Errno::EAGAIN => Self::Full,
             _ => Self::Other,
         }
     }
@@ -52,6 +55,7 @@ impl Failure {
             Self::NoWay => "no-way",
             Self::TooLong => "too-long",
             Self::NoRoom => "no-room",
+            Self::Full => "full",
             Self::Other => "other",
         }
     }
@@ -65,6 +69,10 @@ impl Failure {
             }
             Self::TooLong => "the datagram was too long for the network; lower `mtu` in [network], on all nodes",
             Self::NoRoom => "the kernel had no room; lower `rate` in [network] to what the network can carry",
+            Self::Full => {
+                "its device has not sent what earlier slots brought; does it carry what `link` in [tdma] says (`ethtool DEVICE`), and is \
+                 net.core.wmem_max enough for a slot (`sysctl`)?"
+            }
             Self::Other => "the kernel refused it",
         }
     }

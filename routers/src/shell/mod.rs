@@ -118,7 +118,12 @@ impl Shell {
     /// # Errors
     /// [`ShellError`]
     pub fn start(parts: Parts<'_>) -> Result<Self, ShellError> {
-        let Parts { node, name, settings, faults, impair, clock } = parts;
+        let Parts { node, name, mut settings, faults, impair, clock } = parts;
+        let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
+        if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
+            // What comes through the tunnel comes from the router, and is not to share the quota of those whom nobody knows.
+            settings.senders.push(vec![name]);
+        }
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
         let socket = Arc::new(InSocket::open(own)?);
         if socket.receive_bytes < InSocket::WANTED_BYTES {
@@ -175,7 +180,7 @@ impl Shell {
             threads: Vec::new(),
         };
         if shell.settings.tdma.is_some() {
-            arrivals.refusals = Some(shell.send_in_slots(departures, clock.ok_or(ShellError::NoTime)?)?);
+            arrivals.refusals = Some(shell.send_in_slots(name, departures, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
             shell.service = clock.map(ClockService::start).transpose()?;
@@ -202,6 +207,7 @@ impl Shell {
     /// Starts the thread that sends in time slots, from what else would send as packages come; the way there for refusals.
     fn send_in_slots(
         &mut self,
+        name: Name,
         departures: Departures,
         clock: ClockParts,
     ) -> Result<SyncSender<slots::Refusal>, ShellError> {
@@ -213,7 +219,8 @@ impl Shell {
         let spin_ns = slots::spin_ns(table.cycle_ns());
         let (refusals, line) = sync_channel(slots::REFUSALS);
         let discipline = Discipline::new(table, spin_ns);
-        let slots = Slots::new(departures, works, discipline, settings.network, self.socket.clone(), line);
+        let own = slots::Own { router: name, network: settings.network };
+        let slots = Slots::new(own, departures, works, discipline, self.socket.clone(), line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(refusals)
@@ -225,7 +232,7 @@ impl Shell {
         let settings = self.settings.clone();
         let Some(wanted) = settings.tdma.as_ref().and_then(|tdma| tdma.tunnel) else { return Ok(()) };
         let participants = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
-        match tunnel::ends(&settings, &wanted, name, &self.stats, &self.shared, &participants) {
+        match tunnel::ends(&settings, &wanted, name, &self.shared, &participants) {
             Ok((outgoing, incoming, passed)) => {
                 self.tunnel = Some(passed);
                 self.begin("tunnel-out", move || outgoing.run())?;

@@ -144,24 +144,32 @@ impl InSocket {
 pub(super) struct OutSocket {
     own: IpAddr,
     peer: SocketAddr,
+    /// So many bytes may wait in the kernel, and what is more fails. None: as many as it likes, and whoever sends more waits.
+    waiting_bytes: Option<usize>,
     /// None while there is no way there, as when the network is down.
     socket: Option<Socket>,
 }
 
 impl OutSocket {
     pub(super) fn new(own: IpAddr, peer: SocketAddr) -> Self {
-        Self { own, peer, socket: connect(own, peer).ok() }
+        Self { own, peer, waiting_bytes: None, socket: connect(own, peer, None).ok() }
     }
 
-    /// Sends these parts as one datagram. Blocks while the network card has more than it can send: what waits then waits in the
-    /// router's queue, where important packages overtake.
+    /// One that never blocks, with room for so many bytes.
+    pub(super) fn that_never_waits(own: IpAddr, peer: SocketAddr, bytes: usize) -> Self {
+        let waiting_bytes = Some(bytes);
+        Self { own, peer, waiting_bytes, socket: connect(own, peer, waiting_bytes).ok() }
+    }
+
+    /// Sends these parts as one datagram. Unless it never waits, it blocks while the network card has more than it can send: what waits then
+    /// waits in the router's queue, where important packages overtake.
     ///
     /// # Errors
     /// The datagram was not sent, or not because of what became of an earlier one.
     pub(super) fn send(&mut self, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
         let socket = match &mut self.socket {
             Some(socket) => socket,
-            none => none.insert(connect(self.own, self.peer).map_err(|error| Failure::of(&error))?),
+            none => none.insert(connect(self.own, self.peer, self.waiting_bytes).map_err(|error| Failure::of(&error))?),
         };
         let sent = loop {
             match socket.send_vectored(parts) {
@@ -192,8 +200,15 @@ fn address(of: &SockaddrStorage) -> Option<IpAddr> {
     v4.or_else(|| of.as_sockaddr_in6().map(|of| IpAddr::V6(of.ip())))
 }
 
-fn connect(own: IpAddr, peer: SocketAddr) -> io::Result<Socket> {
+fn connect(own: IpAddr, peer: SocketAddr, waiting_bytes: Option<usize>) -> io::Result<Socket> {
     let socket = new_socket(peer)?;
+    if let Some(bytes) = waiting_bytes {
+        socket.set_nonblocking(true)?;
+        // The kernel tells twice what was asked for. Never less than what is usual.
+        if socket.send_buffer_size()? < 2 * bytes && setsockopt(&socket, sockopt::SndBufForce, &bytes).is_err() {
+            socket.set_send_buffer_size(bytes)?;
+        }
+    }
     socket.bind(&SocketAddr::new(own, 0).into())?;
     // Refusals are not worth a failure: the network then treats these datagrams as all others.
     let _ = if peer.is_ipv4() { socket.set_tos_v4(TRAFFIC_CLASS) } else { socket.set_tclass_v6(TRAFFIC_CLASS) };
@@ -282,6 +297,26 @@ mod tests {
             matches!(error, SocketError::NotHere(_)) && error.to_string().contains("correct its `address`"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn who_never_waits_has_room_for_what_it_asked_for() {
+        let at = SocketAddr::new(ONE, free_port(ONE));
+        let there = InSocket::open(at).unwrap();
+        let usual = OutSocket::new(ONE, at).socket.unwrap();
+        assert!(!usual.nonblocking().unwrap());
+        for bytes in [1, usual.send_buffer_size().unwrap() * 2] {
+            let mut sender = OutSocket::that_never_waits(ONE, at, bytes);
+            let socket = sender.socket.as_ref().unwrap();
+            assert!(socket.nonblocking().unwrap());
+            // Beyond the system's limit it takes a right.
+            let limit = std::fs::read_to_string("/proc/sys/net/core/wmem_max").unwrap().trim().parse().unwrap();
+            let least = usual.send_buffer_size().unwrap().max(2 * bytes.min(limit));
+            assert!(socket.send_buffer_size().unwrap() >= least, "{bytes}");
+            sender.send(&[IoSlice::new(b"hello")]).unwrap();
+            assert!(matches!(there.receive(&mut [0; 10]), Received::Datagram { bytes: 5, .. }));
+        }
+        assert_eq!(Failure::of(&Errno::EAGAIN.into()), Failure::Full, "and is told when that is not enough");
     }
 
     #[test]

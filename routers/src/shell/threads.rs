@@ -23,6 +23,8 @@ pub(super) struct Shared {
     ends: AtomicBool,
     /// When the sending thread wants to be woken, ns; it sleeps without a timeout, since that costs less.
     pub(super) departures_due_ns: AtomicU64,
+    /// Bytes of packets from the tunnel that wait in the queue, as the sending thread last saw it.
+    pub(super) tunnel_bytes: AtomicU64,
     /// Of the sending thread, whose bell wakes it.
     departures: Arc<Participant>,
 }
@@ -32,6 +34,7 @@ impl Shared {
         Self {
             ends: AtomicBool::new(false),
             departures_due_ns: AtomicU64::new(u64::MAX),
+            tunnel_bytes: AtomicU64::new(0),
             departures: departures.clone(),
         }
     }

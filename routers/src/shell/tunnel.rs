@@ -4,24 +4,26 @@
 //!  ssh, HTTP ─▶ kernel ─▶ rohrpost0 ─ tunnel-out ─▶ router.I.3 ─▶ level 31 ═ slots ═▶ router.J.4 ─ tunnel-in ─▶ rohrpost0 ─▶ kernel
 //! ```
 //!
-//! An IP packet is a package like any other, of the least priority. Little of it may wait: then packets are dropped, which is how TCP learns
-//! how much a network carries. Both threads are ordinary ones.
+//! An IP packet is a package like any other, of the least priority, with a quota of its own. Little of it may wait in the queue: then packets are
+//! dropped, which is how TCP learns how much a network carries. Both threads are ordinary ones.
 
 use super::threads::Shared;
 use super::ways::{Reach, Ways};
 use crate::frame::NodeIndex;
 use crate::netlink::Netlink;
 use crate::outbound::DIRECT_HEAD_BYTES;
-use crate::settings::{LEVELS, Settings};
-use crate::stats::{Count, Stats};
+use crate::settings::{QUOTA_BYTES_MIN, Settings};
+use crate::stats::Count;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use rohrpost_config::Tunnel;
+use rohrpost_config::wire::KEPT_IN_BYTES;
 use rohrpost_mailbox::{CreateError, Head, Name, Participant, Priority, Receiver, Shape, Type, sys};
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::net::Ipv4Addr;
 use std::os::fd::AsFd;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Of a router: takes IP packets from other nodes.
@@ -30,8 +32,8 @@ const LOCAL: u8 = 4;
 const DEVICE: &str = "rohrpost%d";
 /// Largest packet, where the largest datagram has room for it.
 const MTU_MAX: usize = 1500;
-/// Packets that may wait in the queue; more are dropped.
-const WAITING_MAX: u64 = 64;
+/// What may wait in the queue, of this node's packets alone: 64 of the largest. More are dropped.
+const WAITING_BYTES_MAX: u64 = 64 * (MTU_MAX as u64).next_multiple_of(KEPT_IN_BYTES);
 /// Slots of the mailbox that packets come to.
 const SLOTS: u16 = 64;
 /// The threads look this often whether the router ends.
@@ -39,6 +41,8 @@ const LOOK: Duration = Duration::from_millis(100);
 const LOOK_MS: u8 = 100;
 /// Where an IPv4 packet has its destination.
 const DESTINATION: std::ops::Range<usize> = 16..20;
+
+const _: () = assert!(WAITING_BYTES_MAX <= QUOTA_BYTES_MIN as u64, "it is dropped here before its quota drops it");
 
 /// What went through the tunnel.
 #[derive(Default, Debug)]
@@ -91,7 +95,6 @@ struct Common {
 pub(super) struct Out {
     common: Common,
     ways: Ways,
-    stats: Arc<Stats>,
     /// The router's name.
     own: Name,
     first: Ipv4Addr,
@@ -120,7 +123,6 @@ pub(super) fn ends(
     settings: &Settings,
     tunnel: &Tunnel,
     own: Name,
-    stats: &Arc<Stats>,
     shared: &Arc<Shared>,
     [sender, receiver]: &[Arc<Participant>; 2],
 ) -> Result<(Out, In, Arc<Passed>), TunnelError> {
@@ -132,7 +134,6 @@ pub(super) fn ends(
     let outgoing = Out {
         common: common(device),
         ways: Ways::new(sender, Reach::Everywhere),
-        stats: stats.clone(),
         own: own.with_local(LOCAL),
         first: tunnel.address(0),
         nodes: settings.nodes.len() as NodeIndex,
@@ -169,7 +170,7 @@ impl Out {
             priority: Priority(0),
             ..Head::default()
         };
-        let full = self.stats.waiting[LEVELS - 1].get() >= WAITING_MAX;
+        let full = self.common.shared.tunnel_bytes.load(Ordering::Relaxed) >= WAITING_BYTES_MAX;
         let count = if full || self.ways.send(&head, packet).is_err() { &passed.dropped } else { &passed.sent };
         count.add(1);
     }

@@ -4,7 +4,8 @@
 
 use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
 use rohrpost_mailbox::{
-    Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type, monotonic_ns, realtime_ns,
+    HEAD_BYTES, Head, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type,
+    monotonic_ns, realtime_ns,
 };
 use rohrpost_routers::frame::{Alive, FrameHead, Kind};
 use rohrpost_routers::lab::{Crossing, Lab, LabError, NodeSpec};
@@ -256,19 +257,31 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
 }
 
 /// A frame of ours that crossed the bridge.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Crossed {
     /// When it left its sender's device, monotonic ns.
     pub(crate) at_ns: u64,
     pub(crate) from: u8,
     pub(crate) kind: Kind,
+    /// Of the whole packages in it.
+    pub(crate) heads: Vec<Head>,
+}
+
+/// Heads of the packages that lie one behind the other.
+fn heads(kind: Kind, mut packages: &[u8]) -> Vec<Head> {
+    let next = || {
+        let head = Head::from_bytes(packages).ok()?;
+        packages = packages.get(HEAD_BYTES + usize::from(head.len)..)?;
+        Some(head)
+    };
+    if kind == Kind::Packages { std::iter::from_fn(next).collect() } else { Vec::new() }
 }
 
 impl Crossed {
     fn of(crossing: &Crossing<'_>) -> Option<Self> {
-        let (head, _) = FrameHead::parse(crossing.datagram).ok()?;
+        let (head, inside) = FrameHead::parse(crossing.datagram).ok()?;
         let from = (0..NODES).find(|node| address(*node) == crossing.source)?;
-        Some(Self { at_ns: crossing.at_ns, from, kind: head.kind })
+        Some(Self { at_ns: crossing.at_ns, from, kind: head.kind, heads: heads(head.kind, inside) })
     }
 }
 

@@ -103,3 +103,126 @@ impl Intake {
 fn hurries(head: &Head) -> bool {
     matches!(head.kind.kind(), Kind::Command(_)) && head.priority.outranks(head.from.class().priority())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::{End, S, module};
+    use crate::stats::Cause;
+    use rohrpost_mailbox::{Label, Name, Node, Participant, Sender, Shape, Type};
+
+    /// A package of this body takes 50 bytes of a slot.
+    const BODY: [u8; 50 - HEAD_BYTES] = [7; 50 - HEAD_BYTES];
+    const SLOTS: u16 = 16;
+
+    /// A router of node 0, and a mailbox for packages to node 1.
+    struct Ground {
+        intake: Intake,
+        sender: Sender,
+        end: End,
+        _folder: tempfile::TempDir,
+    }
+
+    impl Ground {
+        /// That began so long ago.
+        fn new(age_ns: u64) -> Self {
+            let folder = tempfile::tempdir().unwrap();
+            let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+            let join = || Participant::join(&node, Name::NONE).unwrap();
+            let shape = Shape { slots: SLOTS, full: rohrpost_mailbox::Full::Displace, ..Shape::default() };
+            let intake = Intake::new(join().receiver(module(100, 1), shape).unwrap());
+            let sender = join().sender(module(100, 1)).unwrap();
+            Self { intake, sender, end: End::begin(0, monotonic_ns() - age_ns, |_| {}), _folder: folder }
+        }
+
+        fn send(&mut self, kind: Type, priorities: &[u8]) {
+            for priority in priorities {
+                let label = Label { from: module(100, 0), kind, priority: Priority(*priority), ..Label::default() };
+                self.sender.send(&label, &[&BODY]).unwrap();
+            }
+        }
+
+        fn data(&mut self, priorities: &[u8]) {
+            self.send(Type::data(1), priorities);
+        }
+
+        /// So many looks shortly before the call.
+        fn before_the_call(&mut self, looks: usize) {
+            (0..looks).for_each(|_| self.intake.take_one(&mut self.end.outbound, &mut self.end.log));
+        }
+
+        fn in_the_slot(&mut self) {
+            self.intake.take_on(&mut self.end.outbound, &mut self.end.log);
+        }
+
+        fn between_slots(&mut self) {
+            self.intake.relieve(&mut self.end.outbound, &mut self.end.log);
+        }
+
+        /// Packages in the mailbox, and in the queue.
+        fn waiting(&mut self) -> (usize, u64) {
+            (self.intake.transit.waits().0, self.end.stats.waiting_in_all())
+        }
+    }
+
+    #[test]
+    fn a_slot_takes_what_it_has_room_for_and_then_what_is_more_important() {
+        let mut ground = Ground::new(0);
+        ground.data(&[10, 90, 50, 50, 20]);
+        ground.intake.open(100);
+        ground.before_the_call(10);
+        assert_eq!(ground.waiting(), (3, 2), "90 and 50 fill it");
+        ground.data(&[50]);
+        ground.before_the_call(10);
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (4, 2), "as important as what was taken, it waits");
+        ground.data(&[95, 51]);
+        ground.before_the_call(10);
+        assert_eq!(ground.waiting(), (4, 4));
+        ground.data(&[95; FEW + 2]);
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (6, 4 + FEW as u64), "a few between two datagrams");
+        ground.intake.open(10_000);
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (0, 10 + FEW as u64), "who woke up late takes in the slot what it has room for");
+    }
+
+    #[test]
+    fn between_slots_all_stays_unless_it_is_much_or_no_slot_comes() {
+        let mut ground = Ground::new(0);
+        ground.data(&[50; SLOTS as usize / 2]);
+        ground.between_slots();
+        assert_eq!(ground.waiting(), (8, 0));
+        ground.data(&[50]);
+        ground.between_slots();
+        assert_eq!(ground.waiting(), (0, 9), "more than half");
+        ground.data(&[50]);
+        ground.between_slots();
+        assert_eq!(ground.waiting(), (1, 9));
+        ground.intake.taken_ns -= UNTAKEN_NS_MAX;
+        ground.between_slots();
+        assert_eq!(ground.waiting(), (0, 10), "no slot came for long");
+    }
+
+    #[test]
+    fn what_hurries_more_than_it_may_takes_no_room_from_what_may() {
+        let mut ground = Ground::new(0);
+        ground.send(Type::command(16), &[200, 200, 100]);
+        ground.intake.open(50);
+        ground.before_the_call(10);
+        assert_eq!(ground.waiting(), (0, 3));
+        ground.send(Type::command(16), &[100]);
+        ground.before_the_call(10);
+        assert_eq!(ground.waiting(), (1, 3), "now it is full");
+    }
+
+    #[test]
+    fn packages_for_a_silent_node_are_lost_in_the_next_slot_and_keep_nothing_up() {
+        let mut ground = Ground::new(10 * S);
+        ground.data(&[50; 5]);
+        ground.intake.open(50);
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (0, 0));
+        assert_eq!(ground.end.log.causes(), [Cause::Silent; 5]);
+    }
+}

@@ -33,10 +33,11 @@ use held::Held;
 use intake::Intake;
 use rohrpost_config::Network;
 use rohrpost_config::wire::HAND_OVER;
-use rohrpost_mailbox::monotonic_ns;
+use rohrpost_mailbox::{Name, monotonic_ns};
 use std::io::IoSlice;
 use std::net::IpAddr;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 
 /// It wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it wakes
@@ -70,6 +71,13 @@ pub(super) struct Refusal {
     pub(super) datagram: [u8; REFUSAL_BYTES],
 }
 
+/// Whose thread it is.
+#[derive(Clone, Copy)]
+pub(super) struct Own {
+    pub(super) router: Name,
+    pub(super) network: Network,
+}
+
 /// What the thread has.
 pub(super) struct Slots {
     shared: Arc<Shared>,
@@ -88,7 +96,7 @@ pub(super) struct Slots {
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
     held: Option<Held>,
-    network: Network,
+    own: Own,
     /// When the socket of time was read last, local ns.
     looked_ns: u64,
     /// The first datagram of the last window, if the kernel stamps it.
@@ -110,10 +118,10 @@ struct First {
 impl Slots {
     /// From what would send as packages come.
     pub(super) fn new(
+        own: Own,
         departures: Departures,
         works: Works,
         discipline: Discipline,
-        network: Network,
         socket: Arc<InSocket>,
         refusals: mpsc::Receiver<Refusal>,
     ) -> Self {
@@ -140,7 +148,7 @@ impl Slots {
             refusal: None,
             datagram,
             held: None,
-            network,
+            own,
             looked_ns: 0,
             first: None,
             snapshot,
@@ -192,6 +200,7 @@ impl Slots {
         self.drop_if_old();
         self.outbound.tidy(now_ns, &mut self.answers);
         self.intake.relieve(&mut self.outbound, &mut self.answers);
+        self.tell_tunnel();
         self.wire.deliver(now_ns);
         if silent || self.works.now_ns().saturating_sub(self.looked_ns) > self.discipline.table().cycle_ns() {
             self.look();
@@ -237,6 +246,7 @@ impl Slots {
         if permit.carries == Carries::All {
             self.refuse(&mut permit);
             self.send_packages(&mut permit);
+            self.tell_tunnel();
         }
         self.discipline.close(&permit);
         if permit.datagrams() > 0 {
@@ -307,6 +317,12 @@ impl Slots {
         }
     }
 
+    /// How much of its packets waits.
+    fn tell_tunnel(&self) {
+        let bytes = self.outbound.waiting_bytes_of(self.own.router);
+        self.shared.tunnel_bytes.store(bytes, Ordering::Relaxed);
+    }
+
     fn send_packages(&mut self, permit: &mut Permit) {
         self.drop_if_old();
         while let Some((to, bytes)) = self.next_datagram(permit) {
@@ -334,7 +350,7 @@ impl Slots {
     /// up what is, and is lost.
     fn missed(&mut self, to: NodeIndex, bytes: usize) {
         let datagram = &self.datagram[..bytes];
-        if held::is_real_time(datagram, &self.network) {
+        if held::is_real_time(datagram, &self.own.network) {
             self.held = Some(Held { to, bytes, made_ns: monotonic_ns() });
             self.snapshot.held += 1;
         } else {
