@@ -3,12 +3,20 @@
 use crate::palette;
 use crate::scene::{Scene, entity};
 use rerun::{Scalars, SeriesLines};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Classes in the order in which they came: it is their colour.
 #[derive(Default)]
 pub(crate) struct Charts {
     classes: HashMap<String, Class>,
+    drawn: HashSet<String>,
+}
+
+impl Charts {
+    /// Whether it is asked for the first time in this scene: then what never changes is to be drawn.
+    pub(crate) fn is_first(&mut self, what: &str) -> bool {
+        !self.drawn.contains(what) && self.drawn.insert(what.into())
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -49,7 +57,8 @@ impl Scene {
         self.charts.classes.entry(class.into()).or_insert(Class { index, flows: false, times: false })
     }
 
-    fn series(&mut self, parts: &[&str], name: &str, colour: palette::Rgb, width: f32) {
+    /// How a curve looks.
+    pub(crate) fn series(&mut self, parts: &[&str], name: &str, colour: palette::Rgb, width: f32) {
         let line = SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]);
         self.log_static(entity(parts), &line);
     }

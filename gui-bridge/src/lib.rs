@@ -29,6 +29,7 @@ mod palette;
 mod pen;
 mod scene;
 mod sink;
+mod slots;
 mod states;
 mod store;
 mod subjects;

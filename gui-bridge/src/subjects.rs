@@ -89,7 +89,14 @@ impl Subjects {
         }
         // With one node there are none.
         let routers = installation.nodes.iter().filter_map(|node| installation.router_of(&node.name));
-        for (router, data) in routers.flat_map(|router| [(router, "links"), (router, "clock")]) {
+        let told = [
+            ("links", true),
+            ("clock", true),
+            ("slots", installation.tdma.is_some()),
+            ("flows", !installation.flows.is_empty()),
+        ];
+        let told = told.iter().filter(|(_, is_there)| *is_there).map(|(data, _)| *data);
+        for (router, data) in routers.flat_map(|router| told.clone().map(move |data| (router, data))) {
             let (module, data) = (text(router), Some(data.into()));
             entries.push(Entry { from: router, module, data, rate: None, answered: false, asking: None });
         }

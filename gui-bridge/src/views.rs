@@ -3,6 +3,7 @@
 use crate::blueprint::Tab;
 use crate::network::{Clocks, Network};
 use crate::scene::{DrawError, Scene};
+use crate::slots::{Flows, Slots};
 use crate::states::Level;
 use crate::view::{Datum, View, Wish};
 use rohrpost::description::{DataItem, Description};
@@ -22,6 +23,8 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
         Box::new(Output),
         Box::new(Network::default()),
         Box::new(Clocks),
+        Box::new(Slots::default()),
+        Box::new(Flows),
         Box::new(Other),
     ]
 }

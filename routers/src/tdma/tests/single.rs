@@ -198,13 +198,17 @@ pub(super) fn what_was_handed_over_counts() {
     let Verdict::Send(mut permit) = verdict else { panic!("{verdict:?}") };
     // 350 µs: 4375 bytes. All are handed over at once, and the wire takes its time.
     assert!((349 * US..=350 * US).contains(&(planned.end_ns - planned.begin_ns)), "{planned:?}");
-    let mut datagrams = 0;
+    let (mut datagrams, wire_ns) = (0, 85_280);
+    let arrives_after_ns = permit.arrives_after_ns(permit.begin_ns, 1_000, 5 * US);
+    assert_eq!(arrives_after_ns, 5 * US + 2 * wire_ns, "to the wire, on it, and once more behind a switch");
     while permit.fits(one.now_ns, 1_000) {
         permit.takes(one.now_ns, 1_000);
         datagrams += 1;
         assert!(datagrams < 100, "it does not end");
     }
     assert_eq!(datagrams, 4, "of 1066 bytes each");
+    let arrives_after_ns = permit.arrives_after_ns(permit.begin_ns, 1_000, 5 * US);
+    assert!(arrives_after_ns >= 6 * wire_ns, "behind those: {arrives_after_ns}");
     assert!(permit.fits(one.now_ns, 40) && !permit.fits(planned.end_ns - 5 * US, 0), "nothing that ends in the guard");
     one.discipline.close(&permit);
     let counts = one.discipline.counts(&one.clock);
