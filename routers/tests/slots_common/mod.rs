@@ -143,8 +143,15 @@ impl Station {
             observer: None,
         };
         let name = router(self.own);
-        let parts =
-            Parts { node: &self.node, name, settings, faults: Arc::new(Silence), impair: None, clock: Some(clock) };
+        let parts = Parts {
+            node: &self.node,
+            name,
+            settings,
+            faults: Arc::new(Silence),
+            socket: None,
+            impair: None,
+            clock: Some(clock),
+        };
         self.shell = Some(Shell::start(parts).unwrap());
     }
 
