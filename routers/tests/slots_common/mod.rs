@@ -125,6 +125,7 @@ impl Station {
     fn start_here(&mut self) {
         self.settings.incarnation = self.settings.incarnation.max(realtime_ns()) + 1;
         let settings = self.settings.clone();
+        let is_true = self.skew == Skew { begin_ns: self.skew.begin_ns, ..Skew::default() };
         let clock = ClockParts {
             settings: TimeSettings {
                 system: 1,
@@ -136,7 +137,8 @@ impl Station {
                 incarnation: settings.incarnation,
             },
             nodes: (0..NODES).map(|node| SocketAddr::new(address(node), PORT + 1)).collect(),
-            node: Some(self.node.clone()),
+            // Readers of a page go by the true clock: a skewed one would seem to go back there.
+            node: is_true.then(|| self.node.clone()),
             impair: self.late,
             kernel_stamps: true,
             skew: Some(self.skew),
