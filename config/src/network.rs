@@ -180,10 +180,11 @@ pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(
             although: Vec::new(),
             settings: toml::Table::new(),
             start: Start::On,
-            // Without it the node is cut off, so it is never given up: no backoff is short enough for so many in a second.
+            // Without it the node is cut off, so it is never given up: pauses grow, so that so many in a second cannot be. The first is short,
+            // since what peers send meanwhile soon is too old.
             restart: Restart {
                 policy: RestartPolicy::Always,
-                backoff: Duration::from_millis(100),
+                backoff: Duration::from_millis(10),
                 at_most: 1000,
                 within: Duration::from_secs(1),
             },

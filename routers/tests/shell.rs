@@ -154,6 +154,7 @@ fn without_the_right_to_the_address_a_router_does_not_start_and_leaves_the_node_
         name: Name::new(1, 250, 0, 0),
         settings: side.settings.clone(),
         faults: std::sync::Arc::new(common::Words),
+        socket: None,
         impair: None,
         clock: None,
     };

@@ -1,107 +1,175 @@
-//! A router that sends in time slots is killed between two of them: what waits for the next is still there.
+//! The master of time slots dies, stands still or stumbles, as a process: the others go on in their slots and lose nothing.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
-#[path = "shell_common/mod.rs"]
+#[path = "slots_common/mod.rs"]
 mod common;
 
-use common::{PATIENCE, Pair, Side, label, module, router, turns};
-use rohrpost_config::{TRANSIT, Tdma};
-use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
-use std::net::IpAddr;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use common::process::{Router, be_a_router};
+use common::talk::{Ears, Mouth, mouths};
+use common::{Capture, MASTERS, Segment, assert_kept};
+use nix::sys::signal::Signal;
+use rohrpost_mailbox::monotonic_ns;
+use rohrpost_routers::link::State;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-const ROLE: &str = "ROHRPOST_TEST_ROUTER";
-const ROUNDS: u16 = 10;
-/// Fewer than what is taken from the mailbox so that it does not become full.
-const PACKAGES: u16 = 20;
-/// Long enough for a router that would take them from the mailbox as they come, short beside a cycle.
-const AWHILE: Duration = Duration::from_millis(8);
+/// What the processes run.
+const PROCESS: &str = "in_a_process_of_its_own";
+/// This node is in this process, and never master: it sees who is.
+const WITNESS: u8 = 2;
+/// A round of packages comes so much after the one before: a few in each cycle, at any moment of it.
+const PAUSE: Duration = Duration::from_micros(2300);
+/// Longer than a takeover takes, and than anything may be late.
+const FROZEN: Duration = Duration::from_millis(500);
+/// A stumble, and the time between two: at most half of the windows are met by one.
+const STUMBLE: Duration = Duration::from_millis(4);
+const BETWEEN: Duration = Duration::from_millis(9);
 
-/// A slot each, far apart.
-fn seldom() -> Tdma {
-    Tdma { cycle: Duration::from_millis(60), ..turns() }
+/// How often it stands still, or stumbles.
+const TIMES: u16 = 3;
+
+/// How often it is killed: for a long run, `ROHRPOST_KILLS=100 cargo test -p rohrpost-routers --test slots_killed`.
+fn kills() -> u16 {
+    std::env::var("ROHRPOST_KILLS").ok().map_or(5, |kills| kills.parse().unwrap())
 }
 
-/// The router of node 0, in a process of its own: until it is killed.
-#[test]
-fn role() {
-    let Ok(said) = std::env::var(ROLE) else { return };
-    let [folder, first, second, life] = said.split(' ').collect::<Vec<_>>().try_into().unwrap();
-    let addresses = [first, second].map(|address| address.parse::<IpAddr>().unwrap());
-    let mut side = Side::new(0, Node::open(folder.as_ref()).unwrap(), addresses, Some(seldom()));
-    side.settings.incarnation = life.parse().unwrap();
-    side.start();
-    loop {
-        std::thread::park();
+/// The masters' routers are processes.
+struct Scene {
+    routers: [Option<Router>; 2],
+    ears: Ears,
+    segment: Segment,
+}
+
+impl Scene {
+    fn new() -> Option<Self> {
+        let mut segment = Segment::at_rest(None)?;
+        // By its time frames are judged, so its clock is the true one.
+        segment.stations[usize::from(WITNESS)].skew = Default::default();
+        let Segment { stations, lab, .. } = &mut segment;
+        stations[usize::from(WITNESS)].start(lab);
+        let routers = MASTERS.map(|own| Some(Router::start(&segment, own, PROCESS)));
+        let scene = Self { routers, ears: Ears::new(&segment), segment };
+        scene.wait_until_all_send();
+        Some(scene)
+    }
+
+    /// From now on the witness hears each, and sends.
+    fn wait_until_all_send(&self) {
+        let since_ns = monotonic_ns();
+        self.segment.wait_until("all send", |segment| {
+            let witness = &segment.stations[usize::from(WITNESS)];
+            let stats = witness.shell().stats();
+            let is_heard = |own: &u8| {
+                let is_new = stats.peer(*own).link.heard_ns.get() > since_ns;
+                is_new && stats.state(*own, monotonic_ns()) == State::Alive
+            };
+            witness.slots().silent.is_none() && MASTERS.iter().all(is_heard)
+        });
+    }
+
+    fn router(&self, own: u8) -> &Router {
+        self.routers[usize::from(own)].as_ref().unwrap()
+    }
+
+    fn master(&self) -> u8 {
+        let master = || self.segment.stations[usize::from(WITNESS)].clock().master;
+        self.segment.wait_until("there is a master", |_| master().is_some());
+        master().unwrap()
+    }
+
+    /// Until the witness follows another one.
+    fn wait_for_another(&mut self, than: u8) {
+        self.segment.wait_until(&format!("another than {than} is master"), |segment| {
+            segment.stations[usize::from(WITNESS)].clock().master.is_some_and(|master| master != than)
+        });
+    }
+
+    /// So many rounds of packages.
+    fn talk(&mut self, mouths: &mut [Mouth], numbers: std::ops::Range<u16>) {
+        for id in numbers {
+            mouths.iter_mut().for_each(|mouth| mouth.say(id));
+            self.ears.listen();
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    /// Something happens to the master; who lives throughout loses nothing, and sends in its slots alone.
+    fn round(&mut self, what: &str, happens: impl FnOnce(&mut Self, u8), ends: impl FnOnce(&mut Self, u8)) {
+        let master = self.master();
+        let others = [MASTERS[0] + MASTERS[1] - master, WITNESS];
+        let time = self.segment.stations[usize::from(WITNESS)].clock().record;
+        let capture = Capture::start(&self.segment.lab);
+        let mut mouths_of_others = mouths(&self.segment, &others);
+        self.talk(&mut mouths_of_others, 0..20);
+        happens(self, master);
+        self.talk(&mut mouths_of_others, 20..120);
+        ends(self, master);
+        self.talk(&mut mouths_of_others, 120..160);
+        self.ears.hear_all(&others, &(0..160).collect::<Vec<_>>());
+        let crossed = capture.end();
+        assert_kept(what, &crossed, &time);
+    }
+
+    /// All nodes hear each other, and lose nothing.
+    fn all_talk(&mut self) {
+        self.wait_until_all_send();
+        let all = [MASTERS[0], MASTERS[1], WITNESS];
+        let mut mouths = mouths(&self.segment, &all);
+        self.talk(&mut mouths, 0..20);
+        self.ears.hear_all(&all, &(0..20).collect::<Vec<_>>());
     }
 }
 
-struct Killed(Child);
-
-impl Drop for Killed {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn start(side: &Side, life: u16) -> Killed {
-    let [first, second] = [0, 1].map(|node: usize| side.settings.nodes[node].address);
-    let said = format!("{} {first} {second} {}", side.node.path().display(), 1000 + u64::from(life));
-    let mut child = Command::new(std::env::current_exe().unwrap());
-    child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, said);
-    Killed(child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap())
-}
-
-/// The mailbox of node 0's router.
-fn transit() -> Name {
-    router(0).with_local(local::TRANSIT)
-}
-
-fn adopt(side: &Side) -> Receiver {
-    let shape = Shape {
-        slots: TRANSIT.slots,
-        body_bytes_max: TRANSIT.size as u16,
-        full: TRANSIT.full,
-        max_age: TRANSIT.max_age,
-        claims: TRANSIT.claims,
-    };
-    side.receiver(transit(), shape)
+#[test]
+fn in_a_process_of_its_own() {
+    be_a_router();
 }
 
 #[test]
-fn what_waits_for_a_slot_outlives_a_router_that_is_killed() {
-    let mut pair = Pair::with(Some(seldom()));
-    pair.sides[0].shell = None;
-    let there = Shape { slots: 256, ..Shape::default() };
-    let mut receiver = pair.sides[1].receiver(module(1), there);
-    let mut sender = pair.sides[0].sender(module(1));
-    let waiting = || pair.sides[0].node.look_at(transit()).map_or(0, |mailbox| mailbox.depth);
-    let mut kept = 0;
-    for round in 0..ROUNDS {
-        let killed = start(&pair.sides[0], round);
-        // Its slots have begun, and one has just taken what there was.
-        let began = Instant::now();
-        let mut hello = || {
-            let _ = sender.send(&label(module(0), 100, u16::MAX), &[b"hello"]);
-            receiver.receive_timeout(Duration::from_millis(100)).is_some()
+fn the_master_is_killed_again_and_again_and_the_others_lose_nothing() {
+    let Some(mut scene) = Scene::new() else { return };
+    let mut reigns = [0; 2];
+    for time in 0..kills() {
+        let kill = |scene: &mut Scene, master: u8| {
+            reigns[usize::from(master)] += 1;
+            scene.routers[usize::from(master)].take().unwrap().kill(&scene.segment, master);
         };
-        while !hello() || waiting() > 0 {
-            assert!(began.elapsed() < PATIENCE, "round {round}: nothing comes");
-        }
-        for id in 0..PACKAGES {
-            sender.send(&label(module(0), 100, id), &[b"waits for a slot"]).unwrap();
-        }
-        std::thread::sleep(AWHILE);
-        drop(killed);
-        let mut left = adopt(&pair.sides[0]);
-        let ids: Vec<_> = std::iter::from_fn(|| left.try_receive().map(|package| package.head().id)).collect();
-        // On a busy computer a slot may have come in between.
-        kept += u16::from(ids == (0..PACKAGES).collect::<Vec<_>>());
-        println!("round {round}: {} of {PACKAGES} left", ids.len());
-        while receiver.try_receive().is_some() {}
+        scene.round(&format!("killed, {time}"), kill, Scene::wait_for_another);
+        let dead = scene.routers.iter().position(Option::is_none).unwrap() as u8;
+        scene.routers[usize::from(dead)] = Some(Router::start(&scene.segment, dead, PROCESS));
+        scene.all_talk();
     }
-    assert!(kept * 2 >= ROUNDS, "all were kept in {kept} of {ROUNDS} rounds");
+    assert!(kills() < 2 || reigns.iter().all(|times| *times > 0), "each was master at a time: {reigns:?}");
+}
+
+#[test]
+fn a_master_that_stood_still_wakes_as_a_slave_and_sends_in_its_own_slots() {
+    let Some(mut scene) = Scene::new() else { return };
+    for time in 0..TIMES {
+        let freeze = |scene: &mut Scene, master: u8| scene.router(master).signal(Signal::SIGSTOP);
+        let wake = |scene: &mut Scene, master: u8| {
+            scene.wait_for_another(master);
+            std::thread::sleep(FROZEN);
+            scene.router(master).signal(Signal::SIGCONT);
+        };
+        scene.round(&format!("frozen, {time}"), freeze, wake);
+        scene.all_talk();
+    }
+}
+
+#[test]
+fn a_master_that_stumbles_disturbs_nobody() {
+    let Some(mut scene) = Scene::new() else { return };
+    for time in 0..TIMES {
+        let ends = Arc::new(AtomicBool::new(false));
+        let mut stumbles = None;
+        let begin = |scene: &mut Scene, master: u8| {
+            stumbles = Some(scene.router(master).stumble([STUMBLE, BETWEEN], ends.clone()));
+        };
+        scene.round(&format!("stumbles, {time}"), begin, |_, _| ends.store(true, Ordering::Relaxed));
+        stumbles.unwrap().join().unwrap();
+        scene.all_talk();
+    }
 }

@@ -5,8 +5,8 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
-use common::{Capture, Crossed, Judged, NODES, PATIENCE, Segment, judge, label};
-use rohrpost_mailbox::{Receiver, SendError, Sender};
+use common::talk::{Ears, mouths};
+use common::{Capture, NODES, PATIENCE, Segment, assert_kept, judge};
 use rohrpost_routers::frame::Kind;
 use rohrpost_routers::time::Role;
 use std::time::{Duration, Instant};
@@ -15,97 +15,6 @@ use std::time::{Duration, Instant};
 const ROUNDS: u16 = 150;
 /// A round comes so much after the one before: a few in each cycle, at any moment of it.
 const PAUSE: Duration = Duration::from_micros(2300);
-/// Of the frames, so many in a thousand may be outside of their sender's slots: the thread looks at the clock before each, and may lose
-/// its processor between that and the system call. TDMA.md found 0.03 % to 0.5 % of wake-ups that late on a computer that works.
-const OUTSIDE_PER_THOUSAND: usize = 10;
-
-struct Mouth {
-    from: u8,
-    to: u8,
-    sender: Sender,
-}
-
-impl Mouth {
-    /// Says a number; if the router's mailbox is full just now, a little later.
-    fn say(&mut self, id: u16) {
-        let began = Instant::now();
-        loop {
-            match self.sender.send(&label(self.from, 100, id), &[&id.to_le_bytes()]) {
-                Ok(()) => return,
-                Err(SendError::Full(_)) => std::thread::sleep(Duration::from_micros(100)),
-                Err(error) => panic!("{} to {}: {error}", self.from, self.to),
-            }
-            assert!(began.elapsed() < PATIENCE, "{} to {}: {id}", self.from, self.to);
-        }
-    }
-}
-
-fn mouths(segment: &Segment, nodes: &[u8]) -> Vec<Mouth> {
-    let pairs = nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to)));
-    let mouth = |(from, to): (u8, u8)| Mouth { from, to, sender: segment.stations[usize::from(from)].sender(to) };
-    pairs.filter(|(from, to)| from != to).map(mouth).collect()
-}
-
-/// What each node has heard of each, in order.
-struct Ears {
-    receivers: Vec<Receiver>,
-    heard: Vec<Vec<Vec<u16>>>,
-}
-
-impl Ears {
-    fn new(segment: &Segment) -> Self {
-        Self {
-            receivers: segment.stations.iter().map(|station| station.receiver()).collect(),
-            heard: vec![vec![Vec::new(); NODES.into()]; NODES.into()],
-        }
-    }
-
-    fn listen(&mut self) {
-        for (receiver, heard) in self.receivers.iter_mut().zip(&mut self.heard) {
-            while let Some(package) = receiver.try_receive() {
-                heard[usize::from(package.head().from.instance())].push(package.head().id);
-            }
-        }
-    }
-
-    /// Waits until all these numbers have come from each of the nodes to each other.
-    fn hear_all(&mut self, nodes: &[u8], numbers: &[u16]) {
-        let began = Instant::now();
-        for (from, to) in nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to))) {
-            while from != to && self.heard[usize::from(to)][usize::from(from)] != numbers {
-                assert!(
-                    began.elapsed() < PATIENCE,
-                    "{from} to {to}: {:?}",
-                    self.heard[usize::from(to)][usize::from(from)]
-                );
-                std::thread::sleep(Duration::from_millis(1));
-                self.listen();
-            }
-        }
-        self.heard.iter_mut().flatten().for_each(Vec::clear);
-    }
-}
-
-fn tell(what: &str, judged: &Judged) {
-    let at = |per_thousand: usize| judged.starts_ns[(judged.starts_ns.len() - 1) * per_thousand / 1000] as f64 / 1e3;
-    println!(
-        "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us after their nominal time",
-        judged.frames,
-        judged.outside.len(),
-        at(10),
-        at(500),
-        at(990),
-        at(999)
-    );
-}
-
-fn assert_kept(what: &str, crossed: &[Crossed], time: &rohrpost_mailbox::TimeRecord) {
-    let judged = judge(crossed, time);
-    tell(what, &judged);
-    assert!(judged.frames > 100, "{judged:?}");
-    assert!(judged.outside.len() * 1000 <= judged.frames * OUTSIDE_PER_THOUSAND, "{what}: {judged:?}");
-}
-
 #[test]
 fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
     let Some(mut segment) = Segment::start() else { return };

@@ -1,6 +1,7 @@
 //! `rohrpost launch`: the modules of a node, with a live table.
 
 mod all;
+mod sockets;
 
 use super::Failure;
 use super::manager::Manager;
@@ -76,7 +77,8 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
     let mut manager = Manager::from_environment(|warning| speech.complain(warning));
     manager.starting(&node);
-    let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
+    let sockets = sockets::of(installation.clone(), node.clone());
+    let mut launch = Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, sockets)?;
     manager.ready(&launch);
     let mut view = View::new(arguments.quiet, speech);
     view.began(&launch, &node);

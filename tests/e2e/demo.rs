@@ -95,29 +95,6 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
     assert!(said.contains("say --nodes 3"), "{said}");
 }
 
-/// The router of the master dies in the middle of it.
-#[test]
-fn when_the_master_dies_it_tells_the_takeover() {
-    let place = Place::new();
-    let arguments = ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "--kill-master"];
-    let said = place.say(&arguments);
-    if lacks_namespaces(&said.err) {
-        return;
-    }
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let said = said.out;
-    for words in
-        ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
-    {
-        assert!(said.contains(words), "no `{words}`:\n{said}");
-    }
-    assert!(said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"), "{said}");
-    let flows = said.split("from end to end").nth(1).unwrap();
-    let mut rows = flows.lines().filter(|line| line.contains(" → "));
-    assert!(rows.any(|row| row.starts_with("laser.0 → pilot.0") && row.contains("data")), "{said}");
-    place.assert_empty();
-}
-
 #[test]
 fn it_ends_by_itself_after_the_time_that_was_given() {
     let place = Place::new();

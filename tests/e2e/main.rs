@@ -39,6 +39,7 @@ mod restart;
 mod screen;
 mod start;
 mod subscribe;
+mod takeover;
 mod terminal;
 mod tools;
 mod tools_data;

@@ -14,7 +14,6 @@ use rohrpost_config::{Installation, Module, Restart, Start};
 use rohrpost_mailbox::{ModuleState, Name, Node};
 use std::io;
 use std::os::unix::process::ExitStatusExt;
-use std::path::Path;
 use std::process::{Child as Process, ExitStatus};
 use std::time::{Duration, Instant};
 
@@ -104,12 +103,12 @@ pub(super) struct Child {
 }
 
 impl Child {
-    pub(super) fn new(module: &Module, installation: &Installation, executable: &Path, relay: &Relay) -> Self {
+    pub(super) fn new(module: &Module, installation: &Installation, program: Program, relay: &Relay) -> Self {
         let configured_on = module.start == Start::On;
         Self {
             name: module.name,
             text: installation.classes.format(module.name),
-            program: Program::new(module, installation, executable),
+            program,
             policy: Policy::new(module.restart),
             turn_on: configured_on,
             was_on: false,

@@ -42,7 +42,8 @@ use child::Child;
 use end::Ending;
 use events::Bell;
 use look::Looks;
-use rohrpost_config::{Installation, Node as NodeConfig, TimeSource as ConfiguredTime};
+use program::Program;
+use rohrpost_config::{Installation, Module, Node as NodeConfig, TimeSource as ConfiguredTime};
 use rohrpost_mailbox::{
     LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
     wait_any,
@@ -50,6 +51,7 @@ use rohrpost_mailbox::{
 use serve::{Counter, Orders};
 use std::io::ErrorKind;
 use std::ops::Range;
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -67,7 +69,7 @@ const LET_GO: Duration = Duration::from_secs(1);
 const NOTES_MAX: usize = 1000;
 
 /// A router that was started again so often, and is not ready, is not going to be.
-const ROUTER_RESTARTS_MAX: u32 = 5;
+const ROUTER_RESTARTS_MAX: u32 = 8;
 
 /// A node that somebody else removes just now is taken at the next try, or the next but one.
 const TAKE_MAX: usize = 20;
@@ -118,6 +120,21 @@ impl Launch {
         executable: PathBuf,
         events: Receiver<Event>,
     ) -> Result<Self, LaunchError> {
+        Self::begin_keeping(installation, node_name, executable, events, |_| None)
+    }
+
+    /// The same, and it keeps what `keep` gives for a module: a socket, say. Each process of that module has it as its standard input
+    /// ([`kept`](crate::runtime::kept)), so what waits in it outlives them.
+    ///
+    /// # Errors
+    /// As for [`Launch::begin`].
+    pub fn begin_keeping(
+        installation: Arc<Installation>,
+        node_name: &str,
+        executable: PathBuf,
+        events: Receiver<Event>,
+        keep: impl Fn(&Module) -> Option<OwnedFd>,
+    ) -> Result<Self, LaunchError> {
         let beside = executable.parent().map(PathBuf::from).unwrap_or_default();
         let missing = installation.missing_programs(node_name, &beside);
         let fatal: Vec<String> = missing.iter().filter(|p| !p.optional).map(ToString::to_string).collect();
@@ -137,7 +154,10 @@ impl Launch {
         let children: Vec<Child> = installation
             .modules_on(node_name)
             .filter(|module| missing.iter().all(|program| program.module != module.name))
-            .map(|module| Child::new(module, &installation, &executable, &relay))
+            .map(|module| {
+                let program = Program::new(module, &installation, &executable, keep(module));
+                Child::new(module, &installation, program, &relay)
+            })
             .collect();
         // It holds launch's place on the node, which is to be given back if the start fails.
         drop(relay);

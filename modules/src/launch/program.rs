@@ -3,6 +3,7 @@
 use crate::runtime::environment;
 use rohrpost_config::{Installation, Module, Program as Configured, find_program};
 use std::io::{self, PipeWriter};
+use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -15,11 +16,13 @@ pub(super) struct Program {
     config: PathBuf,
     /// The module's name.
     module: String,
+    /// The standard input of all its processes, one after the other; none: there is nothing to read.
+    kept: Option<OwnedFd>,
 }
 
 impl Program {
     /// `executable` is the `rohrpost` command, which holds the built-in modules.
-    pub(super) fn new(module: &Module, installation: &Installation, executable: &Path) -> Self {
+    pub(super) fn new(module: &Module, installation: &Installation, executable: &Path, kept: Option<OwnedFd>) -> Self {
         let beside = executable.parent().unwrap_or(Path::new("."));
         let (path, arguments) = match &module.program {
             Configured::Builtin(name) if !module.is_in_file() => (executable.to_owned(), vec![name.clone()]),
@@ -31,7 +34,7 @@ impl Program {
             }
         };
         let config = installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone());
-        Self { path, arguments, config, module: installation.classes.format(module.name) }
+        Self { path, arguments, config, module: installation.classes.format(module.name), kept }
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -44,6 +47,10 @@ impl Program {
         if !on {
             command.env(environment::OFF, "1");
         }
+        match &self.kept {
+            Some(kept) => command.env(environment::KEPT, "1").stdin(kept.try_clone()?),
+            None => command.env_remove(environment::KEPT).stdin(Stdio::null()),
+        };
         // Launch alone speaks to the service manager.
         for variable in ["NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "JOURNAL_STREAM"] {
             command.env_remove(variable);
@@ -54,7 +61,6 @@ impl Program {
             .env(environment::MODULE, &self.module)
             .env(environment::LAUNCHER, std::process::id().to_string())
             .env(environment::RESTARTS, restarts.to_string())
-            .stdin(Stdio::null())
             .stdout(stdout)
             .stderr(stderr)
             .process_group(0)

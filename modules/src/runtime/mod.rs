@@ -25,4 +25,4 @@ pub use host::{ClientError, ToolLink, describe};
 pub use runner::{exit, run, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;
-pub use start::{Start, StartError, find_other_versions, find_running};
+pub use start::{Start, StartError, find_other_versions, find_running, kept};

@@ -34,7 +34,7 @@ pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
 pub use news::difference;
-pub use socket::SocketError;
+pub use socket::{SocketError, listen};
 
 use crate::impair;
 use crate::inbound::Inbound;
@@ -51,6 +51,7 @@ use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotoni
 use slots::Slots;
 use socket::InSocket;
 use std::io;
+use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -90,6 +91,8 @@ pub struct Parts<'a> {
     pub settings: Settings,
     /// How commands are answered that cannot be delivered.
     pub faults: Arc<dyn Faults>,
+    /// Its socket, if that is kept for it ([`listen`]); else it makes its own.
+    pub socket: Option<OwnedFd>,
     /// A bad network between it and its sockets.
     pub impair: Option<impair::Settings>,
     /// Its clock; none unless time comes from a master.
@@ -118,14 +121,18 @@ impl Shell {
     /// # Errors
     /// [`ShellError`]
     pub fn start(parts: Parts<'_>) -> Result<Self, ShellError> {
-        let Parts { node, name, mut settings, faults, impair, clock } = parts;
+        let Parts { node, name, mut settings, faults, socket, impair, clock } = parts;
         let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
         if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
             // What comes through the tunnel comes from the router, and is not to share the quota of those whom nobody knows.
             settings.senders.push(vec![name]);
         }
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
-        let socket = Arc::new(InSocket::open(own)?);
+        let socket = match socket {
+            Some(kept) => InSocket::kept(kept, own),
+            None => InSocket::open(own),
+        };
+        let socket = Arc::new(socket?);
         if socket.receive_bytes < InSocket::WANTED_BYTES {
             tracing::debug!(
                 "{} bytes may wait in the socket; raise net.core.rmem_max to {} for bursts (`sysctl`)",

@@ -11,7 +11,7 @@ use rohrpost_mailbox::realtime_ns;
 use socket2::{Domain, Protocol, SockRef, Socket, Type};
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::{IpAddr, Shutdown, SocketAddr, UdpSocket};
-use std::os::fd::AsRawFd;
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -45,6 +45,9 @@ pub enum SocketError {
          configuration (`ip addr` shows which there are)"
     )]
     NotHere(SocketAddr),
+    /// What was kept for the router is not its socket.
+    #[error("the socket that was handed to this router is bound to {1}, and not to {0}; launch the node anew")]
+    Strange(SocketAddr, String),
     /// The system says no for another reason.
     #[error("{1} for {0}: {2}")]
     Io(SocketAddr, &'static str, io::Error),
@@ -68,11 +71,22 @@ pub(super) enum Received {
     Closed,
 }
 
+/// The socket of a node's router, for who keeps it while routers come and go ([`Parts::socket`](super::Parts)). What peers send meanwhile waits in
+/// the kernel, with the time at which it came; what has waited for too long is not delivered.
+///
+/// # Errors
+/// [`SocketError`]
+pub fn listen(own: SocketAddr) -> Result<OwnedFd, SocketError> {
+    InSocket::open(own).map(|inside| inside.socket.into())
+}
+
 /// Takes datagrams from all peers.
 pub(super) struct InSocket {
     socket: UdpSocket,
     port: u16,
     closed: AtomicBool,
+    /// Another process has it too, and keeps it for who comes after.
+    is_kept: bool,
     /// What may wait in the kernel, bytes; less than asked for if the system's limit is lower.
     pub(super) receive_bytes: usize,
 }
@@ -83,8 +97,24 @@ impl InSocket {
 
     /// Binds the node's own address and port. Not shared with anybody: two routers of one node would each get some datagrams.
     pub(super) fn open(own: SocketAddr) -> Result<Self, SocketError> {
+        let socket = new_socket(own).map_err(|error| SocketError::Io(own, "making a socket", error))?;
+        bind(&socket, own)?;
+        Self::of(socket, own, false)
+    }
+
+    /// A socket that is kept for all routers of this node, one after the other: see [`listen`].
+    pub(super) fn kept(socket: OwnedFd, own: SocketAddr) -> Result<Self, SocketError> {
+        let socket = Socket::from(socket);
+        let bound =
+            socket.local_addr().map_err(|error| SocketError::Io(own, "looking at the socket that is kept", error))?;
+        match bound.as_socket() {
+            Some(bound) if bound == own => Self::of(socket, own, true),
+            bound => Err(SocketError::Strange(own, bound.map_or("nothing".into(), |bound| bound.to_string()))),
+        }
+    }
+
+    fn of(socket: Socket, own: SocketAddr, is_kept: bool) -> Result<Self, SocketError> {
         let failed = |what| move |error: io::Error| SocketError::Io(own, what, error);
-        let socket = new_socket(own).map_err(failed("making a socket"))?;
         if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
             // Without the right to go beyond the limit, up to the limit.
             socket.set_recv_buffer_size(RECEIVE_BYTES).map_err(failed("SO_RCVBUF"))?;
@@ -93,8 +123,7 @@ impl InSocket {
         let receive_bytes = socket.recv_buffer_size().map_err(failed("SO_RCVBUF"))? / 2;
         setsockopt(&socket, sockopt::ReceiveTimestampns, &true).map_err(|e| failed("SO_TIMESTAMPNS")(e.into()))?;
         socket.set_read_timeout(Some(LISTEN)).map_err(failed("SO_RCVTIMEO"))?;
-        bind(&socket, own)?;
-        Ok(Self { socket: socket.into(), port: own.port(), closed: AtomicBool::new(false), receive_bytes })
+        Ok(Self { socket: socket.into(), port: own.port(), closed: AtomicBool::new(false), is_kept, receive_bytes })
     }
 
     /// Reads the next datagram; blocks until there is one, or for [`LISTEN`].
@@ -132,9 +161,13 @@ impl InSocket {
         let _ = self.socket.send_to(datagram, (to, self.port));
     }
 
-    /// Ends the reading, also of a thread that blocks in it.
+    /// Ends the reading, also of a thread that blocks in it; of a socket that is kept, after [`LISTEN`].
     pub(super) fn close(&self) {
         self.closed.store(true, Ordering::Release);
+        if self.is_kept {
+            // It would be shut down for those who come after as well.
+            return;
+        }
         // An unconnected socket answers that it is not connected, and wakes its readers all the same.
         let _ = SockRef::from(&self.socket).shutdown(Shutdown::Both);
     }
@@ -280,6 +313,30 @@ mod tests {
         inside.close();
         reader.join().unwrap();
         assert_eq!(inside.receive(&mut [0; 10]), Received::Closed, "and any other");
+    }
+
+    #[test]
+    fn what_comes_while_nobody_reads_a_kept_socket_waits_for_the_next_one() {
+        let at = SocketAddr::new(ONE, free_port(ONE));
+        let keeper = listen(at).unwrap();
+        let mut sender = OutSocket::new(OTHER, at);
+        let mut datagram = [0; 10];
+        for life in 0..3_u8 {
+            sender.send(&[IoSlice::new(&[life])]).unwrap();
+            std::thread::sleep(Duration::from_millis(2));
+            let inside = InSocket::kept(keeper.try_clone().unwrap(), at).unwrap();
+            let Received::Datagram { bytes: 1, waited_ns, .. } = inside.receive(&mut datagram) else { panic!() };
+            assert_eq!(datagram[0], life);
+            assert!(waited_ns >= 2_000_000, "the kernel says how long: {waited_ns}");
+            inside.close();
+            assert_eq!(inside.receive(&mut datagram), Received::Closed);
+        }
+        let elsewhere = SocketAddr::new(ONE, free_port(ONE));
+        let error = InSocket::kept(keeper, elsewhere).err().unwrap();
+        assert!(
+            matches!(error, SocketError::Strange(..)) && error.to_string().contains("launch the node anew"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -100,7 +100,7 @@ impl Side {
         self.settings.incarnation += 1;
         let name = router(self.settings.own);
         let (settings, faults, clock) = (self.settings.clone(), Arc::new(Words), self.clock());
-        let parts = Parts { node: &self.node, name, settings, faults, impair: None, clock };
+        let parts = Parts { node: &self.node, name, settings, faults, socket: None, impair: None, clock };
         self.shell = Some(Shell::start(parts).unwrap());
     }
 

@@ -11,7 +11,7 @@ use rohrpost::config::Network;
 use rohrpost::interfaces::{Router, RouterInterface};
 use rohrpost::mailbox::realtime_ns;
 use rohrpost::{Context, Module, ModuleError, Start};
-use rohrpost_modules::runtime::{exit, run_started};
+use rohrpost_modules::runtime::{exit, kept, run_started};
 use rohrpost_routers::impair;
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::shell::clock::ClockParts;
@@ -64,7 +64,8 @@ impl Module for RouterModule {
         let faults = Arc::new(faults::Encoded::new(settings.digest));
         let node = context.link().borrow().participant().node().clone();
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
-        let shell = Shell::start(Parts { node: &node, name: context.me(), settings, faults, impair, clock })?;
+        let (name, socket) = (context.me(), kept());
+        let shell = Shell::start(Parts { node: &node, name, settings, faults, socket, impair, clock })?;
         context.set_period(PERIOD);
         Ok(Self { shell })
     }

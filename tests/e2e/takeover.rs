@@ -1,0 +1,111 @@
+//! The demo in time slots, whose master's router is killed: what is told of it, and that nothing of a declared flow is lost.
+
+use crate::harness::{Place, Robot, lacks_namespaces, signal, wait};
+use crate::process::Running;
+use nix::sys::signal::Signal;
+use rohrpost::common::GET_DATA;
+use rohrpost::interface::DataPort;
+use rohrpost::interfaces::RouterInterface;
+use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::value::Data;
+use std::path::Path;
+use std::time::Duration;
+
+const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo-tdma.toml");
+const NODES: [&str; 3] = ["base", "brain", "desk"];
+/// Modules here answer within this time.
+const SOON: Duration = Duration::from_secs(2);
+/// A router that lives for so long is started again without a longer pause.
+const SETTLED_MS: u64 = 1200;
+
+/// How often the master is killed: for a long run, `ROHRPOST_KILLS=100 cargo test --test e2e takeover`.
+fn kills() -> usize {
+    std::env::var("ROHRPOST_KILLS").ok().map_or(3, |kills| kills.parse().unwrap())
+}
+
+/// Numbers in the last column of the flows' table that are not 0, with their rows.
+fn lost(said: &str) -> Vec<&str> {
+    let flows = said.split("from end to end").nth(1).unwrap_or_else(|| panic!("no flows:\n{said}"));
+    let rows: Vec<&str> = flows.lines().skip(3).take_while(|line| !line.is_empty()).collect();
+    assert!(rows.iter().any(|row| row.starts_with("laser.0 → pilot.0") && row.contains("data")), "{said}");
+    assert!(rows.iter().any(|row| row.starts_with("pilot.0 → motor.0") && row.contains("commands")), "{said}");
+    rows.into_iter().filter(|row| !row.trim_end().ends_with(" 0")).collect()
+}
+
+/// What the router of a node says of itself, if it answers.
+fn said<T: Data>(robot: &Robot, router: &str, port: DataPort<T>) -> Option<T> {
+    let mut tool = robot.tool(SOON);
+    let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
+    let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
+    let said = tool.call(robot.name(router), GET_DATA, RouterInterface::hash(), ask, read);
+    tool.close();
+    said.ok().map(|(_, said)| said)
+}
+
+/// The node that all take for the master, once they know the time and no router was started a moment ago.
+fn settled(robots: &[Robot; 3]) -> Option<usize> {
+    let mut masters = Vec::new();
+    for (robot, index) in robots.iter().zip(0..) {
+        let router = format!("router.{index}");
+        let clock = said(robot, &router, RouterInterface::CLOCK)?;
+        let links = said(robot, &router, RouterInterface::LINKS)?;
+        masters.push(clock.error_ns.filter(|_| links.uptime_ms > SETTLED_MS).map(|_| clock.master)?);
+    }
+    masters.dedup();
+    NODES.iter().position(|node| masters == [*node])
+}
+
+#[test]
+fn killed_again_and_again_the_master_costs_no_package_of_a_declared_flow() {
+    let place = Place::new();
+    let demo = ["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet"];
+    let mut demo = Running::start(place.command(&demo));
+    wait("all nodes run, or cannot", || {
+        let all = NODES.iter().all(|node| demo.out().contains(&format!("node {node} of demo-tdma runs")));
+        (all || demo.ended().is_some()).then_some(())
+    });
+    if lacks_namespaces(&demo.err()) {
+        return;
+    }
+    let robots = NODES.map(|node| place.robot_at(Path::new(CONFIG), node));
+    for _ in 0..kills() {
+        let master = wait("one master", || settled(&robots));
+        let (robot, router) = (&robots[master], format!("router.{master}"));
+        let pid = robot.pid(&router);
+        signal(pid, Signal::SIGKILL);
+        robot.wait_restarted(&router, pid);
+    }
+    wait("one master at the end", || settled(&robots));
+    drop(robots);
+    let said = demo.stop();
+    let events = said.lines().filter(|line| line.contains("not by this command); there again ")).count();
+    assert_eq!(events, kills(), "{said}");
+    assert_eq!(said.lines().filter(|line| line.contains("It was the master. ")).count(), kills(), "{said}");
+    assert!(said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"), "{said}");
+    println!(
+        "{}",
+        said.lines().filter(|line| line.contains(" → ") || line.contains("there again")).collect::<Vec<_>>().join("\n")
+    );
+    assert_eq!(lost(&said), [""; 0], "{said}");
+    place.assert_empty();
+}
+
+#[test]
+fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
+    let place = Place::new();
+    let arguments = ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "--kill-master"];
+    let said = place.say(&arguments);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let said = said.out;
+    for words in
+        ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
+    {
+        assert!(said.contains(words), "no `{words}`:\n{said}");
+    }
+    assert!(said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"), "{said}");
+    assert_eq!(lost(&said), [""; 0], "{said}");
+    place.assert_empty();
+}
