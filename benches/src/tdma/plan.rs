@@ -82,16 +82,16 @@ impl Plan {
             .map_err(|error| Failure::of("configuration", error))
     }
 
-    /// The slots, as somebody reads them who has none.
+    /// The slots, as a node reads them.
     ///
     /// # Errors
     /// As [`Self::installation`].
-    pub fn table(&self) -> Result<Table, Failure> {
+    pub fn table(&self, own: u8) -> Result<Table, Failure> {
         let installation = self.installation()?;
-        let settings = Settings::new(&installation, &Place::Node(0).name(), 1)
+        let settings = Settings::new(&installation, &Place::Node(own).name(), 1)
             .map_err(|error| Failure::of("configuration", error))?;
         let tdma = installation.tdma.as_ref().ok_or_else(|| Failure::Failed("a plan without slots".into()))?;
-        Ok(Table::new(tdma, installation.time.masters(), 0, NODES, settings.overhead_bytes()))
+        Ok(Table::new(tdma, installation.time.masters(), own, NODES, settings.overhead_bytes()))
     }
 
     /// The configuration.
@@ -162,7 +162,7 @@ masters = [{masters}]
                 let to = (node + hop) % NODES;
                 text += &module(class, node, &format!("calls = [\"ear.{to}\"]\n"));
                 text += &format!(
-                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = {bytes}\nperiod = \"{period_us} us\"\n"
+                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = \"{bytes} B\"\nperiod = \"{period_us} us\"\n"
                 );
             }
         }

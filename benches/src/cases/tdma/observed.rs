@@ -71,7 +71,7 @@ impl Observed {
             return Err(Failure::Failed(format!("the kernel schedules slots as `{}`", counts.scheduled)));
         }
         Ok(Self {
-            kept: Kept::of(&frames, &plan.table()?, &time),
+            kept: Kept::of(&frames, &plan.table(0)?, &time),
             steal_percent: machine_after.steal_percent(&machine),
             waited_ms_s: machine_after.waited_ms(&machine) / watched(settings).as_secs_f64(),
             counts,
