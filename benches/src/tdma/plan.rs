@@ -148,16 +148,16 @@ masters = [{masters}]
 
     /// Nobody launches them: processes of the bench are them.
     fn modules(&self) -> String {
-        let module = |class: &str, node: u8, calls: &str| {
+        let module = |class: &str, node: u8, more: &str| {
             let at = Place::Node(node).name();
             format!(
-                "[[module]]\nname = \"{class}.{node}\"\nnode = \"{at}\"\nprogram = \"{class}\"\noptional = true\n{calls}"
+                "[[module]]\nname = \"{class}.{node}\"\nnode = \"{at}\"\nprogram = \"{class}\"\noptional = true\n{more}"
             )
         };
         let mut text = String::new();
         for node in 0..NODES {
             text += &module("flood", node, "");
-            text += &module("ear", node, "");
+            text += &module("ear", node, "[module.mailbox.commands]\nsize = \"8 KiB\"\n");
             for Declared { class: (_, class), hop, bytes, period_us } in self.flows {
                 let to = (node + hop) % NODES;
                 text += &module(class, node, &format!("calls = [\"ear.{to}\"]\n"));

@@ -65,10 +65,10 @@ pub fn kill_master(
     routers.kill(dead);
     await_reign(capture, first, dead, cycle, &mut pages)?;
     let frames = capture.since(first);
+    let last = frames.iter().rposition(|frame| frame.what == What::Sync && frame.from == dead).unwrap_or_default();
     let cycles_until = |is: &[What]| {
-        let last = frames.iter().rfind(|frame| frame.what == What::Sync && frame.from == dead)?;
-        let next = frames.iter().find(|frame| frame.from != dead && is.contains(&frame.what));
-        Some((next?.at_ns - last.at_ns) as f64 / cycle.as_nanos() as f64)
+        let next = frames[last..].iter().find(|frame| frame.from != dead && is.contains(&frame.what))?;
+        Some((next.at_ns - frames[last].at_ns) as f64 / cycle.as_nanos() as f64)
     };
     let never = || Failure::Failed("nobody synchronised in a dead master's place".into());
     let looked_at = killed_ns..killed_ns + (cycle * CYCLES).as_nanos() as u64;

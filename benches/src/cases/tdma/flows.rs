@@ -12,6 +12,7 @@ use crate::statistics::{Summary, median};
 use crate::tdma::capture::{Arrived, Capture};
 use crate::tdma::kept::Kept;
 use crate::tdma::machine::Machine;
+use crate::tdma::plan::Declared;
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
 use crate::tdma::stage::Stage;
@@ -87,9 +88,9 @@ fn steal_in_windows(all: Duration) -> Vec<f64> {
     windows
 }
 
-/// A flow of a node, by the class and the node of its sender.
+/// A flow of each node: their bounds are the same, since their slots are.
 struct Measured {
-    name: String,
+    name: &'static str,
     bound_us: f64,
     latencies_us: Vec<f64>,
 }
@@ -97,16 +98,18 @@ struct Measured {
 fn measured(turns: &[Watched]) -> Result<Vec<Measured>, Failure> {
     let installation = FLOWS.installation()?;
     let bounds = rohrpost_config::bounds(&installation);
-    let of = |bound: &rohrpost_config::FlowBound| {
-        let flow = &installation.flows[bound.flow];
-        let name = installation.classes.format(flow.from);
-        let latency = bound.latency.map_err(|why| Failure::of(&name, why))?.latency;
-        let arrivals = turns.iter().flat_map(|turn| &turn.arrivals);
-        let own = arrivals.filter(|came| (came.class, came.from) == (flow.from.class().0, flow.from.instance()));
-        let latencies_us = own.map(|came| came.at_ns.saturating_sub(came.published_ns) as f64 / 1000.0).collect();
-        Ok(Measured { name, bound_us: latency.as_nanos() as f64 / 1000.0, latencies_us })
+    let of = |Declared { class: (class, name), .. }: &Declared| {
+        let own = bounds.iter().filter(|bound| installation.flows[bound.flow].from.class() == *class);
+        let mut bound_us: f64 = 0.0;
+        for bound in own {
+            let latency = bound.latency.map_err(|why| Failure::of(name, why))?.latency;
+            bound_us = bound_us.max(latency.as_nanos() as f64 / 1000.0);
+        }
+        let came = turns.iter().flat_map(|turn| &turn.arrivals).filter(|came| came.class == class.0);
+        let latencies_us = came.map(|came| came.at_ns.saturating_sub(came.published_ns) as f64 / 1000.0).collect();
+        Ok(Measured { name, bound_us, latencies_us })
     };
-    bounds.iter().map(of).collect()
+    FLOWS.flows.iter().map(of).collect()
 }
 
 fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
