@@ -100,8 +100,9 @@ impl Member {
         } else {
             Skew { begin_ns: monotonic_ns(), offset_ns: u64::from(own) * SKEW.offset_ns, ..SKEW }
         };
-        let clock =
-            ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { skew: Some(skew), ..parts });
+        // A page is written and read by this computer's clock, which is another than the node's here: so nobody writes it.
+        let clock = ClockParts::new(&settings, installation, &node);
+        let clock = clock.map(|parts| ClockParts { skew: Some(skew), node: None, ..parts });
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);
         let shell = Shell::start(Parts { node: &node, name, settings, faults: Arc::new(Silence), impair: None, clock });
         let shell = shell.map_err(|error| Failure::of("router", error))?;
