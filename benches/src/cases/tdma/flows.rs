@@ -5,7 +5,7 @@ use super::goals::{Goal, figure, spread};
 use super::observed::{ALL, watched};
 use super::plans::FLOWS;
 use crate::cases::Case;
-use crate::harness::{Failure, alone};
+use crate::harness::{Failure, alone, rest};
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
 use crate::statistics::{Summary, median};
@@ -68,7 +68,7 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
     let time = routers.clock(0)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;
     let (first, before) = (capture.len(), routers.machine());
     let talkers = Talkers::start(&routers, &FLOWS)?;
-    let windows = steal_in_windows(watched(settings));
+    let windows = steal_in_windows(watched(settings))?;
     let waited_ms_s = routers.machine().waited_ms(&before) / watched(settings).as_secs_f64();
     let talked = talkers.end()?;
     capture.check()?;
@@ -77,15 +77,15 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
 }
 
 /// Sleeps for so long; what the hypervisor took in each window of it, percent.
-fn steal_in_windows(all: Duration) -> Vec<f64> {
+fn steal_in_windows(all: Duration) -> Result<Vec<f64>, Failure> {
     let over = Instant::now() + all;
     let mut windows = Vec::new();
     while Instant::now() < over {
         let before = Machine::look(&[]);
-        std::thread::sleep(WINDOW);
+        rest(WINDOW)?;
         windows.push(Machine::look(&[]).steal_percent(&before));
     }
-    windows
+    Ok(windows)
 }
 
 /// A flow of each node: their bounds are the same, since their slots are.
@@ -152,7 +152,7 @@ fn steal_rows(turns: &[Watched]) -> Vec<Row> {
     let waited: Vec<f64> = turns.iter().map(|turn| turn.waited_ms_s).collect();
     let mut rows = figure(&subject("flows, seconds with steal", "%"), "all", &[share], &STOLEN);
     rows.extend(spread(&subject("flows, steal in these", "%"), "all", stolen_from));
-    rows.extend(figure(&subject("flows, run delay", "ms/s"), "all", &median(waited).as_slice(), &[]));
+    rows.extend(figure(&subject("flows, run delay", "ms/s"), "all", median(waited).as_slice(), &[]));
     rows
 }
 

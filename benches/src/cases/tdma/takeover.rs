@@ -4,7 +4,7 @@ use super::goals::{Goal, figure, spread};
 use super::observed::ALL;
 use super::plans::LOADED;
 use crate::cases::Case;
-use crate::harness::{Failure, alone};
+use crate::harness::{Failure, alone, rest};
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
 use crate::tdma::capture::Capture;
@@ -80,7 +80,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
         found.killed.push(taken_over);
     }
     let first = capture.len();
-    std::thread::sleep(quiet);
+    rest(quiet)?;
     capture.check()?;
     found.false_changes += changes_of_master(&capture.since(first));
     found.quiet_cycles += quiet.as_micros() as f64 / LOADED.cycle_us as f64;
