@@ -83,6 +83,12 @@ pub struct Row {
 }
 
 impl Row {
+    /// What is compared with nothing.
+    pub fn alone(subject: Subject, who: &'static str, result: Result<Summary, Failure>) -> Self {
+        let Subject { case, bytes, unit } = subject;
+        Self { case, bytes, who, unit, result, versus: None, ratio_p50: None, ratio_p99: None }
+    }
+
     /// Whether every target is met; none where there is no target, or where what it is compared with was skipped.
     pub fn met(&self) -> Option<bool> {
         let versus = self.versus?;

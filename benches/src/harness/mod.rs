@@ -11,7 +11,7 @@ mod shared;
 
 pub use alone::{Alone, alone};
 pub use child::Child;
-pub use interrupt::{heed, interrupted};
+pub use interrupt::{heed, interrupted, rest};
 #[cfg(feature = "peers")]
 pub use ping_pong::time_two_threads;
 pub use ping_pong::{Cell, End, Link, Meetings, check_echo, fill, ping, pong, time_two_processes};

@@ -1,11 +1,13 @@
 //! What routers say of their slots, by `rohrpost net`, as a user would ask.
 
 use super::stage::{NODES, Place};
-use crate::Failure;
+use crate::harness::{Failure, interrupted};
 use serde::Deserialize;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::process::{Child, Command, Stdio};
+
+/// On a busy computer an answer may take longer than a tool waits.
+const TRIES: usize = 5;
 
 /// Data `slots` of a router, as far as it matters here. Counts only grow.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -34,25 +36,16 @@ impl Counts {
     /// Of each node; asked on the node itself, so that nothing of it crosses the network.
     ///
     /// # Errors
-    /// When a router does not answer.
+    /// When a router does not answer, also not when it is asked again.
     pub fn ask(command: &Path, config: &Path, scratch: &Path) -> Result<Vec<Self>, Failure> {
-        let ask = |node| {
-            let mut asked = Command::new(command);
-            asked.args(["net", "--json", "--node", &Place::Node(node).name(), "--config"]).arg(config);
-            asked.env("ROHRPOST_DIR", scratch).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-            asked.spawn().map_err(|error| Failure::of("rohrpost net", error))
-        };
-        let asked = (0..NODES).map(ask).collect::<Result<Vec<_>, Failure>>()?;
-        let answer = |child: std::process::Child| {
-            let output = child.wait_with_output().map_err(|error| Failure::of("rohrpost net", error))?;
-            let said = || format!("rohrpost net: {}", String::from_utf8_lossy(&output.stderr));
-            // It fails if a peer is silent, which is no concern of ours.
-            let told: Vec<Told> =
-                serde_json::from_slice(&output.stdout).map_err(|error| Failure::of(&said(), error))?;
-            let told = told.into_iter().next().ok_or_else(|| Failure::Failed(said()))?;
-            told.slots.ok_or_else(|| Failure::Failed(told.failure.unwrap_or_else(said)))
-        };
-        asked.into_iter().map(answer).collect()
+        let mut answers = ask_all(command, config, scratch);
+        for _ in 1..TRIES {
+            if answers.is_ok() || interrupted() {
+                break;
+            }
+            answers = ask_all(command, config, scratch);
+        }
+        answers
     }
 
     /// What has happened since `before`, on all nodes.
@@ -81,8 +74,27 @@ impl Counts {
     }
 }
 
-/// Routers tell how they are twice a second: after this, what they tell is of what is measured.
-pub const TOLD_EACH: Duration = Duration::from_millis(500);
+fn ask_all(command: &Path, config: &Path, scratch: &Path) -> Result<Vec<Counts>, Failure> {
+    let ask = |node| {
+        let mut asked = Command::new(command);
+        asked.args(["net", "--json", "--node", &Place::Node(node).name(), "--config"]).arg(config);
+        asked.env("ROHRPOST_DIR", scratch).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        asked.spawn().map_err(|error| Failure::of("rohrpost net", error))
+    };
+    // All at the same time.
+    let asked = (0..NODES).map(ask).collect::<Result<Vec<_>, Failure>>()?;
+    let answers: Vec<Result<Counts, Failure>> = asked.into_iter().map(answer).collect();
+    answers.into_iter().collect()
+}
+
+fn answer(asked: Child) -> Result<Counts, Failure> {
+    let output = asked.wait_with_output().map_err(|error| Failure::of("rohrpost net", error))?;
+    let said = || format!("rohrpost net: {}", String::from_utf8_lossy(&output.stderr));
+    // It fails if a peer is silent, which is no concern of ours.
+    let told: Vec<Told> = serde_json::from_slice(&output.stdout).map_err(|error| Failure::of(&said(), error))?;
+    let told = told.into_iter().next().ok_or_else(|| Failure::Failed(said()))?;
+    told.slots.ok_or_else(|| Failure::Failed(told.failure.unwrap_or_else(said)))
+}
 
 #[cfg(test)]
 mod tests {

@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn first_frames_count_and_what_is_in_anothers_slot_is_told() {
         // Two windows of 500 us, then slots of 430 us, 150 of which are guard; a cycle is 5 ms.
-        let table = plans::LOADED.table().unwrap();
+        let table = plans::LOADED.table(0).unwrap();
         let cycles = [(0, 1_010), (0, 1_130), (1, 1_440), (0, 6_012), (1, 6_440), (0, 11_310), (1, 11_440)];
         let kept = Kept::of(&frames(&cycles), &table, &TIME);
         // Of node 0: 10, 12 and 310 us late, so 2, 0 and 298 us off the median.

@@ -20,4 +20,6 @@ pub mod rights;
 pub mod routers;
 pub mod shells;
 pub mod stage;
+pub mod takeover;
+pub mod talkers;
 pub mod traffic;

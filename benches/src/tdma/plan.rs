@@ -82,16 +82,16 @@ impl Plan {
             .map_err(|error| Failure::of("configuration", error))
     }
 
-    /// The slots, as somebody reads them who has none.
+    /// The slots, as a node reads them.
     ///
     /// # Errors
     /// As [`Self::installation`].
-    pub fn table(&self) -> Result<Table, Failure> {
+    pub fn table(&self, own: u8) -> Result<Table, Failure> {
         let installation = self.installation()?;
-        let settings = Settings::new(&installation, &Place::Node(0).name(), 1)
+        let settings = Settings::new(&installation, &Place::Node(own).name(), 1)
             .map_err(|error| Failure::of("configuration", error))?;
         let tdma = installation.tdma.as_ref().ok_or_else(|| Failure::Failed("a plan without slots".into()))?;
-        Ok(Table::new(tdma, installation.time.masters(), 0, NODES, settings.overhead_bytes()))
+        Ok(Table::new(tdma, installation.time.masters(), own, NODES, settings.overhead_bytes()))
     }
 
     /// The configuration.
@@ -148,21 +148,21 @@ masters = [{masters}]
 
     /// Nobody launches them: processes of the bench are them.
     fn modules(&self) -> String {
-        let module = |class: &str, node: u8, calls: &str| {
+        let module = |class: &str, node: u8, more: &str| {
             let at = Place::Node(node).name();
             format!(
-                "[[module]]\nname = \"{class}.{node}\"\nnode = \"{at}\"\nprogram = \"{class}\"\noptional = true\n{calls}"
+                "[[module]]\nname = \"{class}.{node}\"\nnode = \"{at}\"\nprogram = \"{class}\"\noptional = true\n{more}"
             )
         };
         let mut text = String::new();
         for node in 0..NODES {
             text += &module("flood", node, "");
-            text += &module("ear", node, "");
+            text += &module("ear", node, "[module.mailbox.commands]\nsize = \"8 KiB\"\n");
             for Declared { class: (_, class), hop, bytes, period_us } in self.flows {
                 let to = (node + hop) % NODES;
                 text += &module(class, node, &format!("calls = [\"ear.{to}\"]\n"));
                 text += &format!(
-                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = {bytes}\nperiod = \"{period_us} us\"\n"
+                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = \"{bytes} B\"\nperiod = \"{period_us} us\"\n"
                 );
             }
         }

@@ -7,7 +7,7 @@ use crate::harness::Scratch;
 use crate::lan::router::{ROUTER, SYSTEM};
 use crate::lan::skewed::{SKEW, Shown};
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Name, Node, SystemClock, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{Name, Node, monotonic_ns, realtime_ns};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
@@ -29,10 +29,9 @@ impl Faults for Silence {
     }
 }
 
-/// One node: how wrong its clock is, its page, and its router while it runs.
+/// One node: how wrong its clock is, and its router while it runs.
 struct Member {
     skew: Skew,
-    page: SystemClock,
     shell: Option<Shell>,
 }
 
@@ -69,21 +68,22 @@ impl Shells {
         Ok(())
     }
 
-    /// Ends the routers of these nodes; their pages stay.
+    /// Ends the routers of these nodes.
     pub fn end(&mut self, nodes: std::ops::Range<u8>) {
         for member in &mut self.members[usize::from(nodes.start)..usize::from(nodes.end)] {
             member.shell = None;
         }
     }
 
-    /// What the page of a node shows.
+    /// What a node has for its page of time.
     ///
     /// # Errors
-    /// When it shows nothing.
+    /// When its router has ended.
     pub fn shown(&self, node: u8) -> Result<Shown, Failure> {
-        let Member { skew, page, .. } = &self.members[usize::from(node)];
-        let record = page.record().ok_or_else(|| Failure::Failed(format!("node {node} shows no time")))?;
-        Ok(Shown { record, skew: *skew })
+        let Member { skew, shell } = &self.members[usize::from(node)];
+        let clock = shell.as_ref().and_then(Shell::clock);
+        let clock = clock.ok_or_else(|| Failure::Failed(format!("node {node} shows no time")))?;
+        Ok(Shown { record: clock.snapshot().record, skew: *skew })
     }
 }
 
@@ -100,12 +100,13 @@ impl Member {
         } else {
             Skew { begin_ns: monotonic_ns(), offset_ns: u64::from(own) * SKEW.offset_ns, ..SKEW }
         };
-        let clock =
-            ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { skew: Some(skew), ..parts });
+        // A page is written and read by this computer's clock, which is another than the node's here: so nobody writes it.
+        let clock = ClockParts::new(&settings, installation, &node);
+        let clock = clock.map(|parts| ClockParts { skew: Some(skew), node: None, ..parts });
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);
         let shell = Shell::start(Parts { node: &node, name, settings, faults: Arc::new(Silence), impair: None, clock });
         let shell = shell.map_err(|error| Failure::of("router", error))?;
-        Ok(Self { skew, page: SystemClock::open(&node), shell: Some(shell) })
+        Ok(Self { skew, shell: Some(shell) })
     }
 
     fn is_settled(&self) -> bool {

@@ -29,15 +29,17 @@ impl Traffic {
         let all = u32::from(NODES) + 1;
         let feeder = |node: u8| {
             Child::start(|| {
-                let mut sink = Sink::open(&routers.directory(node), flood(node), BYTES)?;
-                let to = flood((node + 1) % NODES);
-                let mut source = Source::open(&routers.directory(node), flood(node), to)?;
+                let (directory, to) = (routers.directory(node), flood((node + 1) % NODES));
+                let mut sink = Sink::open(&directory, flood(node), BYTES)?;
+                let mut source = Source::open(&directory, flood(node), to)?;
                 ready.meet(all)?;
                 let package = [7; BYTES];
                 loop {
                     sink.drain();
-                    for _ in 0..BURST {
-                        source.offer(&package)?;
+                    let offered = (0..BURST).try_for_each(|_| source.offer(&package).map(drop));
+                    // Its router is gone, and perhaps there again.
+                    if let (Err(_), Ok(again)) = (offered, Source::open(&directory, flood(node), to)) {
+                        source = again;
                     }
                     std::thread::sleep(EACH);
                 }

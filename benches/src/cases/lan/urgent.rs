@@ -24,6 +24,7 @@ use crate::lan::flow::Outlet;
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
+use crate::statistics::Summary;
 use rohrpost_mailbox::sys;
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -200,16 +201,8 @@ fn flood_rows(case: &str, floods: &[Flooded]) -> Vec<Row> {
     // What the router's mailbox took, and what arrived.
     let row = |who, rate: fn(&Flooded) -> f64| {
         let median = crate::statistics::median(floods.iter().map(rate))?;
-        Some(Row {
-            case: case.into(),
-            bytes: Some(FLOOD_BYTES),
-            who,
-            unit: "packages/s",
-            result: Ok(crate::statistics::Summary::single(median)),
-            versus: None,
-            ratio_p50: None,
-            ratio_p99: None,
-        })
+        let subject = Subject { case: case.into(), bytes: Some(FLOOD_BYTES), unit: "packages/s" };
+        Some(Row::alone(subject, who, Ok(Summary::single(median))))
     };
     [row("flood, taken", |flood| flood.sent), row("flood, arrived", |flood| flood.received)]
         .into_iter()

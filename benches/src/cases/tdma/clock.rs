@@ -34,7 +34,8 @@ const SLAVE: u8 = 2;
 const SILENT_FOR: Duration = Duration::from_secs(1);
 const SILENCES: usize = 5;
 /// So long clocks measure before: what they know of their pace is of that time.
-const MEASURES: Duration = Duration::from_secs(5);
+const MEASURES: Duration = Duration::from_secs(10);
+const MEASURES_QUICK: Duration = Duration::from_millis(500);
 
 const MUST: (&str, Summary) = ("2, 5, 15 us", Summary { p50: 2.0, p99: Some(5.0), p999: None, max: Some(15.0) });
 const HOPED: (&str, Summary) = ("0.5, 1.5, 3 us", Summary { p50: 0.5, p99: Some(1.5), p999: None, max: Some(3.0) });
@@ -108,6 +109,10 @@ fn subject(case: &str) -> Subject {
     Subject { case: case.into(), bytes: None, unit: "us" }
 }
 
+fn measures(settings: &Settings) -> Duration {
+    if settings.quick { MEASURES_QUICK } else { MEASURES }
+}
+
 /// How far off the slaves were at any moment.
 fn errors_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
@@ -115,6 +120,7 @@ fn errors_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
     sample_in_child(PATIENCE, |samples| {
         let shells = Shells::start(stage, &LOADED, &scratch)?;
         shells.await_settled()?;
+        std::thread::sleep(measures(settings));
         for _ in 0..settings.count(SAMPLES) {
             std::thread::sleep(EACH);
             for slave in 1..NODES {
@@ -127,13 +133,13 @@ fn errors_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
 
 /// How far off a slave was a second after all masters had fallen silent, several times.
 fn off_after_silence_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
-    let (silences, measures) = if settings.quick { (1, Duration::ZERO) } else { (SILENCES, MEASURES) };
+    let silences = if settings.quick { 1 } else { SILENCES };
     let scratches = (0..silences).map(|_| Scratch::new()).collect::<Result<Vec<_>, Failure>>()?;
     sample_in_child(PATIENCE, |samples| {
         for scratch in &scratches {
             let mut shells = Shells::start(stage, &LOADED, scratch)?;
             shells.await_settled()?;
-            std::thread::sleep(measures);
+            std::thread::sleep(measures(settings));
             let master = shells.shown(0)?;
             shells.end(MASTERS);
             std::thread::sleep(SILENT_FOR);

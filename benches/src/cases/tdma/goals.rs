@@ -17,18 +17,15 @@ pub(super) fn figure(subject: &Subject, who: &'static str, rounds: &[f64], goals
     let Some(middle) = median(rounds.iter().copied()) else { return Vec::new() };
     let row = |goal: Option<&Goal>| {
         let ratio = goal.and_then(|goal| Ratio::of(rounds.iter().map(|value| value / base(goal))));
-        Row {
-            case: subject.case.clone(),
-            bytes: subject.bytes,
-            who,
-            unit: subject.unit,
-            result: Ok(Summary::single(middle)),
-            versus: goal.map(|goal| Versus { name: goal.name, p50: Some(target(goal)), p99: None }),
-            ratio_p50: ratio,
-            ratio_p99: None,
-        }
+        let versus = goal.map(|goal| Versus { name: goal.name, p50: Some(target(goal)), p99: None });
+        Row { versus, ratio_p50: ratio, ..Row::alone(subject.clone(), who, Ok(Summary::single(middle))) }
     };
     if goals.is_empty() { vec![row(None)] } else { goals.iter().map(Some).map(row).collect() }
+}
+
+/// Many figures of all rounds, for information. None without any.
+pub(super) fn spread(subject: &Subject, who: &'static str, mut samples: Vec<f64>) -> Option<Row> {
+    Some(Row::alone(subject.clone(), who, Ok(Summary::of(&mut samples)?)))
 }
 
 /// What the ratio is taken to: where nothing at all is allowed, one.

@@ -3,15 +3,20 @@
 mod brisk;
 mod clock;
 mod contest;
+mod flows;
 mod goals;
 mod observed;
 mod pitch;
 pub mod plans;
 mod slots;
+mod takeover;
 
 use super::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [slots::cases(), brisk::cases(), pitch::cases(), clock::cases()].into_iter().flatten().collect()
+    [slots::cases(), brisk::cases(), pitch::cases(), clock::cases(), takeover::cases(), flows::cases()]
+        .into_iter()
+        .flatten()
+        .collect()
 }

@@ -14,7 +14,7 @@ use crate::tdma::plan::Plan;
 use crate::tdma::rights::Rights;
 
 const INTO_GUARD: Figure =
-    Figure { what: "into the guard", unit: "us", of: |seen| seen.kept.into_guard_us, goals: &[] };
+    Figure { what: "into the guard", unit: "us in", of: |seen| seen.kept.into_guard_us, goals: &[] };
 
 /// Of the first table: RTnet's pitch with what guard that leaves.
 const PITCH: [Goal; 2] = [Goal { name: "must 250 us", most: 250.0 }, Goal { name: "hoped 200 us", most: 200.0 }];

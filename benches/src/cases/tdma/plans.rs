@@ -1,6 +1,7 @@
 //! The slot tables of the cases.
 
-use crate::tdma::plan::Plan;
+use crate::tdma::plan::{Declared, Plan};
+use rohrpost_mailbox::Class;
 
 /// RTnet's own cycle; slots that have room for a datagram of 1400 B for sure, on an ordinary link.
 pub const LOADED: Plan = Plan {
@@ -24,3 +25,11 @@ pub const SHORTEST_PITCH: Plan = Plan { pitch_us: 210, guard_us: 40, ..WIDE_GUAR
 
 /// The shortest cycle: one master, and slots of the same kind.
 pub const BRISK: Plan = Plan { cycle_us: 1_000, synchronisation_us: 210, masters: 1, ..SHORT_PITCH };
+
+/// Slots with room for several packages: what is declared fits, and what floods has what is left.
+pub const FLOWS: Plan = Plan { pitch_us: 1_300, flows: &[URGENT, STEADY, BULKY], ..LOADED };
+
+const URGENT: Declared = Declared { class: (Class(200), "urgent"), hop: 1, bytes: 64, period_us: 9_000 };
+const STEADY: Declared = Declared { class: (Class(160), "steady"), hop: 2, bytes: 1_000, period_us: 19_000 };
+/// In five parts.
+const BULKY: Declared = Declared { class: (Class(130), "bulky"), hop: 1, bytes: 6_000, period_us: 49_000 };

@@ -1,0 +1,161 @@
+//! Declared flows, while every node floods with a lower class: how late their packages are, beside the bounds that `rohrpost check` computes
+//! for this very configuration.
+
+use super::goals::{Goal, figure, spread};
+use super::observed::{ALL, watched};
+use super::plans::FLOWS;
+use crate::cases::Case;
+use crate::harness::{Failure, alone, rest};
+use crate::rounds::{Row, Subject};
+use crate::settings::Settings;
+use crate::statistics::{Summary, median};
+use crate::tdma::capture::{Arrived, Capture};
+use crate::tdma::kept::Kept;
+use crate::tdma::machine::Machine;
+use crate::tdma::plan::Declared;
+use crate::tdma::rights::Rights;
+use crate::tdma::routers::Routers;
+use crate::tdma::stage::Stage;
+use crate::tdma::talkers::{Talked, Talkers};
+use crate::tdma::traffic::Traffic;
+use std::time::{Duration, Instant};
+
+/// Parts of a turn in which it is looked whether the hypervisor took time away.
+const WINDOW: Duration = Duration::from_secs(1);
+const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
+const NOT_VACUOUS: [Goal; 1] = [Goal { name: "must 3 times", most: 3.0 }];
+const NONE: [Goal; 1] = [Goal { name: "must none", most: 0.0 }];
+const STOLEN: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
+
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    vec![Box::new(Flows)]
+}
+
+struct Flows;
+
+/// One turn.
+struct Watched {
+    arrivals: Vec<Arrived>,
+    kept: Kept,
+    talked: Talked,
+    /// Steal in each window, percent.
+    windows: Vec<f64>,
+    waited_ms_s: f64,
+}
+
+impl Case for Flows {
+    fn name(&self) -> String {
+        "flows".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let turn = |_| {
+            let _alone = alone()?;
+            watch(&Stage::new()?, settings)
+        };
+        match (0..settings.rounds.max(1)).map(turn).collect::<Result<Vec<_>, Failure>>() {
+            Ok(turns) => rows(&turns),
+            Err(failure) => Ok(vec![Row::alone(subject("flows", "us"), "all", Err(failure))]),
+        }
+    }
+}
+
+fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
+    let routers = Routers::start(stage, &FLOWS, Rights::RealTime, settings)?;
+    let mut capture = Capture::start(stage)?;
+    let _traffic = Traffic::start(&routers)?;
+    routers.await_packages(&ALL, &mut capture)?;
+    let time = routers.clock(0)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;
+    let (first, before) = (capture.len(), routers.machine());
+    let talkers = Talkers::start(&routers, &FLOWS)?;
+    let windows = steal_in_windows(watched(settings))?;
+    let waited_ms_s = routers.machine().waited_ms(&before) / watched(settings).as_secs_f64();
+    let talked = talkers.end()?;
+    capture.check()?;
+    let kept = Kept::of(&capture.since(first), &FLOWS.table(0)?, &time);
+    Ok(Watched { arrivals: capture.arrivals(), kept, talked, windows, waited_ms_s })
+}
+
+/// Sleeps for so long; what the hypervisor took in each window of it, percent.
+fn steal_in_windows(all: Duration) -> Result<Vec<f64>, Failure> {
+    let over = Instant::now() + all;
+    let mut windows = Vec::new();
+    while Instant::now() < over {
+        let before = Machine::look(&[]);
+        rest(WINDOW)?;
+        windows.push(Machine::look(&[]).steal_percent(&before));
+    }
+    Ok(windows)
+}
+
+/// A flow of each node: their bounds are the same, since their slots are.
+struct Measured {
+    name: &'static str,
+    bound_us: f64,
+    latencies_us: Vec<f64>,
+}
+
+fn measured(turns: &[Watched]) -> Result<Vec<Measured>, Failure> {
+    let installation = FLOWS.installation()?;
+    let bounds = rohrpost_config::bounds(&installation);
+    let of = |Declared { class: (class, name), .. }: &Declared| {
+        let own = bounds.iter().filter(|bound| installation.flows[bound.flow].from.class() == *class);
+        let mut bound_us: f64 = 0.0;
+        for bound in own {
+            let latency = bound.latency.map_err(|why| Failure::of(name, why))?.latency;
+            bound_us = bound_us.max(latency.as_nanos() as f64 / 1000.0);
+        }
+        let came = turns.iter().flat_map(|turn| &turn.arrivals).filter(|came| came.class == class.0);
+        let latencies_us = came.map(|came| came.at_ns.saturating_sub(came.published_ns) as f64 / 1000.0).collect();
+        Ok(Measured { name, bound_us, latencies_us })
+    };
+    FLOWS.flows.iter().map(of).collect()
+}
+
+fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
+    let mut off_us: Vec<f64> = turns.iter().flat_map(|turn| turn.kept.off_us.iter().copied()).collect();
+    let wake_up_us = Summary::of(&mut off_us).and_then(|summary| summary.p999).unwrap_or_default();
+    let mut rows = Vec::new();
+    for Measured { name, bound_us, mut latencies_us } in measured(turns)? {
+        let case = format!("flows, {name}");
+        let Some(p999_us) = Summary::of(&mut latencies_us).and_then(|summary| summary.p999) else {
+            let failure = Failure::Failed("nothing of it came".into());
+            rows.push(Row::alone(subject(&case, "us"), "measured", Err(failure)));
+            continue;
+        };
+        rows.extend(spread(&subject(&case, "us"), "measured", latencies_us));
+        rows.extend(figure(&subject(&case, "us"), "bound", &[bound_us], &[]));
+        let within = p999_us / (bound_us + wake_up_us);
+        rows.extend(figure(
+            &subject(&format!("{case}, p99.9"), "of bound and wake-up"),
+            "measured",
+            &[within],
+            &WITHIN,
+        ));
+        let vacuous = bound_us / p999_us;
+        rows.extend(figure(&subject(&format!("{case}, bound"), "of p99.9"), "bound", &[vacuous], &NOT_VACUOUS));
+    }
+    let published: u64 = turns.iter().map(|turn| turn.talked.published).sum();
+    let lost = published - turns.iter().map(|turn| turn.talked.taken).sum::<u64>().min(published);
+    rows.extend(figure(&subject("flows, lost", "packages"), "all", &[lost as f64], &NONE));
+    rows.extend(figure(&subject("flows, published", "packages"), "all", &[published as f64], &[]));
+    rows.extend(figure(&subject("flows, wake-up p99.9", "us"), "all", &[wake_up_us], &[]));
+    rows.extend(steal_rows(turns));
+    Ok(rows)
+}
+
+/// Windows of a second in which the hypervisor took something, and how much.
+fn steal_rows(turns: &[Watched]) -> Vec<Row> {
+    let windows: Vec<f64> = turns.iter().flat_map(|turn| turn.windows.iter().copied()).collect();
+    let stolen_from: Vec<f64> = windows.iter().copied().filter(|percent| *percent > 0.0).collect();
+    let share = stolen_from.len() as f64 * 100.0 / windows.len().max(1) as f64;
+    let waited: Vec<f64> = turns.iter().map(|turn| turn.waited_ms_s).collect();
+    let mut rows = figure(&subject("flows, seconds with steal", "%"), "all", &[share], &STOLEN);
+    rows.extend(spread(&subject("flows, steal in these", "%"), "all", stolen_from));
+    rows.extend(figure(&subject("flows, run delay", "ms/s"), "all", median(waited).as_slice(), &[]));
+    rows
+}
+
+fn subject(case: &str, unit: &'static str) -> Subject {
+    Subject { case: case.into(), bytes: None, unit }
+}

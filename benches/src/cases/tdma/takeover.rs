@@ -1,0 +1,121 @@
+//! The master is killed, again and again, while all nodes send; and then it is left alone for long, and must remain it.
+
+use super::goals::{Goal, figure, spread};
+use super::observed::ALL;
+use super::plans::LOADED;
+use crate::cases::Case;
+use crate::harness::{Failure, alone, rest};
+use crate::rounds::{Row, Subject};
+use crate::settings::Settings;
+use crate::tdma::capture::Capture;
+use crate::tdma::rights::Rights;
+use crate::tdma::routers::Routers;
+use crate::tdma::stage::Stage;
+use crate::tdma::takeover::{TakenOver, changes_of_master, kill_master};
+use crate::tdma::traffic::Traffic;
+use std::time::Duration;
+
+/// In each round.
+const KILLS: usize = 10;
+const KILLS_QUICK: usize = 2;
+/// In each round: 100 000 cycles in five.
+const QUIET: Duration = Duration::from_secs(100);
+const QUIET_QUICK: Duration = Duration::from_secs(1);
+/// The pace at which the moment of killing goes through the cycle.
+const GOLDEN: f64 = 0.618_034;
+
+/// Who dies. Each time the other takes its place and keeps it, so they die in turns. Only a later one in the order of masters stands in for
+/// a silent master in the same cycle: its window lies behind.
+const DEAD: [&str; 2] = ["the first dies", "the second dies"];
+
+const REPLACED: [Goal; 2] = [Goal { name: "must 2 cycles", most: 2.0 }, Goal { name: "hoped 1, and 1 ms", most: 1.2 }];
+const REIGNS: [Goal; 2] = [Goal { name: "must 4 cycles", most: 4.0 }, Goal { name: "hoped 3, and 1 ms", most: 3.2 }];
+const LOST: [Goal; 1] = [Goal { name: "hoped none", most: 0.0 }];
+const STEP: [Goal; 1] = [Goal { name: "hoped 5 us", most: 5.0 }];
+const FALSE: [Goal; 2] = [Goal { name: "must 1", most: 1.0 }, Goal { name: "hoped none", most: 0.0 }];
+
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    vec![Box::new(Takeover)]
+}
+
+struct Takeover;
+
+/// Of all rounds.
+#[derive(Default)]
+struct Found {
+    killed: Vec<TakenOver>,
+    quiet_cycles: f64,
+    false_changes: usize,
+}
+
+impl Case for Takeover {
+    fn name(&self) -> String {
+        "takeover".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let mut found = Found::default();
+        let watched = (0..settings.rounds.max(1)).try_for_each(|_| {
+            let _alone = alone()?;
+            watch(&Stage::new()?, settings, &mut found)
+        });
+        Ok(match watched {
+            Ok(()) => found.rows(),
+            Err(failure) => vec![Row::alone(subject("takeover", "cycles"), "all", Err(failure))],
+        })
+    }
+}
+
+fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Failure> {
+    let (kills, quiet) = if settings.quick { (KILLS_QUICK, QUIET_QUICK) } else { (KILLS, QUIET) };
+    let mut routers = Routers::start(stage, &LOADED, Rights::RealTime, settings)?;
+    let mut capture = Capture::start(stage)?;
+    let _traffic = Traffic::start(&routers)?;
+    routers.await_packages(&ALL, &mut capture)?;
+    for kill in 0..kills {
+        let taken_over = kill_master(&mut routers, &mut capture, &LOADED, (kill as f64 * GOLDEN).fract())?;
+        routers.start_again(taken_over.dead)?;
+        // One that comes back listens, follows, and sends again.
+        routers.await_packages(&ALL, &mut capture)?;
+        found.killed.push(taken_over);
+    }
+    let first = capture.len();
+    rest(quiet)?;
+    capture.check()?;
+    found.false_changes += changes_of_master(&capture.since(first));
+    found.quiet_cycles += quiet.as_micros() as f64 / LOADED.cycle_us as f64;
+    Ok(())
+}
+
+impl Found {
+    /// What became of it when this node was the master.
+    fn killed(&self, who: &'static str, dead: u8) -> Vec<Row> {
+        let kills: Vec<&TakenOver> = self.killed.iter().filter(|kill| kill.dead == dead).collect();
+        let mut rows = Vec::new();
+        let mut told = |what: &str, unit, goals: &[Goal], of: fn(&TakenOver) -> f64| {
+            let all: Vec<f64> = kills.iter().map(|kill| of(kill)).collect();
+            let worst = all.iter().copied().reduce(f64::max);
+            rows.extend(spread(&subject(&format!("takeover, {what}"), unit), who, all));
+            rows.extend(figure(&subject(&format!("takeover, {what}, worst"), unit), who, worst.as_slice(), goals));
+        };
+        told("replacement", "cycles", &REPLACED, |kill| kill.replaced_cycles);
+        told("new master", "cycles", &REIGNS, |kill| kill.reigns_cycles);
+        told("slots lost", "slots", &LOST, |kill| kill.slots_lost as f64);
+        told("time step", "us", &STEP, |kill| kill.step_us);
+        rows
+    }
+
+    fn rows(&self) -> Vec<Row> {
+        let mut rows: Vec<Row> = DEAD.iter().zip(0..).flat_map(|(who, dead)| self.killed(who, dead)).collect();
+        let cycles = self.quiet_cycles;
+        let changes = self.false_changes as f64 * 1e5 / cycles;
+        rows.extend(figure(&subject("takeover, false changes", "in 1e5 cycles"), "quiet", &[changes], &FALSE));
+        rows.extend(figure(&subject("takeover, quiet", "cycles"), "quiet", &[cycles], &[]));
+        rows.extend(figure(&subject("takeover, kills", "kills"), "all", &[self.killed.len() as f64], &[]));
+        rows
+    }
+}
+
+fn subject(case: &str, unit: &'static str) -> Subject {
+    Subject { case: case.into(), bytes: None, unit }
+}

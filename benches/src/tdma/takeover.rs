@@ -1,0 +1,153 @@
+//! A master that is killed, and what others do about it, as the capture and their pages show it.
+
+use super::capture::{Capture, Crossed, What};
+use super::plan::Plan;
+use super::routers::Routers;
+use super::stage::NODES;
+use crate::Failure;
+use crate::harness::interrupted;
+use rohrpost_mailbox::{SystemClock, TimeRecord, monotonic_ns};
+use rohrpost_routers::tdma::{Kind, Table, Window};
+use std::collections::HashSet;
+use std::time::{Duration, Instant};
+
+/// So many cycles before and behind it are looked at.
+const CYCLES: u32 = 20;
+const TAKEN_OVER_WITHIN: Duration = Duration::from_secs(10);
+/// How often pages are read meanwhile.
+const LOOK_EACH: Duration = Duration::from_micros(500);
+
+/// What became of it.
+#[derive(Clone, Copy, Debug)]
+pub struct TakenOver {
+    /// Who was killed.
+    pub dead: u8,
+    /// From the last synchronisation of the old master to the first one in its place, cycles.
+    pub replaced_cycles: f64,
+    /// To the first one of the new master.
+    pub reigns_cycles: f64,
+    /// Slots of the others that went by without a frame.
+    pub slots_lost: u64,
+    /// How much a page has moved against the old master's time, µs.
+    pub step_us: f64,
+}
+
+/// Who synchronised last as the master.
+fn master(frames: &[Crossed]) -> Option<u8> {
+    frames.iter().rev().find(|frame| frame.what == What::Sync).map(|frame| frame.from)
+}
+
+/// How often another node than before synchronised as the master.
+pub fn changes_of_master(frames: &[Crossed]) -> usize {
+    let masters = || frames.iter().filter(|frame| frame.what == What::Sync).map(|frame| frame.from);
+    masters().zip(masters().skip(1)).filter(|(before, after)| before != after).count()
+}
+
+/// Kills the master after some part of a cycle, and waits until another reigns.
+///
+/// # Errors
+/// When none takes its place.
+pub fn kill_master(
+    routers: &mut Routers<'_>,
+    capture: &mut Capture,
+    plan: &Plan,
+    part_of_cycle: f64,
+) -> Result<TakenOver, Failure> {
+    let cycle = Duration::from_micros(plan.cycle_us);
+    let first = capture.len();
+    std::thread::sleep(cycle * CYCLES + cycle.mul_f64(part_of_cycle));
+    let dead = master(&capture.since(first)).ok_or_else(|| Failure::Failed("nobody synchronises".into()))?;
+    let others: Vec<u8> = (0..NODES).filter(|node| *node != dead).collect();
+    let clocks = others.iter().map(|node| routers.clock(*node)).collect::<Result<Vec<_>, Failure>>()?;
+    let time = routers.clock(dead)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;
+    let mut pages = Pages::begin(clocks, time)?;
+    let killed_ns = time.at(monotonic_ns()).ns;
+    routers.kill(dead);
+    await_reign(capture, first, dead, cycle, &mut pages)?;
+    let frames = capture.since(first);
+    let last = frames.iter().rposition(|frame| frame.what == What::Sync && frame.from == dead).unwrap_or_default();
+    let cycles_until = |is: &[What]| {
+        let next = frames[last..].iter().find(|frame| frame.from != dead && is.contains(&frame.what))?;
+        Some((next.at_ns - frames[last].at_ns) as f64 / cycle.as_nanos() as f64)
+    };
+    let never = || Failure::Failed("nobody synchronised in a dead master's place".into());
+    let looked_at = killed_ns..killed_ns + (cycle * CYCLES).as_nanos() as u64;
+    let mut slots_lost = 0;
+    for node in others {
+        slots_lost += unused(&frames, &plan.table(node)?, &time, &looked_at);
+    }
+    Ok(TakenOver {
+        dead,
+        replaced_cycles: cycles_until(&[What::Sync, What::Replacement]).ok_or_else(never)?,
+        reigns_cycles: cycles_until(&[What::Sync]).ok_or_else(never)?,
+        slots_lost,
+        step_us: pages.moved_ns as f64 / 1000.0,
+    })
+}
+
+/// Until another than the dead master has synchronised as one for some cycles; all the time pages are read.
+fn await_reign(
+    capture: &mut Capture,
+    first: usize,
+    dead: u8,
+    cycle: Duration,
+    pages: &mut Pages,
+) -> Result<(), Failure> {
+    let give_up = Instant::now() + TAKEN_OVER_WITHIN;
+    let mut over = None;
+    while over.is_none_or(|over| Instant::now() < over) {
+        if interrupted() || Instant::now() > give_up {
+            return Err(Failure::Failed(format!("nobody takes the place of node {dead}")));
+        }
+        std::thread::sleep(LOOK_EACH);
+        pages.look()?;
+        capture.check()?;
+        if over.is_none() && master(&capture.since(first)).is_some_and(|master| master != dead) {
+            over = Some(Instant::now() + cycle * CYCLES);
+        }
+    }
+    Ok(())
+}
+
+/// Slots of a node, those that begin in this part of system time, in which it sent nothing.
+fn unused(frames: &[Crossed], table: &Table, time: &TimeRecord, of: &std::ops::Range<u64>) -> u64 {
+    let its = frames.iter().filter(|frame| frame.from == table.own());
+    let window = |frame: &Crossed| -> Option<Window> {
+        let at_ns = time.at(frame.at_ns).ns;
+        let owners = [at_ns, at_ns + table.allowance_ns()].map(|ns| table.owner(ns));
+        owners.into_iter().flatten().find(|owner| owner.node == table.own()).map(|owner| owner.window)
+    };
+    let is_meant = |window: &Window| matches!(window.kind, Kind::Slot { .. }) && of.contains(&window.begin_ns);
+    let used: HashSet<Window> = its.filter_map(window).filter(is_meant).collect();
+    table.slots_between(of.start, of.end).saturating_sub(used.len() as u64)
+}
+
+/// The pages of those that live on, against the time of the one that does not.
+struct Pages {
+    time: TimeRecord,
+    /// Each with by how much it was ahead at first, ns.
+    pages: Vec<(SystemClock, i64)>,
+    moved_ns: u64,
+}
+
+impl Pages {
+    fn begin(clocks: Vec<SystemClock>, time: TimeRecord) -> Result<Self, Failure> {
+        let pages = clocks.into_iter().map(|clock| Ok((ahead_ns(&clock, &time)?, clock)));
+        let pages = pages.map(|page| page.map(|(ahead_ns, clock)| (clock, ahead_ns)));
+        Ok(Self { time, pages: pages.collect::<Result<_, Failure>>()?, moved_ns: 0 })
+    }
+
+    fn look(&mut self) -> Result<(), Failure> {
+        for (clock, before_ns) in &self.pages {
+            self.moved_ns = self.moved_ns.max(ahead_ns(clock, &self.time)?.abs_diff(*before_ns));
+        }
+        Ok(())
+    }
+}
+
+/// By how much a page is ahead of a time.
+fn ahead_ns(clock: &SystemClock, time: &TimeRecord) -> Result<i64, Failure> {
+    let record = clock.record().ok_or_else(|| Failure::Failed("a node has no time".into()))?;
+    let now_ns = monotonic_ns();
+    Ok(record.at(now_ns).ns.wrapping_sub(time.at(now_ns).ns).cast_signed())
+}

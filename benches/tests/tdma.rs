@@ -1,0 +1,69 @@
+//! The cases with time slots, run small: each runs, every line is complete, and nothing is left behind.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod support;
+
+use nix::sys::signal::Signal;
+use serde_json::{Map, Value};
+use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+
+/// A row of each case that is there whenever the case could run, and by whom.
+const ROWS: [(&str, &str); 15] = [
+    ("slots", "loaded"),
+    ("slots", "unloaded"),
+    ("slots", "ordinary"),
+    ("slots, omitted", "loaded"),
+    ("slots, in another's slot", "loaded"),
+    ("slots, left out or over 250 us off", "loaded"),
+    ("cycle-1ms", "loaded"),
+    ("pitch, into the guard", "250 us, guard 80"),
+    ("clock", "rohrpost"),
+    ("clock", "RTnet's formula"),
+    ("holdover", "after 1 s"),
+    ("takeover, replacement", "the first dies"),
+    ("takeover, new master", "the second dies"),
+    ("flows, urgent, p99.9", "measured"),
+    ("flows, lost", "all"),
+];
+
+/// The case of a row.
+fn case_of(row: &Map<String, Value>) -> String {
+    row["case"].as_str().unwrap().split(',').next().unwrap().into()
+}
+
+#[test]
+fn every_case_runs_and_every_line_is_complete() {
+    let (output, prefix) = run("tdma", &["--quick", "--json"]);
+    let rows = rows(&output);
+    for (case, who) in ROWS {
+        let own = || rows.iter().filter(|row| case_of(row) == case.split(',').next().unwrap());
+        // Where there are no namespaces, no real time or no command, a note says so.
+        let is_skipped = own().any(|row| row["note"].is_string());
+        let is_there = rows.iter().any(|row| row["case"] == case && row["who"] == who);
+        assert!(is_there || is_skipped, "{case} by {who}");
+        assert!(own().next().is_some(), "{case}");
+    }
+    // Whatever was declared arrived.
+    let lost = rows.iter().filter(|row| row["case"] == "flows, lost");
+    lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
+    assert_eq!(left_behind(&prefix), [""; 0]);
+}
+
+#[test]
+fn whoever_interrupts_it_finds_no_process_left() {
+    let mut child = bench("tdma", &["--only", "slots", "--rounds", "1000"]).spawn().unwrap();
+    let prefix = prefix(&child);
+    let mut pids = Vec::new();
+    // Routers, capture and feeders; without a command or namespaces it ends by itself.
+    wait_for("a turn", || {
+        pids = children(&child);
+        pids.len() > 2 || child.try_wait().unwrap().is_some()
+    });
+    if child.try_wait().unwrap().is_none() {
+        signal(&child, Signal::SIGINT);
+        assert!(!child.wait().unwrap().success());
+    }
+    assert_eq!(left_behind(&prefix), [""; 0]);
+    wait_for("the processes to end", || are_gone(&pids));
+}
