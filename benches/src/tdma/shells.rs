@@ -104,8 +104,9 @@ impl Member {
         let clock = ClockParts::new(&settings, installation, &node);
         let clock = clock.map(|parts| ClockParts { skew: Some(skew), node: None, ..parts });
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);
-        let shell = Shell::start(Parts { node: &node, name, settings, faults: Arc::new(Silence), impair: None, clock });
-        let shell = shell.map_err(|error| Failure::of("router", error))?;
+        let faults = Arc::new(Silence);
+        let parts = Parts { node: &node, name, settings, faults, socket: None, impair: None, clock };
+        let shell = Shell::start(parts).map_err(|error| Failure::of("router", error))?;
         Ok(Self { skew, shell: Some(shell) })
     }
 
