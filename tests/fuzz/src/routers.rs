@@ -60,6 +60,7 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
         tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(u8::MAX), node: other }],
         senders: Vec::new(),
+        flows: Vec::new(),
     }
 }
 
