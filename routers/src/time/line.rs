@@ -5,6 +5,8 @@ use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemTime, TimeRecord, TimeSource};
 
 /// A slower line begins so far ahead: readers go by the old one until the new one is in the page.
 const SLOWER_LEAD_NS: u64 = 1_000_000;
+/// A page whose bound grows so fast, ns a second, may have been bent: its pace says nothing of the clock's rate, and must not be kept.
+const BENT_NS_S: u64 = 50_000;
 /// What lines may be off by being whole numbers, until the source is heard again.
 const ROUNDING_NS: u64 = 4;
 pub(super) const BILLION: i128 = 1_000_000_000;
@@ -50,7 +52,13 @@ impl Line {
         let age_ns = now_ns.saturating_sub(record.monotonic_ns);
         let drift_ns_s = record.drift_ns_s.saturating_add(wander_ns_s(age_ns)).min(2 * RATE_MAX_PPB.unsigned_abs());
         let drift_ns_s = if record.drift_ns_s == 0 { 0 } else { drift_ns_s.max(record.drift_ns_s) };
-        Self { record: TimeRecord { drift_ns_s, ..record }, slew: None }
+        let mut line = Self { record: TimeRecord { drift_ns_s, ..record }, slew: None };
+        if record.drift_ns_s > BENT_NS_S {
+            let error_ns = line.error_ns(now_ns).min(ERROR_UNKNOWN_NS);
+            line.turn(now_ns, now_ns, EVEN_PPB);
+            line.restate(error_ns, drift_ns_s);
+        }
+        line
     }
 
     pub(super) fn record(&self) -> &TimeRecord {

@@ -10,11 +10,13 @@ use crate::time::coarse::Coarse;
 use crate::time::election::{Origin, State};
 use crate::time::line::EVEN_PPB;
 use crate::time::message::{Request, Sync};
-use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES};
+use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES, Term};
 use rohrpost_mailbox::TimeRecord;
 
 /// Who reigns by a time that is not its own sends nothing but Syncs in so many cycles: who goes by another hears of it meanwhile.
 const BEGINNING_CYCLES: u8 = JOINING_SYNCS;
+
+const MS: u64 = 1_000_000;
 
 /// What of time may leave now.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -74,6 +76,11 @@ impl Clock {
     /// For a clock that is new: it listens first, whatever its page says.
     pub fn in_slots(mut self, settings: InSlots) -> Self {
         self.election.asks_after(JOINING_SYNCS.into());
+        // Who hears nobody begins its terms anew, but not those of an earlier life, by which others may still go: a reign lasts longer than
+        // a millisecond.
+        if self.line.record().epoch > 0 {
+            self.election.speaks_of(Term::new(self.hello_ns / MS, 0), 0);
+        }
         self.slots = Some(Box::new(Slots {
             settings,
             coarse: Coarse::default(),
