@@ -25,7 +25,7 @@ use super::clock::{ClockState, Works};
 use super::departures::{Departures, Wire};
 use super::socket::InSocket;
 use super::threads::Shared;
-use crate::frame::FrameHead;
+use crate::frame::{FrameHead, NodeIndex};
 use crate::outbound::Outbound;
 use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Permit, Planned, Silent, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
@@ -350,7 +350,7 @@ impl Slots {
         let room_bytes = permit.room_bytes(self.works.now_ns() + MAKING_NS)?;
         let made_ns = monotonic_ns();
         let made = self.outbound.poll_slot(made_ns, room_bytes, &mut self.datagram, &mut self.answers);
-        made.map(|(to, bytes)| Held { to, bytes, made_ns })
+        made.map(|(to, bytes): (NodeIndex, usize)| Held { to, bytes, made_ns })
     }
 
     /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time: then it would keep
