@@ -21,7 +21,7 @@ use response::{Ahead, Never, Stream, Supply, Window};
 use rohrpost_mailbox::Priority;
 use std::time::Duration;
 
-pub(crate) use remedy::remedy;
+pub(crate) use remedy::{remedy, slower};
 
 /// What is published less than this before a slot begins may have to wait for the next one.
 pub const TAKEN_BEFORE: Duration = Duration::from_micros(100);

@@ -1,6 +1,7 @@
 //! The smallest change of a slot table by which a flow keeps its deadline.
 
 use super::bound;
+use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::tdma::{Tdma, TimeSlot};
 use crate::units::duration_decimal;
@@ -9,6 +10,8 @@ use std::time::Duration;
 
 /// Slots are changed in such steps.
 const STEP: Duration = Duration::from_micros(10);
+/// So many cycles as a period are tried.
+const CYCLES_MAX: u32 = 64;
 
 /// What to write instead, so that a flow keeps its deadline: found by trying, and tried.
 pub(crate) fn remedy(installation: &Installation, tdma: &Tdma, flow: usize) -> String {
@@ -36,11 +39,35 @@ pub(crate) fn remedy(installation: &Installation, tdma: &Tdma, flow: usize) -> S
                 format!("no change of one slot suffices; allow `deadline = \"{}\"`", duration_decimal(bound))
             }
             None => {
-                "no change of one slot suffices; write a smaller `size`, a longer `period`, or let others send less"
-                    .into()
+                let period = slower(installation, tdma, flow, |_| false).map(duration_decimal);
+                let period = period.map_or_else(
+                    || "a longer `period`".into(),
+                    |period| format!("`period = \"{period}\"` and a `deadline` no shorter"),
+                );
+                format!("no change of one slot suffices; write a smaller `size`, or {period}, or let others send less")
             }
         }
     })
+}
+
+/// The fewest cycles that a flow keeps as its period and deadline, if these others become as slow: found by trying.
+pub(crate) fn slower(
+    installation: &Installation,
+    tdma: &Tdma,
+    flow: usize,
+    others: impl Fn(&Flow) -> bool,
+) -> Option<Duration> {
+    let holds = |period: &Duration| {
+        let mut slower = installation.clone();
+        for (index, other) in slower.flows.iter_mut().enumerate() {
+            if index == flow || others(other) {
+                (other.period, other.deadline) = (*period, *period);
+            }
+        }
+        Search { installation: &slower, tdma, flow }.keeps(tdma)
+    };
+    let longer = (1..=CYCLES_MAX).map(|cycles| tdma.cycle * cycles);
+    longer.filter(|period| *period > installation.flows[flow].period).find(holds)
 }
 
 /// Up to a tenth of a millisecond.

@@ -218,15 +218,17 @@ impl Judge<'_> {
     /// No flow publishes so quickly that a package could not even be sure of a slot that begins when the next one comes.
     fn periods_of_flows(&self) {
         let node = |name| self.installation.node_of(name);
-        let is_too_quick = |flow: &&Flow| flow.period < bounds::TAKEN_BEFORE && node(flow.from) != node(flow.to);
-        for flow in self.installation.flows.iter().filter(is_too_quick) {
-            let right = self
-                .period_that_holds(flow)
-                .map_or_else(String::new, |period| format!(" of {}", duration_decimal(period)));
+        let is_too_quick = |flow: &Flow| flow.period < bounds::TAKEN_BEFORE && node(flow.from) != node(flow.to);
+        let flows = self.installation.flows.iter().enumerate();
+        for (index, flow) in flows.filter(|(_, flow)| is_too_quick(flow)) {
+            let right = bounds::slower(self.installation, self.tdma, index, is_too_quick).map_or_else(
+                || "a longer `period`".into(),
+                |period| format!("`period = \"{}\"`", duration_decimal(period)),
+            );
             let text = |name| self.installation.classes.format(name);
             let message = format!(
                 "[[flow]] from `{}` to `{}`: `period` {} is less than the {} that a package must be there before its slot, and a cycle is {}; put \
-                 what comes meanwhile into one package, with a `period`{right} or more",
+                 what comes meanwhile into one package, and write {right}",
                 text(flow.from),
                 text(flow.to),
                 duration_decimal(flow.period),
@@ -235,20 +237,6 @@ impl Judge<'_> {
             );
             self.reader.report(flow.line, message);
         }
-    }
-
-    /// So many cycles that a flow keeps them as its deadline, if all quicker ones are as slow: found by trying.
-    fn period_that_holds(&self, flow: &Flow) -> Option<Duration> {
-        let index = self.installation.flows.iter().position(|other| other == flow)?;
-        let holds = |period: &Duration| {
-            let mut slower = self.installation.clone();
-            for flow in slower.flows.iter_mut().filter(|flow| flow.period < *period) {
-                (flow.period, flow.deadline) = (*period, *period);
-            }
-            let bound = bounds::bounds(&slower).into_iter().find(|bound| bound.flow == index);
-            bound.is_some_and(|bound| bound.latency.is_ok_and(|bound| bound.latency <= *period))
-        };
-        (1..=CYCLES_MAX as u32).map(|cycles| self.tdma.cycle * cycles).find(holds)
     }
 
     /// Each flow keeps its deadline.

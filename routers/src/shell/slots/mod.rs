@@ -4,8 +4,8 @@
 //!        sleep, at most a millisecond at a time             wake    call begin              guard
 //!  ──┬──────────────┬──────────────┬─────────────────────────┬───────┬────┬───────────────────┬─────▶ local time
 //!    is the mailbox full?   the same      the same           │ spin  │lead│ time, refusal,    │
-//!    does one wait in vain?     stamps, datagrams of time ─▶ Clock,    │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
-//!                                                      mailbox ─▶ queue
+//!                                         mailbox ─▶ queue ──┼──────▶│    │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
+//!                                       stamps, datagrams of time ─▶ Clock
 //! ```
 //!
 //! Nothing but this thread sends, and this thread only with a [`Permit`]. It is never rung: who publishes a package makes no system call, and
@@ -194,7 +194,8 @@ impl Slots {
         }
     }
 
-    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is `silent` waits for datagrams of time; others read them once a cycle at least.
+    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is `silent` waits for datagrams of
+    /// time; others read them once a cycle at least.
     fn between(&mut self, silent: bool) {
         let now_ns = monotonic_ns();
         self.drop_if_old();
@@ -325,33 +326,34 @@ impl Slots {
 
     fn send_packages(&mut self, permit: &mut Permit) {
         self.drop_if_old();
-        while let Some((to, bytes)) = self.next_datagram(permit) {
-            let now_ns = self.works.now_ns();
+        while let Some(made) = self.next_datagram(permit) {
+            let (Held { to, bytes, .. }, now_ns) = (made, self.works.now_ns());
             if !permit.fits(now_ns, bytes) {
-                self.missed(to, bytes);
+                self.missed(made);
                 return;
             }
             self.hand_over(permit, now_ns, to, bytes);
         }
     }
 
-    /// What leaves next: for whom, and how many bytes. Room is reckoned for when it will be made, so that it misses the slot only
-    /// if the thread stands still meanwhile.
-    fn next_datagram(&mut self, permit: &Permit) -> Option<(NodeIndex, usize)> {
+    /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread stands still meanwhile.
+    fn next_datagram(&mut self, permit: &Permit) -> Option<Held> {
         if let Some(held) = self.held.take() {
-            return Some((held.to, held.bytes));
+            return Some(held);
         }
         self.intake.take_on(&mut self.outbound, &mut self.answers);
         let room_bytes = permit.room_bytes(self.works.now_ns() + MAKING_NS)?;
-        self.outbound.poll_slot(monotonic_ns(), room_bytes, &mut self.datagram, &mut self.answers)
+        let made_ns = monotonic_ns();
+        let made = self.outbound.poll_slot(made_ns, room_bytes, &mut self.datagram, &mut self.answers);
+        made.map(|(to, bytes): (NodeIndex, usize)| Held { to, bytes, made_ns })
     }
 
     /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time: then it would keep
     /// up what is, and is lost.
-    fn missed(&mut self, to: NodeIndex, bytes: usize) {
-        let datagram = &self.datagram[..bytes];
+    fn missed(&mut self, made: Held) {
+        let datagram = &self.datagram[..made.bytes];
         if held::is_real_time(datagram, &self.own.network) {
-            self.held = Some(Held { to, bytes, made_ns: monotonic_ns() });
+            self.held = Some(made);
             self.snapshot.held += 1;
         } else {
             self.outbound.unsent(datagram, &[], &mut self.answers);
