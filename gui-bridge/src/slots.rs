@@ -147,10 +147,10 @@ fn plan(scene: &mut Scene, installation: &Installation, tdma: &Tdma) {
     scene.log_static(entity(&["slots", "plan", "nodes"]), &names.with_colors(nodes.map(palette::series)));
     let bottom = top(installation.nodes.len());
     let at = |mark: u32| tdma.cycle * mark / MARKS;
-    let lines = (0..=MARKS).map(|mark| [[across(tdma, at(mark)), -10.0], [across(tdma, at(mark)), bottom]]);
+    let lines = (0..=MARKS).map(|mark| [[across(tdma, at(mark)), -10.0], [across(tdma, at(mark)), bottom + 20.0]]);
     let lines = LineStrips2D::new(lines).with_colors([palette::muted(palette::AID)]).with_radii([0.4]);
     scene.log_static(entity(&["slots", "plan", "marks"]), &lines);
-    let times = (0..=MARKS).map(|mark| [across(tdma, at(mark)), bottom + 10.0]);
+    let times = (0..=MARKS).map(|mark| [across(tdma, at(mark)), bottom - 5.0]);
     let times = label(times, (0..=MARKS).map(|mark| duration_decimal(at(mark))));
     scene.log_static(entity(&["slots", "plan", "times"]), &times.with_colors([palette::AID]));
 }
