@@ -68,6 +68,11 @@ impl Counts {
         self.late + self.skipped
     }
 
+    /// The same, percent of all.
+    pub fn omitted_percent(&self) -> f64 {
+        self.omitted() as f64 * 100.0 / self.all().max(1) as f64
+    }
+
     /// All slots, but those in which the node did not know the time.
     pub fn all(&self) -> u64 {
         self.used + self.empty + self.omitted()

@@ -65,12 +65,12 @@ pub fn kill_master(
     routers.kill(dead);
     await_reign(capture, first, dead, cycle, &mut pages)?;
     let frames = capture.since(first);
-    let last = frames.iter().rposition(|frame| frame.what == What::Sync && frame.from == dead).unwrap_or_default();
+    let never = || Failure::Failed("nobody synchronised in a dead master's place".into());
+    let last = frames.iter().rposition(|frame| frame.what == What::Sync && frame.from == dead).ok_or_else(never)?;
     let cycles_until = |is: &[What]| {
         let next = frames[last..].iter().find(|frame| frame.from != dead && is.contains(&frame.what))?;
         Some((next.at_ns - frames[last].at_ns) as f64 / cycle.as_nanos() as f64)
     };
-    let never = || Failure::Failed("nobody synchronised in a dead master's place".into());
     let looked_at = killed_ns..killed_ns + (cycle * CYCLES).as_nanos() as u64;
     let mut slots_lost = 0;
     for node in others {

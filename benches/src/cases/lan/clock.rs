@@ -32,6 +32,7 @@ const SETTLED: u64 = 50;
 const PATIENCE: Duration = Duration::from_secs(60);
 const PORT: u16 = 20_140;
 const MTU: u16 = 1_500;
+
 /// What must be reached, and what may be hoped for: µs, as p50, p99, p99.9 (none given) and maximum.
 const MUST: (&str, Summary) = ("2, 5, 15 us", Summary { p50: 2.0, p99: Some(5.0), p999: None, max: Some(15.0) });
 const HOPED: (&str, Summary) = ("0.5, 1.5, 3 us", Summary { p50: 0.5, p99: Some(1.5), p999: None, max: Some(3.0) });

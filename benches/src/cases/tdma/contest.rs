@@ -30,11 +30,11 @@ pub(super) struct Figure {
     pub unit: &'static str,
     /// What it is.
     pub of: fn(&Observed) -> f64,
-    /// For the first contender.
+    /// For those who are judged.
     pub goals: &'static [Goal],
 }
 
-/// What belongs to each table: whether slots were left out, and what the computer did meanwhile.
+/// What belongs to each case: whether nodes met on the wire, and what the computer did meanwhile.
 pub(super) const ALWAYS: [Figure; 3] = [
     Figure {
         what: "in another's slot",
@@ -53,8 +53,10 @@ pub(super) type Seen = Vec<Observed>;
 pub(super) struct Contest {
     /// Its name.
     pub case: &'static str,
-    /// Those watched, the first of which is judged.
+    /// Those watched.
     pub watched: Vec<Watched>,
+    /// Goals are for the first so many.
+    pub judged: usize,
     /// What slots are held against that has a name and figures.
     pub bounds: Vec<(&'static str, Summary)>,
     /// Whom the first is compared with.
@@ -93,12 +95,12 @@ impl Contest {
         (rows, seen)
     }
 
-    /// The rows of a figure: the first contender's beside its goals, those of the others alone.
+    /// The rows of a figure: of those who are judged beside its goals, of the others alone.
     fn told(&self, told: &Figure, seen: &[Seen]) -> Vec<Row> {
         let subject = self.subject(told.unit, Some(told.what));
         let rows = self.watched.iter().zip(seen).enumerate().map(|(at, (watched, seen))| {
             let rounds: Vec<f64> = seen.iter().map(told.of).collect();
-            figure(&subject, watched.who, &rounds, if at == 0 { told.goals } else { &[] })
+            figure(&subject, watched.who, &rounds, if at < self.judged { told.goals } else { &[] })
         });
         rows.flatten().collect()
     }

@@ -10,6 +10,7 @@ use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
 use crate::statistics::{Summary, median};
 use crate::tdma::capture::{Arrived, Capture};
+use crate::tdma::counts::Counts;
 use crate::tdma::kept::Kept;
 use crate::tdma::machine::Machine;
 use crate::tdma::plan::Declared;
@@ -37,6 +38,7 @@ struct Flows;
 struct Watched {
     arrivals: Vec<Arrived>,
     kept: Kept,
+    counts: Counts,
     talked: Talked,
     /// Steal in each window, percent.
     windows: Vec<f64>,
@@ -66,14 +68,15 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
     let _traffic = Traffic::start(&routers)?;
     routers.await_packages(&ALL, &mut capture)?;
     let time = routers.clock(0)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;
-    let (first, before) = (capture.len(), routers.machine());
+    let (counts, first, before) = (routers.counts()?, capture.len(), routers.machine());
     let talkers = Talkers::start(&routers, &FLOWS)?;
     let windows = steal_in_windows(watched(settings))?;
     let waited_ms_s = routers.machine().waited_ms(&before) / watched(settings).as_secs_f64();
     let talked = talkers.end()?;
+    let counts = Counts::between(&counts, &routers.counts()?);
     capture.check()?;
     let kept = Kept::of(&capture.since(first), &FLOWS.table(0)?, &time);
-    Ok(Watched { arrivals: capture.arrivals(), kept, talked, windows, waited_ms_s })
+    Ok(Watched { arrivals: capture.arrivals(), kept, counts, talked, windows, waited_ms_s })
 }
 
 /// Sleeps for so long; what the hypervisor took in each window of it, percent.
@@ -139,6 +142,8 @@ fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
     let lost = published - turns.iter().map(|turn| turn.talked.taken).sum::<u64>().min(published);
     rows.extend(figure(&subject("flows, lost", "packages"), "all", &[lost as f64], &NONE));
     rows.extend(figure(&subject("flows, published", "packages"), "all", &[published as f64], &[]));
+    let omitted: Vec<f64> = turns.iter().map(|turn| turn.counts.omitted_percent()).collect();
+    rows.extend(figure(&subject("flows, omitted", "%"), "all", &omitted, &[]));
     rows.extend(figure(&subject("flows, wake-up p99.9", "us"), "all", &[wake_up_us], &[]));
     rows.extend(steal_rows(turns));
     Ok(rows)

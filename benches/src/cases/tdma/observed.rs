@@ -92,7 +92,7 @@ impl Observed {
 
     /// Slots that were left out, percent.
     pub(super) fn omitted_percent(&self) -> f64 {
-        self.counts.omitted() as f64 * 100.0 / self.counts.all().max(1) as f64
+        self.counts.omitted_percent()
     }
 
     /// Slots whose first frame was further off than this, percent of those that were used.

@@ -16,7 +16,7 @@ use crate::tdma::rights::Rights;
 const INTO_GUARD: Figure =
     Figure { what: "into the guard", unit: "us in", of: |seen| seen.kept.into_guard_us, goals: &[] };
 
-/// Of the first table: RTnet's pitch with what guard that leaves.
+/// From slot to slot, as RTnet has it; and what of it nobody may send in.
 const PITCH: [Goal; 2] = [Goal { name: "must 250 us", most: 250.0 }, Goal { name: "hoped 200 us", most: 200.0 }];
 const GUARD: [Goal; 2] = [Goal { name: "must 150 us", most: 150.0 }, Goal { name: "hoped 100 us", most: 100.0 }];
 
@@ -41,6 +41,7 @@ impl Case for Pitch {
         let contest = Contest {
             case: "pitch",
             watched: tables.map(|(who, plan)| watched(who, plan)).into(),
+            judged: tables.len(),
             bounds: Vec::new(),
             versus: Vec::new(),
             figures: [&[INTO_GUARD, OMITTED][..], &ALWAYS[..]].concat(),
