@@ -171,6 +171,11 @@ impl Outbound {
         if taken { Accepted::Waits } else { Accepted::Lost }
     }
 
+    /// Whether any package waits to leave.
+    pub fn waits(&self) -> bool {
+        !self.queue.is_empty()
+    }
+
     /// Whether so much waits that more is of use only if it is more important: it fills datagrams, and half of what one sender may have.
     pub fn has_plenty(&self) -> bool {
         let enough = (2 * self.datagram_bytes).max(self.settings.network.quota_bytes / 2);

@@ -1,9 +1,9 @@
 //! What the thread of the time slots takes from the router's mailbox, and when.
 //!
 //! ```text
-//!  between slots                             shortly before the call              in the slot
-//!  all stays in the mailbox; if that has     as much as the slot has room for,    what came since, if it is more
-//!  more than half of its slots full: ─▶      the most important first: ─▶         important than what was taken: ─▶   queue
+//!  between slots                             shortly before the call              in the slot, a few before each datagram
+//!  all stays in the mailbox; if that has     as much as the slot has room for,    what still has room, or is more important
+//!  more than half of its slots full: ─▶      the most important first: ─▶         than what was taken, or too much: ─▶   queue
 //! ```
 //!
 //! The mailbox outlives a router that is killed, the queue does not: so what waits for a slot waits in the mailbox. A flood is taken out of it,
@@ -18,8 +18,11 @@ use rohrpost_mailbox::{HEAD_BYTES, Head, Kind, Priority, Receiver, monotonic_ns}
 const UNTAKEN_NS_MAX: u64 = crate::outbound::WAIT_MAX_NS / 3;
 /// Packages taken at a time: all that the mailbox may hold.
 const BURST: usize = 64;
-/// More important ones than those which fill the slot, between two datagrams: the rest has come just now, and has its turn with the next.
+/// Before each datagram of a slot at most so many, since it is to be handed over at once: the rest has its turn before the next. Bounds
+/// count on one only, for they give each package a datagram of its own.
 const FEW: usize = 4;
+/// Nothing more is taken between slots with less than this until the thread has to wake up: to take one lasts for some ten microseconds.
+const LEFT_NS_MIN: u64 = 50_000;
 
 /// The router's mailbox, and what the coming slot still wants of it.
 pub(super) struct Intake {
@@ -49,33 +52,37 @@ impl Intake {
         }
     }
 
-    /// In the slot: takes all that it still has room for, and a few of what is more important and came since.
+    /// In the slot, before each datagram: takes a few, and more only while there is nothing to send.
     pub(super) fn take_on(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
-        let mut few = FEW;
-        for _ in 0..BURST {
-            if self.room_bytes == 0 {
-                if few == 0 || !self.outranks() {
-                    return;
-                }
-                few -= 1;
-            }
-            if !self.take(outbound, report) {
+        for taken in 0..BURST {
+            let has_enough = taken >= FEW && outbound.waits();
+            let wants = self.room_bytes > 0 || self.outranks() || self.is_full();
+            if has_enough || !wants || !self.take(outbound, report) {
                 return;
             }
         }
     }
 
-    /// Between slots: takes all if it is much, or if there was no slot for long.
-    pub(super) fn relieve(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
-        let (count, now_ns) = (self.transit.waits().0, monotonic_ns());
-        let is_full = 2 * count > usize::from(self.transit.shape().slots);
-        if is_full || now_ns.saturating_sub(self.taken_ns) > UNTAKEN_NS_MAX {
+    /// Between slots: takes all if it is much, or if there was no slot for long. `left_ns` says how long it may last.
+    pub(super) fn relieve(
+        &mut self,
+        outbound: &mut Outbound,
+        report: &mut impl Report,
+        mut left_ns: impl FnMut() -> u64,
+    ) {
+        let now_ns = monotonic_ns();
+        if self.is_full() || now_ns.saturating_sub(self.taken_ns) > UNTAKEN_NS_MAX {
             self.taken_ns = now_ns;
             let mut taken = 0;
-            while taken < BURST && self.take(outbound, report) {
+            while taken < BURST && left_ns() > LEFT_NS_MIN && self.take(outbound, report) {
                 taken += 1;
             }
         }
+    }
+
+    /// Whether the mailbox may have no room for a burst soon.
+    fn is_full(&mut self) -> bool {
+        2 * self.transit.waits().0 > usize::from(self.transit.shape().slots)
     }
 
     /// Whether something waits that is more important than what was taken.
@@ -120,6 +127,8 @@ mod tests {
         intake: Intake,
         sender: Sender,
         end: End,
+        /// Time until the thread has to wake up.
+        left_ns: u64,
         _folder: tempfile::TempDir,
     }
 
@@ -132,7 +141,13 @@ mod tests {
             let shape = Shape { slots: SLOTS, full: rohrpost_mailbox::Full::Displace, ..Shape::default() };
             let intake = Intake::new(join().receiver(module(100, 1), shape).unwrap());
             let sender = join().sender(module(100, 1)).unwrap();
-            Self { intake, sender, end: End::begin(0, monotonic_ns() - age_ns, |_| {}), _folder: folder }
+            Self {
+                intake,
+                sender,
+                end: End::begin(0, monotonic_ns() - age_ns, |_| {}),
+                left_ns: u64::MAX,
+                _folder: folder,
+            }
         }
 
         fn send(&mut self, kind: Type, priorities: &[u8]) {
@@ -156,7 +171,7 @@ mod tests {
         }
 
         fn between_slots(&mut self) {
-            self.intake.relieve(&mut self.end.outbound, &mut self.end.log);
+            self.intake.relieve(&mut self.end.outbound, &mut self.end.log, || self.left_ns);
         }
 
         /// Packages in the mailbox, and in the queue.
@@ -184,7 +199,31 @@ mod tests {
         assert_eq!(ground.waiting(), (6, 4 + FEW as u64), "a few between two datagrams");
         ground.intake.open(10_000);
         ground.in_the_slot();
-        assert_eq!(ground.waiting(), (0, 10 + FEW as u64), "who woke up late takes in the slot what it has room for");
+        assert_eq!(ground.waiting(), (2, 8 + FEW as u64), "who woke up late takes in the slot what it has room for");
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (0, 10 + FEW as u64), "a few before each datagram");
+    }
+
+    #[test]
+    fn in_a_slot_a_mailbox_does_not_become_full_and_what_is_lost_does_not_end_it() {
+        let mut ground = Ground::new(0);
+        ground.intake.open(50);
+        ground.data(&[90; 1]);
+        ground.before_the_call(1);
+        ground.data(&[90; SLOTS as usize / 2]);
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (8, 1), "no room, and no more important");
+        ground.data(&[90; 2]);
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (8, 3), "down to half of it");
+
+        // Their peer is silent, so that taking them gives nothing to send.
+        let mut ground = Ground::new(5 * S);
+        ground.data(&[90; FEW + 2]);
+        ground.intake.open(1000);
+        ground.in_the_slot();
+        assert_eq!(ground.waiting(), (0, 0));
+        assert_eq!(ground.end.log.lost.len(), FEW + 2);
     }
 
     #[test]
@@ -194,6 +233,10 @@ mod tests {
         ground.between_slots();
         assert_eq!(ground.waiting(), (8, 0));
         ground.data(&[50]);
+        ground.left_ns = LEFT_NS_MIN;
+        ground.between_slots();
+        assert_eq!(ground.waiting(), (9, 0), "the slot is too near");
+        ground.left_ns = u64::MAX;
         ground.between_slots();
         assert_eq!(ground.waiting(), (0, 9), "more than half");
         ground.data(&[50]);

@@ -182,25 +182,26 @@ impl Slots {
             if left_ns > NAP_NS_MIN {
                 // Not so that the rest is a short one.
                 alarm::sleep(NAP_NS.min(left_ns / 2));
-                self.between(planned.is_none());
+                self.between(planned.is_none(), wake_ns);
                 continue;
             }
             alarm::sleep(left_ns);
             self.look();
             match planned {
                 Some(planned) => self.window(&planned),
-                None => self.between(true),
+                None => self.between(true, u64::MAX),
             }
         }
     }
 
     /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is `silent` waits for datagrams of
     /// time; others read them once a cycle at least.
-    fn between(&mut self, silent: bool) {
+    fn between(&mut self, silent: bool, wake_ns: u64) {
         let now_ns = monotonic_ns();
         self.drop_if_old();
         self.outbound.tidy(now_ns, &mut self.answers);
-        self.intake.relieve(&mut self.outbound, &mut self.answers);
+        let left_ns = || wake_ns.saturating_sub(self.works.now_ns());
+        self.intake.relieve(&mut self.outbound, &mut self.answers, left_ns);
         self.tell_tunnel();
         self.wire.deliver(now_ns);
         if silent || self.works.now_ns().saturating_sub(self.looked_ns) > self.discipline.table().cycle_ns() {
