@@ -186,9 +186,14 @@ mod tests {
     #[test]
     fn flows_of_one_pair_are_told_apart_by_size_and_then_by_kind() {
         let ms = Duration::from_millis;
-        let (laser, pilot, face) = (module(200, 0), module(50, 1), module(51, 1));
-        let mut flows =
-            [flow(laser, pilot, 800), flow(laser, pilot, 64), flow(laser, pilot, 64), flow(pilot, laser, 8)];
+        let (laser, wheels, pilot, face) = (module(200, 0), module(201, 0), module(50, 1), module(51, 1));
+        let mut flows = [
+            flow(laser, pilot, 800),
+            flow(laser, pilot, 64),
+            flow(laser, pilot, 64),
+            flow(pilot, laser, 8),
+            flow(pilot, wheels, 8),
+        ];
         flows[1].period = ms(900);
         flows[0].to.push(face);
         flows[3].to.push(wheels);

@@ -95,7 +95,8 @@ fn summary(installation: &Arc<Installation>) -> Result<(String, bool), Failure> 
     }
     let late = flows::measured(installation, &late, &links.iter().collect::<Vec<_>>());
     if !late.is_empty() {
-        text += &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
+        text +=
+            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
     }
     text += &format!("\n{balance}\n{clocks}");
     text += &map;
