@@ -117,7 +117,8 @@ fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, boo
     }
     let late = flows::measured(installation, &late, &links.iter().collect::<Vec<_>>());
     if !late.is_empty() {
-        text += &format!("\nDeclared flows; a slot that was left out costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
+        text +=
+            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
     }
     if !installation.flows.is_empty() {
         text += "\nDeclared flows from end to end, as the modules themselves have counted:\n\n";
