@@ -1,0 +1,76 @@
+//! Time slots behind a bridge that delays, and with a clock that drifts.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+#[path = "slots_common/mod.rs"]
+mod common;
+
+use common::talk::{Ears, mouths};
+use common::{Capture, NODES, Segment, Station, assert_kept};
+use rohrpost_routers::frame::Kind;
+use rohrpost_routers::tdma::Silent;
+use std::time::{Duration, Instant};
+
+const ALL: [u8; NODES as usize] = [0, 1, 2];
+/// A round of packages comes so much after the one before: a few in each cycle, at any moment of it.
+const PAUSE: Duration = Duration::from_micros(2300);
+/// The clocks of two computers differ by at most so much, and their rates change by less than this swing brings: 470 ppb in a second.
+const DRIFT_PPB: i64 = 100_000;
+const SWING_PPB: f64 = 1500.0;
+const DRIFTS: Duration = Duration::from_secs(5);
+
+fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
+    let mut mouths = mouths(segment, nodes);
+    for id in 0..rounds {
+        mouths.iter_mut().for_each(|mouth| mouth.say(id));
+        ears.listen();
+        std::thread::sleep(PAUSE);
+    }
+    ears.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_slave_whose_clock_drifts_and_changes_its_rate_keeps_its_slots() {
+    let Some(mut segment) = Segment::at_rest(None) else { return };
+    let Segment { stations, lab, .. } = &mut segment;
+    stations[2].skew.rate_ppb = DRIFT_PPB;
+    stations[2].skew.wander_ppb = SWING_PPB;
+    stations.iter_mut().for_each(|station| station.start(lab));
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    let (mut ears, time, began) = (Ears::new(&segment), segment.stations[0].clock().record, Instant::now());
+    let capture = Capture::start(&segment.lab);
+    while began.elapsed() < DRIFTS {
+        talk(&segment, &mut ears, &ALL, 100);
+    }
+    assert_kept("two clocks that drift", &capture.end(), &time);
+    let rate_ppb = segment.stations[2].clock().rate_ppb.abs();
+    let near = |rate_ppb: i64| (rate_ppb - DRIFT_PPB).abs() < 2 * SWING_PPB as i64;
+    assert!(near(rate_ppb), "it knows how fast its clock is: {rate_ppb} ppb");
+}
+
+#[test]
+fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_and_says_why() {
+    let Some(mut segment) = Segment::at_rest(None) else { return };
+    let Segment { stations, lab, .. } = &mut segment;
+    stations[2].late = Some("delay=2ms,jitter=500us,seed=7".parse().unwrap());
+    stations.iter_mut().for_each(|station| station.start(lab));
+    let capture = Capture::start(lab);
+    segment.wait_until("node 2 knows the time too badly", |segment| {
+        let (clock, slots) = (segment.stations[2].clock(), segment.stations[2].slots());
+        clock.exchanges > 5 && matches!(slots.silent, Some(Silent::BoundTooLarge { .. }))
+    });
+    let mut ears = Ears::new(&segment);
+    talk(&segment, &mut ears, &[0, 1], 100);
+    let crossed = capture.end();
+    let speaks = |kind| matches!(kind, Kind::Alive | Kind::Packages);
+    assert!(crossed.iter().any(|frame| frame.from == 2), "it asks for the time");
+    assert!(!crossed.iter().any(|frame| frame.from == 2 && speaks(frame.kind)), "and says nothing else");
+
+    // The bridge is as quick as others again.
+    let Segment { stations, lab, .. } = &mut segment;
+    stations[2].shell = None;
+    stations[2].late = None;
+    stations[2].start(lab);
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    talk(&segment, &mut ears, &ALL, 50);
+}
