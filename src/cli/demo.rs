@@ -81,6 +81,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
         return nodes::run(arguments, count, long);
     }
+    if arguments.kill_master {
+        return Err("one node alone has no master to be killed; say --nodes 3".into());
+    }
     let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let node = choose_node(&installation, None)?.name.clone();

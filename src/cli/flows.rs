@@ -8,8 +8,8 @@ use rohrpost::interfaces::{FlowState, FlowStates, Links};
 /// What the columns say that their heads do not.
 pub(super) const LEGEND: &str = "\
 at worst: the bound that `check` computes; slowest: as the router that sends measured it, up to the arrival at the other computer;
-beyond: packages slower than the bound; late: slower than the deadline, `within`; lost: in that router; oldest: data of the receiver's class
-when they came to its mailbox, by their stamp";
+beyond: packages slower than the bound; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's
+class when they came to its mailbox, by their stamp. All that goes between two modules is put to one of their flows, declared or not";
 
 /// A row for each flow that leaves one of these nodes; empty without any.
 pub(super) fn measured<'a>(

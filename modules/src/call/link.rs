@@ -198,6 +198,11 @@ impl Link {
             }
             Err(error) => {
                 self.spare.push(call.body);
+                // One whose server is not there is none of the calls that should have had an answer.
+                let is_lost = matches!(error, SendError::Full(_));
+                let tally = self.tally(to);
+                (tally.calls, tally.unanswered) =
+                    (tally.calls + u64::from(is_lost), tally.unanswered + u64::from(is_lost));
                 Err(error.into())
             }
         }

@@ -8,7 +8,7 @@ use super::socket::{InSocket, Received};
 use super::threads::{Awake, Shared};
 use super::ways::Ways;
 use crate::frame::NodeIndex;
-use crate::inbound::{Datagram, Inbound, Output};
+use crate::inbound::{Datagram, Inbound, Output, SOCKET_MAX_NS};
 use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::stats::Cause;
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
@@ -37,6 +37,8 @@ impl Arrivals {
     pub(super) fn run(mut self) {
         let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
         let (mut awake, mut ring_ns) = (Awake::default(), 0);
+        // What waited for this router before it began, in a socket that outlives routers, says nothing of who lives now.
+        let mut is_of_before = true;
         loop {
             let began_ns = monotonic_ns();
             let (received, now_ns) = (self.socket.receive(&mut datagram), monotonic_ns());
@@ -44,7 +46,9 @@ impl Arrivals {
             match received {
                 Received::Closed => return,
                 Received::Nothing => {}
+                Received::Datagram { waited_ns, .. } if is_of_before && waited_ns > SOCKET_MAX_NS => continue,
                 Received::Datagram { bytes, source, waited_ns } => {
+                    is_of_before = false;
                     let bytes = &datagram[..bytes];
                     let datagram = Datagram { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
                     self.inbound.handle(now_ns, &datagram, &mut self.desk);

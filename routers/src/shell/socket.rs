@@ -35,7 +35,7 @@ const PAUSE: Duration = Duration::from_millis(1);
 pub enum SocketError {
     /// Somebody is there.
     #[error(
-        "{0} is in use: does the router of this node run already, or another program? Stop it, or choose another `port` in \
+        "{0} is in use: does the router of this node run already, its launch (which keeps this for it), or another program? Stop it, or choose another `port` in \
          [network], the same on all nodes"
     )]
     InUse(SocketAddr),

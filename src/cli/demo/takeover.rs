@@ -144,7 +144,8 @@ impl Seen {
 
     /// What became of its time, if it was the master.
     fn takeover(&self, death: &Death) -> Option<String> {
-        let last = self.reigns.last_of(death.node, death.at_ns).filter(|last| death.at_ns < last.last_ns + FOUND_NS)?;
+        let is_its = |last: &&Reign| death.at_ns < last.last_ns + FOUND_NS || self.on_purpose.contains(&death.pid);
+        let last = self.reigns.last_of(death.node, death.at_ns).filter(is_its)?;
         let after = |reign: &Reign| {
             let cycles = reign.first_cycle.saturating_sub(last.last_cycle);
             let took = time(Duration::from_nanos(reign.first_ns.saturating_sub(last.last_ns)));
