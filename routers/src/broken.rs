@@ -109,10 +109,6 @@ mod variants {
         SyncInForeignWindow,
         /// Time slots: whoever yields to another master goes on by its own time.
         KeepsOwnTime,
-        /// Time slots: whoever has no time begins one as soon as it is its turn, whatever it has heard.
-        BeginsAtOnce,
-        /// Time slots: whoever begins a time sends all that it has from the first cycle on.
-        BeginsLoudly,
     }
 
     impl Broken {
@@ -146,10 +142,7 @@ mod variants {
         /// All mistakes of what leaves in a slot. Where packages leave as they come they do not show.
         pub const IN_SLOT: [Self; 3] = [Self::OvertakesInSlot, Self::OverrunsSlot, Self::AnyCompany];
 
-        /// All mistakes of beginning a time. Each shows in few networks, those that once did.
-        pub const BEGINNING: [Self; 2] = [Self::BeginsAtOnce, Self::BeginsLoudly];
-
-        /// All other mistakes of time slots.
+        /// All mistakes of time slots.
         pub const SLOTS: [Self; 9] = [
             Self::NoLateGate,
             Self::SendsWhenUnsure,

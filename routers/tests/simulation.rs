@@ -211,6 +211,21 @@ fn rough_networks_keep_their_promises() {
     }
 }
 
+/// Each of these has shown a bug that hundreds of networks with time slots seldom show.
+#[test]
+fn networks_with_time_slots_that_broke_a_promise_once_keep_it() {
+    let broke = [
+        60, 273, 288, 316, 336, 339, 356, 438, 543, 736, 846, 933, 1385, 1464, 1499, 1792, 1849, 2181, 2207, 10_019,
+        10_984, 11_190,
+    ];
+    for (seed, outcome) in for_all(broke.len() as u64, |index| {
+        let seed = broke[index as usize];
+        (seed, run(Plan::slotted(seed), guard, false))
+    }) {
+        assert!(outcome.problems.is_empty(), "{}", told(SLOTTED, seed, &outcome.problems[0]));
+    }
+}
+
 #[test]
 fn rough_slotted_networks_keep_their_promises() {
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {

@@ -64,7 +64,8 @@ pub enum Promise {
     /// nobody goes by it.
     OneMaster,
     /// With time slots no two nodes transmit at once, unless a fault has divided them for longer than [`HOLDOVER_NS`], or the
-    /// router of one began meanwhile, and until [`HEALED_CYCLES`] cycles after it.
+    /// router of one began meanwhile, or both times by which they go, and until [`HEALED_CYCLES`] cycles after it. Of two that just began a
+    /// time the Syncs that say so may meet.
     ///
     /// [`HOLDOVER_NS`]: super::slots::HOLDOVER_NS
     /// [`HEALED_CYCLES`]: super::slots::HEALED_CYCLES

@@ -107,14 +107,18 @@ impl Plan {
         plan.timed_ns += 2 * u64::from(JOINING_SYNCS) * plan.shape.interval_ns + DEAF_NS;
         plan.end_ns = plan.end_ns.max(plan.timed_ns + S);
         plan.draw_all(chance);
-        plan.spread_calls();
+        plan.fit_traffic();
         plan.divide();
         plan
     }
 
-    /// Commands that wait behind large packages come all at once: no more of them than fit in a mailbox, else some are lost though all is
-    /// well.
-    fn spread_calls(&mut self) {
+    /// What slots carry well: a large package is through long before it is too old. Commands that wait behind it come all at once: no more
+    /// of them than fit in a mailbox, else some are lost though all is well.
+    fn fit_traffic(&mut self) {
+        let most_bytes = self.shape.rate_bytes_s / 4;
+        for flow in &mut self.flows {
+            flow.bytes = (flow.bytes.0.min(most_bytes), flow.bytes.1.min(most_bytes));
+        }
         let large = |node: usize| {
             let flows = self.flows.iter().filter(move |flow| flow.node == node && flow.burst == 1);
             flows.map(|flow| flow.bytes.1).sum::<u64>()

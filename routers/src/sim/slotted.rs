@@ -53,7 +53,7 @@ impl Slotted {
         let is_sure = self.is_sure(io);
         let clock = self.time.clock();
         let term = if is_sure { clock.reading(io.now.monotonic_ns).term } else { Term::NONE };
-        io.book.wire.goes_by(io.node, term, clock.reckoning().filter(|_| is_sure), clock.is_beginning());
+        io.book.wire.goes_by(io.now, io.node, term, clock.reckoning().filter(|_| is_sure), clock.is_beginning());
         self.time.poll_in(io, Some(&mut permit));
         if permit.carries == Carries::All {
             self.packages.poll_in(io, &mut permit);

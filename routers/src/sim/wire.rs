@@ -1,11 +1,12 @@
 //! The wire of a network with time slots, by true time: when each node transmits, and that no two do at once.
 
 use super::book::{Problem, Promise};
+use super::clock::Now;
 use super::plan::US;
 use super::slots::Slots;
 use crate::tdma::LATE_NS;
 use crate::time::{Reckoning, Term};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// From the call to the first bit, ns: usually the shorter, and by chance up to the longer.
 pub const LEAD_NS: (u64, u64) = (8 * US, 20 * US);
@@ -38,6 +39,8 @@ pub struct Wire {
     began_ns: Vec<u64>,
     /// The term that each goes by.
     terms: Vec<Term>,
+    /// When somebody first sent by a term, true ns.
+    first_ns: BTreeMap<Term, u64>,
     /// Whether each only says that it began a time.
     begins: Vec<bool>,
     /// What each reckons by.
@@ -52,6 +55,7 @@ impl Wire {
             free_ns: vec![0; nodes],
             began_ns: vec![0; nodes],
             terms: vec![Term::NONE; nodes],
+            first_ns: BTreeMap::new(),
             begins: vec![false; nodes],
             reckonings: vec![None; nodes],
             recent: VecDeque::with_capacity(RECENT_MAX),
@@ -64,7 +68,8 @@ impl Wire {
     }
 
     /// From now on a node sends by the time of this term; none: by what it has heard only. `begins`: it sends only to say that it began one.
-    pub fn goes_by(&mut self, node: usize, term: Term, reckoning: Option<Reckoning>, begins: bool) {
+    pub fn goes_by(&mut self, now: Now, node: usize, term: Term, reckoning: Option<Reckoning>, begins: bool) {
+        self.first_ns.entry(term).or_insert(now.true_ns);
         (self.terms[node], self.reckonings[node], self.begins[node]) = (term, reckoning, begins);
     }
 
@@ -107,7 +112,10 @@ impl Wire {
             let began_ns = self.began_ns[node].max(self.began_ns[other.node]);
             let began_ns = if is_coarse { begin_ns } else { began_ns };
             let same = term == other.term && !term.is_none();
-            if same || !slots.is_excused(begin_ns, began_ns) {
+            // Of two that begin a time in parts of a divided network neither can ever hear.
+            let first_ns = |term| self.first_ns.get(&term).copied().unwrap_or(0);
+            let elder_ns = first_ns(term).min(first_ns(other.term));
+            if same || !(slots.is_excused(begin_ns, began_ns) || slots.is_excused(begin_ns, elder_ns)) {
                 let text = format!("{own:?} and {other:?} at once");
                 problems.push(Problem { promise: Promise::Exclusive, at_ns: begin_ns, text });
             }

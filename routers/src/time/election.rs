@@ -2,7 +2,6 @@
 
 use super::message::{Request, Sync};
 use super::{TAKEOVER_HALF_INTERVALS, Term};
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 
 /// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
@@ -282,8 +281,7 @@ impl Election {
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = before + if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
-        let begins_after_ns = if broken!(BeginsAtOnce) { 0 } else { self.begins_after_ns };
-        let (since_ns, patience_ns) = match (origin, begins_after_ns, self.state) {
+        let (since_ns, patience_ns) = match (origin, self.begins_after_ns, self.state) {
             (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => (since_ns, patience_ns),
             (Origin::New, begins_ns, State::Slave(master)) => (master.heard_ns, patience_ns.max(begins_ns)),
             (Origin::New, begins_ns, _) => (since_ns.max(self.timed_heard_ns.unwrap_or(0)), patience_ns.max(begins_ns)),

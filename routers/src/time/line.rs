@@ -54,9 +54,12 @@ impl Line {
         let drift_ns_s = if record.drift_ns_s == 0 { 0 } else { drift_ns_s.max(record.drift_ns_s) };
         let mut line = Self { record: TimeRecord { drift_ns_s, ..record }, slew: None };
         if record.drift_ns_s > BENT_NS_S {
-            let error_ns = line.error_ns(now_ns).min(ERROR_UNKNOWN_NS);
+            // Until the two lines meet the new one is off the old one.
+            let bent_ppb = u128::from(record.pace_ppb.abs_diff(EVEN_PPB));
+            let meets_ns = (bent_ppb * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128) as u64 + ROUNDING_NS;
+            let error_ns = line.error_ns(now_ns).saturating_add(meets_ns).min(ERROR_UNKNOWN_NS);
             line.turn(now_ns, now_ns, EVEN_PPB);
-            line.restate(error_ns, drift_ns_s);
+            line.restate(error_ns, drift_ns_s.max(RATE_MAX_PPB.unsigned_abs()));
         }
         line
     }

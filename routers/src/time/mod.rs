@@ -34,7 +34,9 @@
 //! and a Sync leaves in the master's own alone (see [`tdma`](crate::tdma)). Questions wait for a slot, so between t2 and t3 may lie a cycle or more; what
 //! clocks drift meanwhile is in the sample. Whoever starts, yields to another master, or turns to one whose time is another goes by
 //! nothing until it has measured: by [`Clock::coarse`] it may ask. [`Clock::reckoning`] is what slots are found by; its bound leaves
-//! out what the master may be off an earlier term, as all nodes are off alike.
+//! out what the master may be off an earlier term, as all nodes are off alike. Whoever becomes master without time of its own goes on by
+//! what it heard, from Syncs or from those who have time and hear no master; a time is begun only where for 100 ms and eight cycles nobody who
+//! has one was heard. Until others have turned to it, for eight cycles, such a master sends nothing but Syncs.
 //!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 

@@ -276,7 +276,7 @@ impl Clock {
             || self.coarse(now_ns).is_some_and(|heard| heard.bound_ns(now_ns) <= slots.settings.allowance_ns);
         match self.sure(now_ns) {
             Some(_) => Origin::Own,
-            None if is_heard() && !broken!(BeginsAtOnce) => Origin::Heard,
+            None if is_heard() => Origin::Heard,
             None => Origin::New,
         }
     }
@@ -298,7 +298,7 @@ impl Clock {
     /// Whether this node reigns by a time that others may not go by yet: it sends nothing but Syncs.
     pub fn is_beginning(&self) -> bool {
         let is_master = matches!(self.election.state(), State::Master(_));
-        is_master && !broken!(BeginsLoudly) && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
+        is_master && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
     }
 
     /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.
