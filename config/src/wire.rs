@@ -20,6 +20,8 @@ pub const ALIVE_BYTES: usize = 24;
 pub const REFUSAL_BYTES: usize = 16;
 /// A router keeps the body of a package that waits in pieces of so many bytes.
 pub const KEPT_IN_BYTES: u64 = 256;
+/// A clock that was not compared with another yet is off by one, at most, in so long.
+pub const RATE_MAX_PER: u32 = 4000;
 /// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
 pub const HAND_OVER: Duration = Duration::from_micros(20);
 

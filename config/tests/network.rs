@@ -33,10 +33,7 @@ fn every_node_has_a_router_which_is_its_first_module() {
         assert_eq!(full.router_of(&node.name), Some(router.name));
         assert_eq!(full.node_index(&node.name), Some(index as u8));
         assert_eq!(router.program, Program::Builtin(ROUTER.into()));
-        assert_eq!(
-            (router.restart.policy, router.restart.backoff),
-            (RestartPolicy::Always, Duration::from_millis(100))
-        );
+        assert_eq!((router.restart.policy, router.restart.backoff), (RestartPolicy::Always, Duration::from_millis(10)));
         assert!(!router.is_in_file() && router.settings.is_empty());
         assert_eq!(router.line, node.line, "its messages name the node's line");
     }

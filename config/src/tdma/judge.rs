@@ -7,13 +7,15 @@ use crate::installation::Installation;
 use crate::node::Node;
 use crate::reader::Reader;
 use crate::units::{duration_decimal, size_text};
-use crate::wire::{KEPT_IN_BYTES, Link};
+use crate::wire::{KEPT_IN_BYTES, Link, RATE_MAX_PER};
 use std::time::Duration;
 
 /// Clocks of two Linux computers that ask each other all the time are known to half of it.
 const GUARD_MIN: Duration = Duration::from_micros(40);
 /// The part of the guard within which a node that joins takes frames of time to arrive.
 const ARRIVES_WITHIN: u32 = 4;
+/// Peers take a node of which nothing came for a second for silent: it has two chances in that time to say that it is there.
+const SLOT_WITHIN: Duration = Duration::from_millis(500);
 /// Who examines all cycles of a table must come to an end.
 const CYCLES_MAX: u64 = 64;
 
@@ -27,6 +29,8 @@ pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
     judge.periods();
     judge.places();
     judge.lengths();
+    judge.joining();
+    judge.silence();
     judge.nodes();
     if reader.is_content() {
         judge.periods_of_flows();
@@ -115,6 +119,43 @@ impl Judge<'_> {
                 "slots with such periods come together again after {cycles} cycles, and it may be {CYCLES_MAX}; write periods that divide each \
                  other, such as {} in place of {longest}",
                 longest.next_power_of_two().min(CYCLES_MAX as u32)
+            ));
+        }
+    }
+
+    /// Who joins knows the time by a Sync alone, so that it may be off by the quarter of the guard within which that came, and by what its
+    /// clock has drifted since: it must be sure to half of the guard until its slot ends, or it never asks for more.
+    fn joining(&self) {
+        let guard = self.tdma.guard;
+        for slot in &self.tdma.slots {
+            let end = slot.offset + slot.length;
+            let least = round_up(end / RATE_MAX_PER * ARRIVES_WITHIN);
+            if guard < least {
+                let known = duration_decimal(guard / ARRIVES_WITHIN + end / RATE_MAX_PER);
+                let end = duration_decimal(end);
+                self.report(slot, format!(
+                    "ends {end} after the cycle begins, and until then a node that joins knows the time to {known} only, which is more than half of \
+                     the guard: it could never send; put it earlier, or write `guard = \"{}\"` or more in [tdma]",
+                    duration_decimal(least)
+                ));
+            }
+        }
+    }
+
+    /// Each node sends often enough that nobody takes it for silent.
+    fn silence(&self) {
+        let pause = |slot: &TimeSlot| self.tdma.cycle * slot.period;
+        for node in 0..self.installation.nodes.len() {
+            let own = self.tdma.slots.iter().filter(|slot| usize::from(slot.node) == node);
+            let Some(slot) = own.min_by_key(|slot| slot.period).filter(|slot| pause(slot) > SLOT_WITHIN) else {
+                continue;
+            };
+            let most = SLOT_WITHIN.as_nanos() / self.tdma.cycle.as_nanos().max(1);
+            let right =
+                if most > 0 { format!("write `period = {most}` or less") } else { "write a shorter `cycle`".into() };
+            self.report(slot, format!(
+                "comes once in {}, and none of that node sooner: others would take it for silent in between; {right}",
+                duration_decimal(pause(slot))
             ));
         }
     }

@@ -72,6 +72,8 @@ use crate::frame::HEAD_BYTES;
 pub const TIME_BYTES: usize = HEAD_BYTES + message::MESSAGE_BYTES;
 /// How much faster or slower than system time a computer's clock may be, ns a second: two clocks of 100 ppm, and some room.
 pub const RATE_MAX_PPB: i64 = 250_000;
+// Who judges tables of slots counts on it.
+const _: () = assert!(RATE_MAX_PPB * rohrpost_config::wire::RATE_MAX_PER as i64 == 1_000_000_000);
 /// How much that may change in a second, ns a second: measured clocks in a moving robot change by a tenth of it.
 pub const WANDER_PPB_S: i64 = 500;
 /// From so far on a node steps instead of slewing, which is a new epoch for all.

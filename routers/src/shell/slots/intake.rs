@@ -45,6 +45,11 @@ impl Intake {
         (self.room_bytes, self.least, self.taken_ns) = (room_bytes, Priority(u8::MAX), monotonic_ns());
     }
 
+    /// It is over: what waits now waits for the next.
+    pub(super) fn close(&mut self) {
+        (self.room_bytes, self.least) = (0, Priority(u8::MAX));
+    }
+
     /// Before the call: takes the next package, if the slot wants it.
     pub(super) fn take_one(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
         if self.room_bytes > 0 || self.outranks() {

@@ -45,6 +45,8 @@ use std::sync::mpsc;
 const SPIN_NS_MAX: u64 = 150_000;
 /// Of the cycle, at most this part for each window: short cycles leave less time for it.
 const SPIN_CYCLES: u64 = 20;
+/// Syncs that came since it woke up are looked for so long before the call: to read one takes some microseconds.
+const LAST_LOOK_NS: u64 = 50_000;
 /// In the last moments before the call nothing is begun that might last until then.
 const QUIET_NS: u64 = 20_000;
 /// Whether the mailbox is full is looked at this often: half of it has room for a burst of 32 packages.
@@ -240,9 +242,16 @@ impl Slots {
             let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
             self.intake.open(self.discipline.table().wire().bytes_in(sends_ns));
         }
-        self.spin(planned.call_ns);
+        self.spin(planned);
         let called_ns = self.works.now_ns();
-        let Verdict::Send(mut permit) = self.discipline.judge(planned, called_ns, &self.works.clock) else { return };
+        if let Verdict::Send(permit) = self.discipline.judge(planned, called_ns, &self.works.clock) {
+            self.send(permit, called_ns);
+        }
+        self.intake.close();
+    }
+
+    /// `called_ns`: when the window was asked for.
+    fn send(&mut self, mut permit: Permit, called_ns: u64) {
         self.first = None;
         self.send_time(&mut permit, called_ns);
         if permit.carries == Carries::All {
@@ -264,12 +273,20 @@ impl Slots {
         self.look();
     }
 
-    /// Takes what the slot has room for, and what still comes, until shortly before the call.
-    fn spin(&mut self, call_ns: u64) {
+    /// Takes what the slot has room for, and what still comes, until shortly before the call. Who is to send only if a Sync is missing looks
+    /// for it once more.
+    fn spin(&mut self, planned: &Planned) {
+        let left_ns = |works: &Works| planned.call_ns.saturating_sub(works.now_ns());
+        let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
+        let mut looks = !is_slot && left_ns(&self.works) > 2 * LAST_LOOK_NS;
         loop {
-            let left_ns = call_ns.saturating_sub(self.works.now_ns());
+            let left_ns = left_ns(&self.works);
             if left_ns == 0 {
                 return;
+            }
+            if looks && left_ns < LAST_LOOK_NS {
+                looks = false;
+                self.look();
             }
             if left_ns > QUIET_NS {
                 self.intake.take_one(&mut self.outbound, &mut self.answers);
