@@ -75,7 +75,7 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
     let talked = talkers.end()?;
     let counts = Counts::between(&counts, &routers.counts()?);
     capture.check()?;
-    let kept = Kept::of(&capture.since(first), &FLOWS.table(0)?, &time);
+    let kept = Kept::of(&capture.since(first), &FLOWS.tables()?, &time);
     Ok(Watched { arrivals: capture.arrivals(), kept, counts, talked, windows, waited_ms_s })
 }
 
