@@ -112,8 +112,7 @@ fn far_off(seen: &Observed) -> (u64, u64) {
 
 /// Of all. What wakes up too late does not send, so without real time most slots are left out, and few are begun late.
 fn not_kept(seen: &Observed) -> (u64, u64) {
-    let counts = &seen.counts;
-    (far_off(seen).0 + counts.omitted() + counts.silent, counts.all() + counts.silent)
+    (far_off(seen).0 + seen.counts.omitted(), seen.counts.all())
 }
 
 /// Share of ours by that of the other, in each round. Who had none is taken to have had one.
