@@ -1,7 +1,7 @@
 //! Declared flows, while every node floods with a lower class: how late their packages are, beside the bounds that `rohrpost check` computes
 //! for this very configuration.
 
-use super::goals::{Goal, figure, spread};
+use super::goals::{Goal, NONE, figure, spread};
 use super::observed::{ALL, watched};
 use super::plans::FLOWS;
 use crate::cases::Case;
@@ -25,7 +25,6 @@ use std::time::{Duration, Instant};
 const WINDOW: Duration = Duration::from_secs(1);
 const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
 const NOT_VACUOUS: [Goal; 1] = [Goal { name: "must 3 times", most: 3.0 }];
-const NONE: [Goal; 1] = [Goal { name: "must none", most: 0.0 }];
 const STOLEN: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
 pub(super) fn cases() -> Vec<Box<dyn Case>> {

@@ -12,6 +12,9 @@ pub(super) struct Goal {
     pub most: f64,
 }
 
+/// Where nothing at all is allowed.
+pub(super) const NONE: [Goal; 1] = [Goal { name: "must none", most: 0.0 }];
+
 /// A figure that is there once in a round, beside each of its goals, which its worst round must meet; without goals, alone. None without
 /// any round.
 pub(super) fn figure(subject: &Subject, who: &'static str, rounds: &[f64], goals: &[Goal]) -> Vec<Row> {
