@@ -24,6 +24,7 @@ use std::time::{Duration, Instant};
 /// Parts of a turn in which it is looked whether the hypervisor took time away.
 const WINDOW: Duration = Duration::from_secs(1);
 const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
+const WITHIN_ALONE: [Goal; 1] = [Goal { name: "hoped bound", most: 1.0 }];
 const NOT_VACUOUS: [Goal; 1] = [Goal { name: "must 3 times", most: 3.0 }];
 const STOLEN: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
@@ -117,6 +118,8 @@ fn measured(turns: &[Watched]) -> Result<Vec<Measured>, Failure> {
 fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
     let mut off_us: Vec<f64> = turns.iter().flat_map(|turn| turn.kept.off_us.iter().copied()).collect();
     let wake_up_us = Summary::of(&mut off_us).and_then(|summary| summary.p999).unwrap_or_default();
+    // A slot that is off by more was not kept, which is no excuse.
+    let allowed_us = wake_up_us.min(FLOWS.guard_us as f64);
     let mut rows = Vec::new();
     for Measured { name, bound_us, mut latencies_us } in measured(turns)? {
         let case = format!("flows, {name}");
@@ -127,13 +130,11 @@ fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
         };
         rows.extend(spread(&subject(&case, "us"), "measured", latencies_us));
         rows.extend(figure(&subject(&case, "us"), "bound", &[bound_us], &[]));
-        let within = p999_us / (bound_us + wake_up_us);
-        rows.extend(figure(
-            &subject(&format!("{case}, p99.9"), "of bound and wake-up"),
-            "measured",
-            &[within],
-            &WITHIN,
-        ));
+        for (unit, most_us, goals) in
+            [("of bound and wake-up", bound_us + allowed_us, &WITHIN), ("of bound", bound_us, &WITHIN_ALONE)]
+        {
+            rows.extend(figure(&subject(&format!("{case}, p99.9"), unit), "measured", &[p999_us / most_us], goals));
+        }
         let vacuous = bound_us / p999_us;
         rows.extend(figure(&subject(&format!("{case}, bound"), "of p99.9"), "bound", &[vacuous], &NOT_VACUOUS));
     }
