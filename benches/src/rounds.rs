@@ -29,6 +29,8 @@ impl<'a> Contender<'a> {
 pub enum Target {
     /// Of times and sizes.
     AtMost(f64),
+    /// Of what may never be more: in each round.
+    EachAtMost(f64),
     /// Of rates.
     AtLeast(f64),
 }
@@ -37,15 +39,16 @@ impl Target {
     /// The ratio itself.
     pub fn bound(self) -> f64 {
         match self {
-            Self::AtMost(bound) | Self::AtLeast(bound) => bound,
+            Self::AtMost(bound) | Self::EachAtMost(bound) | Self::AtLeast(bound) => bound,
         }
     }
 
     /// Whether this ratio reaches it.
-    pub fn is_met(self, ratio: f64) -> bool {
+    pub fn is_met(self, ratio: Ratio) -> bool {
         match self {
-            Self::AtMost(bound) => ratio <= bound,
-            Self::AtLeast(bound) => ratio >= bound,
+            Self::AtMost(bound) => ratio.median <= bound,
+            Self::EachAtMost(bound) => ratio.max <= bound,
+            Self::AtLeast(bound) => ratio.median >= bound,
         }
     }
 }
@@ -100,7 +103,7 @@ impl Row {
         }
         let reached = |target: Option<Target>, ratio: Option<Ratio>| match (target, ratio) {
             (None, _) => Some(true),
-            (Some(target), Some(ratio)) => Some(target.is_met(ratio.median)),
+            (Some(target), Some(ratio)) => Some(target.is_met(ratio)),
             (Some(_), None) => None,
         };
         Some(reached(versus.p50, self.ratio_p50)? && reached(versus.p99, self.ratio_p99)?)

@@ -71,6 +71,7 @@ fn line(row: &Row) -> Vec<String> {
     let target = |name: &str, target: Option<Target>| {
         target.map(|target| match target {
             Target::AtMost(bound) => format!("{name} ≤ {bound}"),
+            Target::EachAtMost(bound) => format!("each {name} ≤ {bound}"),
             Target::AtLeast(bound) => format!("{name} ≥ {bound}"),
         })
     };

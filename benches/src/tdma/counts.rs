@@ -63,9 +63,9 @@ impl Counts {
         }
     }
 
-    /// Slots that were left out.
+    /// Slots that were left out, for whatever reason.
     pub fn omitted(&self) -> u64 {
-        self.late + self.skipped
+        self.late + self.skipped + self.silent
     }
 
     /// The same, percent of all.
@@ -73,7 +73,7 @@ impl Counts {
         self.omitted() as f64 * 100.0 / self.all().max(1) as f64
     }
 
-    /// All slots, but those in which the node did not know the time.
+    /// All slots.
     pub fn all(&self) -> u64 {
         self.used + self.empty + self.omitted()
     }
@@ -107,9 +107,10 @@ mod tests {
 
     #[test]
     fn what_routers_left_out_is_counted_over_all_nodes() {
-        let counts = |used, late, skipped| Counts { used, late, skipped, ..Counts::default() };
-        let (before, after) = ([counts(10, 1, 0), counts(20, 0, 0)], [counts(110, 3, 1), counts(121, 0, 1)]);
+        let counts = |used, late, skipped, silent| Counts { used, late, skipped, silent, ..Counts::default() };
+        let before = [counts(10, 1, 0, 0), counts(20, 0, 0, 7)];
+        let after = [counts(110, 3, 1, 0), counts(121, 0, 1, 9)];
         let since = Counts::between(&before, &after);
-        assert_eq!((since.used, since.omitted(), since.all()), (201, 4, 205));
+        assert_eq!((since.used, since.omitted(), since.all()), (201, 6, 207));
     }
 }

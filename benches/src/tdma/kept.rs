@@ -1,19 +1,21 @@
 //! How slots were kept: what the capture saw, held against the table by the master's time.
 
-use super::capture::Crossed;
+use super::capture::{Crossed, What};
 use super::stage::NODES;
 use crate::statistics::median;
 use rohrpost_mailbox::TimeRecord;
-use rohrpost_routers::tdma::{Kind, Owner, Table};
+use rohrpost_routers::tdma::{Kind, Table, Window};
 
 /// What became of the frames of some cycles.
 #[derive(Clone, Default, Debug)]
 pub struct Kept {
-    /// Of each slot's first frame: how long after the beginning, less the median of its node, µs; never less than 0.
+    /// Of each slot's first frame: how far from the beginning, µs; in its window less the median of its node.
     pub off_us: Vec<f64>,
     /// Frames, those of synchronisation and what routers say to each other included.
     pub frames: usize,
-    /// Of these, in another's window.
+    /// Of these, in no window of their sender.
+    pub outside: usize,
+    /// Of those outside, in another's window.
     pub in_anothers: usize,
     /// How far into the guard of its slot the latest frame began, µs; 0 if none did.
     pub into_guard_us: f64,
@@ -21,28 +23,31 @@ pub struct Kept {
 
 impl Kept {
     /// A frame is its sender's if it begins in a window of it or in the guard behind, or so little before that the guard of who was there
-    /// before still holds.
-    pub fn of(frames: &[Crossed], table: &Table, time: &TimeRecord) -> Self {
+    /// before still holds. Any other is outside, and off as far as the nearest slot of its sender is, if it could be the first of that.
+    /// `tables`: as each node reads them.
+    pub fn of(frames: &[Crossed], tables: &[Table], time: &TimeRecord) -> Self {
         let mut kept = Self { frames: frames.len(), ..Self::default() };
-        let mut starts_us: [Vec<f64>; NODES as usize] = Default::default();
-        let mut last = None;
+        let mut nodes: [Sender; NODES as usize] = Default::default();
         for frame in frames {
-            let at_ns = time.at(frame.at_ns).ns;
-            let owners = [at_ns, at_ns + table.allowance_ns()].map(|ns| table.owner(ns));
-            let Some(Owner { window, .. }) = owners.into_iter().flatten().find(|owner| owner.node == frame.from) else {
-                kept.in_anothers += usize::from(owners[0].is_some());
+            let from = usize::from(frame.from);
+            let (Some(table), Some(node)) = (tables.get(from), nodes.get_mut(from)) else {
+                kept.outside += 1;
                 continue;
             };
-            kept.into_guard_us = kept.into_guard_us.max(at_ns.saturating_sub(window.end_ns) as f64 / 1000.0);
-            let is_first = last != Some((frame.from, window));
-            last = Some((frame.from, window));
-            if let (true, Kind::Slot { .. }, Some(starts_us)) =
-                (is_first, window.kind, starts_us.get_mut(usize::from(frame.from)))
-            {
-                starts_us.push(at_ns.wrapping_sub(window.begin_ns).cast_signed() as f64 / 1000.0);
+            let at_ns = time.at(frame.at_ns).ns;
+            let owners = [at_ns, at_ns + table.allowance_ns()].map(|ns| table.owner(ns));
+            if let Some(owner) = owners.into_iter().flatten().find(|owner| owner.node == frame.from) {
+                kept.into_guard_us = kept.into_guard_us.max(at_ns.saturating_sub(owner.window.end_ns) as f64 / 1000.0);
+                let start_us = node.first_in(owner.window, at_ns);
+                node.starts_us.extend(start_us);
+            } else {
+                kept.outside += 1;
+                kept.in_anothers += usize::from(owners[0].is_some());
+                let nearest = nearest_slot(table, at_ns).filter(|_| matches!(frame.what, What::Packages | What::Said));
+                kept.off_us.extend(nearest.and_then(|window| node.first_in(window, at_ns)).map(f64::abs));
             }
         }
-        for starts_us in starts_us {
+        for Sender { starts_us, .. } in nodes {
             let middle_us = median(starts_us.iter().copied()).unwrap_or_default();
             kept.off_us.extend(starts_us.into_iter().map(|start_us| (start_us - middle_us).abs()));
         }
@@ -55,11 +60,33 @@ impl Kept {
     }
 }
 
+/// What is known of a node while frames are looked at.
+#[derive(Default)]
+struct Sender {
+    /// Of the first frame of each of its slots: how long after the beginning, µs.
+    starts_us: Vec<f64>,
+    /// Where its last frame belonged.
+    last: Option<Window>,
+}
+
+impl Sender {
+    /// How long after the beginning of its slot a frame came, µs; negative if before. None if it is not the first, or it is no slot.
+    fn first_in(&mut self, window: Window, at_ns: u64) -> Option<f64> {
+        let is_first = self.last.replace(window) != Some(window) && matches!(window.kind, Kind::Slot { .. });
+        is_first.then(|| at_ns.wrapping_sub(window.begin_ns).cast_signed() as f64 / 1000.0)
+    }
+}
+
+/// The slot of a table's node that begins closest to a moment; it has one in each cycle.
+fn nearest_slot(table: &Table, at_ns: u64) -> Option<Window> {
+    let around = [at_ns.saturating_sub(table.cycle_ns()), at_ns].map(|from_ns| table.next_slot(from_ns));
+    around.into_iter().flatten().min_by_key(|slot| slot.begin_ns.abs_diff(at_ns))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cases::tdma::plans;
-    use crate::tdma::capture::What;
     use rohrpost_mailbox::TimeSource;
 
     /// System time and the monotonic clock are one.
@@ -80,17 +107,32 @@ mod tests {
     #[test]
     fn first_frames_count_and_what_is_in_anothers_slot_is_told() {
         // Two windows of 500 us, then slots of 430 us, 150 of which are guard; a cycle is 5 ms.
-        let table = plans::LOADED.table(0).unwrap();
+        let tables = plans::LOADED.tables().unwrap();
         let cycles = [(0, 1_010), (0, 1_130), (1, 1_440), (0, 6_012), (1, 6_440), (0, 11_310), (1, 11_440)];
-        let kept = Kept::of(&frames(&cycles), &table, &TIME);
+        let kept = Kept::of(&frames(&cycles), &tables, &TIME);
         // Of node 0: 10, 12 and 310 us late, so 2, 0 and 298 us off the median.
         let mut off_us = kept.off_us.clone();
         off_us.sort_unstable_by(f64::total_cmp);
         assert_eq!(off_us, [0.0, 0.0, 0.0, 0.0, 2.0, 298.0]);
-        assert_eq!((kept.frames, kept.in_anothers, kept.further_off(250.0)), (7, 0, 1));
+        assert_eq!((kept.frames, kept.outside, kept.in_anothers, kept.further_off(250.0)), (7, 0, 0, 1));
         assert_eq!(kept.into_guard_us, 30.0, "310 us after the beginning of 280 us");
         // 80 us before its slot is in the slot of another, 70 us are in the guard and allowed for.
-        let strangers = Kept::of(&frames(&[(1, 1_350), (1, 1_360), (2, 1_010), (2, 4_000)]), &table, &TIME);
-        assert_eq!(strangers.in_anothers, 2);
+        let strangers = Kept::of(&frames(&[(1, 1_350), (1, 1_360), (2, 1_010), (2, 4_000)]), &tables, &TIME);
+        assert_eq!((strangers.outside, strangers.in_anothers), (3, 2));
+        // Node 2's slot is at 1860 us, and has one first frame.
+        assert_eq!(strangers.off_us, [80.0, 850.0]);
+    }
+
+    #[test]
+    fn what_is_in_nobodys_time_is_far_off_and_its_slot_has_no_other_first_frame() {
+        let tables = plans::LOADED.tables().unwrap();
+        // Behind the last slot, which ends at 2290 us: 1000 us and more behind node 2's beginning; and before the next cycle's.
+        let late = Kept::of(&frames(&[(2, 2_860), (2, 2_900), (2, 6_400), (2, 6_860)]), &tables, &TIME);
+        assert_eq!((late.outside, late.in_anothers), (3, 1));
+        assert_eq!(late.off_us, [1_000.0, 460.0]);
+        // What is no slot's is outside alone.
+        let sync = [Crossed { what: What::Sync, ..frames(&[(0, 3_000)])[0] }];
+        let sync = Kept::of(&sync, &tables, &TIME);
+        assert_eq!((sync.outside, sync.off_us.len()), (1, 0));
     }
 }

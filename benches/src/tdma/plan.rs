@@ -94,6 +94,14 @@ impl Plan {
         Ok(Table::new(tdma, installation.time.masters(), own, NODES, settings.overhead_bytes()))
     }
 
+    /// The slots, as each node reads them.
+    ///
+    /// # Errors
+    /// As [`Self::installation`].
+    pub fn tables(&self) -> Result<Vec<Table>, Failure> {
+        (0..NODES).map(|own| self.table(own)).collect()
+    }
+
     /// The configuration.
     pub fn text(&self) -> String {
         let Self { cycle_us, synchronisation_us, guard_us, pitch_us, link, masters, .. } = self;

@@ -43,6 +43,12 @@ pub fn changes_of_master(frames: &[Crossed]) -> usize {
     masters().zip(masters().skip(1)).filter(|(before, after)| before != after).count()
 }
 
+/// How many of so many cycles had no master's synchronisation, percent.
+pub fn without_sync_percent(frames: &[Crossed], cycles: f64) -> f64 {
+    let syncs = frames.iter().filter(|frame| frame.what == What::Sync).count() as f64;
+    (cycles - syncs).max(0.0) * 100.0 / cycles
+}
+
 /// Kills the master after some part of a cycle, and waits until another reigns.
 ///
 /// # Errors

@@ -35,7 +35,13 @@ pub(super) struct Figure {
 }
 
 /// What belongs to each case: whether nodes met on the wire, and what the computer did meanwhile.
-pub(super) const ALWAYS: [Figure; 3] = [
+pub(super) const ALWAYS: [Figure; 4] = [
+    Figure {
+        what: "outside its own",
+        unit: "%",
+        of: Observed::outside_percent,
+        goals: &[Goal { name: "none", most: 0.0 }],
+    },
     Figure {
         what: "in another's slot",
         unit: "%",

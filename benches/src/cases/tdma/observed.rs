@@ -75,7 +75,7 @@ impl Observed {
             }
         }
         Ok(Self {
-            kept: Kept::of(&frames, &plan.table(0)?, &time),
+            kept: Kept::of(&frames, &plan.tables()?, &time),
             steal_percent: machine_after.steal_percent(&machine),
             waited_ms_s: machine_after.waited_ms(&machine) / watched(settings).as_secs_f64(),
             counts,
@@ -98,6 +98,11 @@ impl Observed {
     /// Slots whose first frame was further off than this, percent of those that were used.
     pub(super) fn further_off_percent(&self, than_us: f64) -> f64 {
         self.kept.further_off(than_us) as f64 * 100.0 / self.kept.off_us.len().max(1) as f64
+    }
+
+    /// Frames in no window of their sender, percent.
+    pub(super) fn outside_percent(&self) -> f64 {
+        self.kept.outside as f64 * 100.0 / self.kept.frames.max(1) as f64
     }
 
     /// Frames in another's slot, percent.

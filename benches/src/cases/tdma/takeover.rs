@@ -11,7 +11,7 @@ use crate::tdma::capture::Capture;
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
 use crate::tdma::stage::Stage;
-use crate::tdma::takeover::{TakenOver, changes_of_master, kill_master};
+use crate::tdma::takeover::{TakenOver, changes_of_master, kill_master, without_sync_percent};
 use crate::tdma::traffic::Traffic;
 use std::time::Duration;
 
@@ -33,6 +33,7 @@ const REIGNS: [Goal; 2] = [Goal { name: "must 4 cycles", most: 4.0 }, Goal { nam
 const LOST: [Goal; 1] = [Goal { name: "hoped none", most: 0.0 }];
 const STEP: [Goal; 1] = [Goal { name: "hoped 5 us", most: 5.0 }];
 const FALSE: [Goal; 2] = [Goal { name: "must 1", most: 1.0 }, Goal { name: "hoped none", most: 0.0 }];
+const WITHOUT_SYNC: [Goal; 1] = [Goal { name: "must 1 %", most: 1.0 }];
 
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     vec![Box::new(Takeover)]
@@ -46,6 +47,8 @@ struct Found {
     killed: Vec<TakenOver>,
     quiet_cycles: f64,
     false_changes: usize,
+    /// Of the quiet cycles of each round, those in which the capture saw no Sync, percent.
+    without_sync: Vec<f64>,
 }
 
 impl Case for Takeover {
@@ -82,8 +85,10 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
     let first = capture.len();
     rest(quiet)?;
     capture.check()?;
-    found.false_changes += changes_of_master(&capture.since(first));
-    found.quiet_cycles += quiet.as_micros() as f64 / LOADED.cycle_us as f64;
+    let (frames, cycles) = (capture.since(first), quiet.as_micros() as f64 / LOADED.cycle_us as f64);
+    found.false_changes += changes_of_master(&frames);
+    found.without_sync.push(without_sync_percent(&frames, cycles));
+    found.quiet_cycles += cycles;
     Ok(())
 }
 
@@ -91,6 +96,10 @@ impl Found {
     /// What became of it when this node was the master.
     fn killed(&self, who: &'static str, dead: u8) -> Vec<Row> {
         let kills: Vec<&TakenOver> = self.killed.iter().filter(|kill| kill.dead == dead).collect();
+        if kills.is_empty() {
+            let never = Failure::Failed("it was never the master when one was killed".into());
+            return vec![Row::alone(subject("takeover, replacement", "cycles"), who, Err(never))];
+        }
         let mut rows = Vec::new();
         let mut told = |what: &str, unit, goals: &[Goal], of: fn(&TakenOver) -> f64| {
             let all: Vec<f64> = kills.iter().map(|kill| of(kill)).collect();
@@ -108,8 +117,13 @@ impl Found {
     fn rows(&self) -> Vec<Row> {
         let mut rows: Vec<Row> = DEAD.iter().zip(0..).flat_map(|(who, dead)| self.killed(who, dead)).collect();
         let cycles = self.quiet_cycles;
-        let changes = self.false_changes as f64 * 1e5 / cycles;
-        rows.extend(figure(&subject("takeover, false changes", "in 1e5 cycles"), "quiet", &[changes], &FALSE));
+        let seen = subject("takeover, cycles without Sync", "%");
+        rows.extend(figure(&seen, "quiet", &self.without_sync, &WITHOUT_SYNC));
+        // Who sees no master sees no change of it.
+        if self.without_sync.iter().all(|percent| *percent <= WITHOUT_SYNC[0].most) {
+            let changes = self.false_changes as f64 * 1e5 / cycles;
+            rows.extend(figure(&subject("takeover, false changes", "in 1e5 cycles"), "quiet", &[changes], &FALSE));
+        }
         rows.extend(figure(&subject("takeover, quiet", "cycles"), "quiet", &[cycles], &[]));
         rows.extend(figure(&subject("takeover, kills", "kills"), "all", &[self.killed.len() as f64], &[]));
         rows
@@ -118,4 +132,26 @@ impl Found {
 
 fn subject(case: &str, unit: &'static str) -> Subject {
     Subject { case: case.into(), bytes: None, unit }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_nobody_saw_is_no_good_figure() {
+        let kill = |dead| TakenOver { dead, replaced_cycles: 1.0, reigns_cycles: 3.0, slots_lost: 0, step_us: 1.0 };
+        let cases = |killed: &[u8], without_sync| {
+            let killed = killed.iter().map(|dead| kill(*dead)).collect();
+            let rows =
+                Found { killed, quiet_cycles: 200.0, false_changes: 0, without_sync: vec![0.0, without_sync] }.rows();
+            let has = |case: &str| rows.iter().any(|row| row.case == case);
+            let failed = rows.iter().filter(|row| row.result.is_err()).map(|row| row.who).collect::<Vec<_>>();
+            let missed = rows.iter().any(|row| row.case == "takeover, cycles without Sync" && row.met() == Some(false));
+            (has("takeover, false changes"), missed, failed)
+        };
+        assert_eq!(cases(&[0, 1], 1.0), (true, false, vec![]));
+        assert_eq!(cases(&[0, 1], 1.5), (false, true, vec![]));
+        assert_eq!(cases(&[0, 0], 0.0), (true, false, vec![DEAD[1]]));
+    }
 }
