@@ -232,6 +232,18 @@ mod tests {
     }
 
     #[test]
+    fn what_comes_after_a_slot_that_was_not_full_waits_for_the_next() {
+        let mut ground = Ground::new(0);
+        ground.intake.open(1000);
+        ground.data(&[50]);
+        ground.before_the_call(1);
+        ground.intake.close();
+        ground.data(&[50, 255]);
+        ground.before_the_call(10);
+        assert_eq!(ground.waiting(), (2, 1));
+    }
+
+    #[test]
     fn between_slots_all_stays_unless_it_is_much_or_no_slot_comes() {
         let mut ground = Ground::new(0);
         ground.data(&[50; SLOTS as usize / 2]);
