@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Most figures of one turn.
-const SAMPLES_MAX: usize = 20_000;
+const SAMPLES_MAX: usize = 100_000;
 
 /// Some thousand figures in shared memory, written by one process.
 #[repr(C)]

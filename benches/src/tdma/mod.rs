@@ -10,6 +10,7 @@
 //! its slot a frame really came. Routers are the real ones ([`routers`]); where clocks have to be wrong, to be judged, they are threads of a child
 //! ([`shells`]).
 
+pub mod bare;
 pub mod capture;
 pub mod counts;
 pub mod filter;

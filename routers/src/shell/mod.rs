@@ -34,6 +34,7 @@ pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
 pub use news::difference;
+pub use slots::spin_ns;
 pub use socket::{SocketError, listen};
 
 use crate::impair;

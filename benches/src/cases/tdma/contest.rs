@@ -1,11 +1,12 @@
 //! Contenders that differ in their table or in how routers run, watched in turn; and the rows that come of it.
 
 use super::goals::{Goal, figure};
-use super::observed::{Observed, Way};
+use super::observed::{Observed, Way, watched};
 use crate::Failure;
 use crate::rounds::{Contender, Row, Subject, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
+use crate::tdma::bare::Bare;
 use crate::tdma::plan::Plan;
 use crate::tdma::stage::Stage;
 use std::cell::RefCell;
@@ -52,6 +53,12 @@ pub(super) const ALWAYS: [Figure; 4] = [
     Figure { what: "run delay", unit: "ms/s", of: |seen| seen.waited_ms_s, goals: &[] },
 ];
 
+/// The floor: threads that wake up for the slots of the first contender, beside the same load, and send nothing.
+pub(super) const BARE: &str = "bare threads";
+const OMITTED: &str = "omitted";
+/// Who leaves out more than threads that do nothing else is to blame for it. Few slots are left out in a round, so the two differ by chance.
+const OF_BARE: [Goal; 1] = [Goal { name: "hoped 1.5", most: 1.5 }];
+
 /// What was seen of a contender, round after round.
 pub(super) type Seen = Vec<Observed>;
 
@@ -90,7 +97,15 @@ impl Contest {
             let bounds = *bounds;
             Contender { name, turn: Box::new(move || Ok(bounds)) }
         };
-        let contenders = self.watched.iter().enumerate().map(contender);
+        let bare = RefCell::new(Vec::new());
+        let floor = Contender::sampled(BARE, || {
+            let Watched { plan, way, .. } = &self.watched[0];
+            let seen = Bare::turn(stage.as_ref().map_err(Clone::clone)?, plan, way.loaded, watched(settings))?;
+            let late_us = seen.late_us.clone();
+            bare.borrow_mut().push(seen);
+            Ok(late_us)
+        });
+        let contenders = self.watched.iter().enumerate().map(contender).chain([floor]);
         let contenders: Vec<Contender> = contenders.chain(self.bounds.iter().map(fixed)).collect();
         let mut rows = compare(settings, &self.subject("us", None), &contenders, &self.versus);
         drop(contenders);
@@ -98,7 +113,19 @@ impl Contest {
         for figure in &self.figures {
             rows.extend(self.told(figure, &seen));
         }
+        rows.extend(self.beside_bare(&seen[0], &bare.into_inner()));
         (rows, seen)
+    }
+
+    /// Slots that bare threads would have left out, and how many times as many the first contender has.
+    fn beside_bare(&self, seen: &Seen, bare: &[Bare]) -> Vec<Row> {
+        let omitted: Vec<f64> = bare.iter().map(Bare::omitted_percent).collect();
+        let mut rows = figure(&self.subject("%", Some(OMITTED)), BARE, &omitted, &[]);
+        // A round in which nobody was late says nothing about their ratio.
+        let both = seen.iter().map(Observed::omitted_percent).zip(omitted).filter(|(_, bare)| *bare > 0.0);
+        let ratios: Vec<f64> = both.map(|(ours, bare)| ours / bare).collect();
+        rows.extend(figure(&self.subject("of bare", Some(OMITTED)), self.watched[0].who, &ratios, &OF_BARE));
+        rows
     }
 
     /// The rows of a figure: of those who are judged beside its goals, of the others alone.

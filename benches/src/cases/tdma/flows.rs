@@ -1,6 +1,7 @@
 //! Declared flows, while every node floods with a lower class: how late their packages are, beside the bounds that `rohrpost check` computes
 //! for this very configuration.
 
+use super::contest::BARE;
 use super::goals::{Goal, NONE, figure, spread};
 use super::observed::{ALL, watched};
 use super::plans::FLOWS;
@@ -9,6 +10,7 @@ use crate::harness::{Failure, alone, rest};
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
 use crate::statistics::{Summary, median};
+use crate::tdma::bare::Bare;
 use crate::tdma::capture::{Arrived, Capture};
 use crate::tdma::counts::Counts;
 use crate::tdma::kept::Kept;
@@ -43,6 +45,7 @@ struct Watched {
     /// Steal in each window, percent.
     windows: Vec<f64>,
     waited_ms_s: f64,
+    bare: Bare,
 }
 
 impl Case for Flows {
@@ -65,7 +68,7 @@ impl Case for Flows {
 fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
     let routers = Routers::start(stage, &FLOWS, Rights::RealTime, settings)?;
     let mut capture = Capture::start(stage)?;
-    let _traffic = Traffic::start(&routers)?;
+    let traffic = Traffic::start(&routers)?;
     routers.await_packages(&ALL, &mut capture)?;
     let time = routers.clock(0)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;
     let (counts, first, before) = (routers.counts()?, capture.len(), routers.machine());
@@ -76,7 +79,10 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
     let counts = Counts::between(&counts, &routers.counts()?);
     capture.check()?;
     let kept = Kept::of(&capture.since(first), &FLOWS.tables()?, &time);
-    Ok(Watched { arrivals: capture.arrivals(), kept, counts, talked, windows, waited_ms_s })
+    let arrivals = capture.arrivals();
+    drop((traffic, capture, routers));
+    let bare = Bare::turn(stage, &FLOWS, false, watched(settings))?;
+    Ok(Watched { arrivals, kept, counts, talked, windows, waited_ms_s, bare })
 }
 
 /// Sleeps for so long; what the hypervisor took in each window of it, percent.
@@ -128,6 +134,8 @@ fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
             rows.push(Row::alone(subject(&case, "us"), "measured", Err(failure)));
             continue;
         };
+        let beyond = latencies_us.iter().filter(|latency_us| **latency_us > bound_us).count();
+        let beyond_percent = beyond as f64 * 100.0 / latencies_us.len() as f64;
         rows.extend(spread(&subject(&case, "us"), "measured", latencies_us));
         rows.extend(figure(&subject(&case, "us"), "bound", &[bound_us], &[]));
         for (unit, most_us, goals) in
@@ -135,6 +143,7 @@ fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
         {
             rows.extend(figure(&subject(&format!("{case}, p99.9"), unit), "measured", &[p999_us / most_us], goals));
         }
+        rows.extend(figure(&subject(&format!("{case}, beyond bound"), "%"), "measured", &[beyond_percent], &[]));
         let vacuous = bound_us / p999_us;
         rows.extend(figure(&subject(&format!("{case}, bound"), "of p99.9"), "bound", &[vacuous], &NOT_VACUOUS));
     }
@@ -144,9 +153,15 @@ fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
     rows.extend(figure(&subject("flows, published", "packages"), "all", &[published as f64], &[]));
     let omitted: Vec<f64> = turns.iter().map(|turn| turn.counts.omitted_percent()).collect();
     rows.extend(figure(&subject("flows, omitted", "%"), "all", &omitted, &[]));
+    rows.extend(figure(&subject("flows, omitted", "%"), BARE, &bare_percent(turns), &[]));
     rows.extend(figure(&subject("flows, wake-up p99.9", "us"), "all", &[wake_up_us], &[]));
     rows.extend(steal_rows(turns));
     Ok(rows)
+}
+
+/// Slots that threads which only wake up would have left out, beside nothing else, of each turn.
+fn bare_percent(turns: &[Watched]) -> Vec<f64> {
+    turns.iter().map(|turn| turn.bare.omitted_percent()).collect()
 }
 
 /// Windows of a second in which the hypervisor took something, and how much.

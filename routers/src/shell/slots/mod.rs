@@ -61,8 +61,8 @@ pub(super) const REFUSAL_BYTES: usize = 128;
 /// Refusals that wait for a slot; more are lost, and said again a second later.
 pub(super) const REFUSALS: usize = 8;
 
-/// How long before the call it is to wake up, ns.
-pub(super) fn spin_ns(cycle_ns: u64) -> u64 {
+/// How long before the call the thread that sends in time slots is to wake up, ns; then it spins.
+pub fn spin_ns(cycle_ns: u64) -> u64 {
     SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)
 }
 
