@@ -1,7 +1,7 @@
 //! The thread that sends in time slots: it has the router's mailbox, its queue, all sockets that send, and the clock.
 //!
 //! ```text
-//!        sleep, at most a millisecond at a time             wake    call begin              guard
+//!        sleep, about a millisecond at a time                  wake    call begin              guard
 //!  ──┬──────────────┬──────────────┬─────────────────────────┬───────┬────┬───────────────────┬─────▶ local time
 //!    is the mailbox full?   the same      the same           │ spin  │lead│ time, refusal,    │
 //!                                         mailbox ─▶ queue ──┼──────▶│    │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
@@ -51,8 +51,11 @@ const LAST_LOOK_NS: u64 = 50_000;
 const QUIET_NS: u64 = 20_000;
 /// Whether the mailbox is full is looked at this often: half of it has room for a burst of 32 packages.
 const NAP_NS: u64 = 1_000_000;
-/// With less than this until it has to wake up it sleeps on: the look at the mailbox would last too long.
-const NAP_NS_MIN: u64 = NAP_NS / 4;
+/// With less than this until it has to wake up it sleeps on: each look at the mailbox keeps a processor from another thread, perhaps one that
+/// is about to send.
+const SLEEP_NS_MAX: u64 = NAP_NS + NAP_NS / 4;
+/// To see to what waits takes less than this, unless much does.
+const TIDY_NS: u64 = 250_000;
 /// A datagram is made so long before it is handed over, at most, unless the thread stands still.
 const MAKING_NS: u64 = 10_000;
 const _: () = assert!(MAKING_NS < HAND_OVER.as_nanos() as u64, "bounds have room for it");
@@ -101,6 +104,8 @@ pub(super) struct Slots {
     own: Own,
     /// When the socket of time was read last, local ns.
     looked_ns: u64,
+    /// When it saw last to what waits.
+    tidied_ns: u64,
     /// The first datagram of the last window, if the kernel stamps it.
     first: Option<First>,
     snapshot: Snapshot,
@@ -152,6 +157,7 @@ impl Slots {
             held: None,
             own,
             looked_ns: 0,
+            tidied_ns: 0,
             first: None,
             snapshot,
             state,
@@ -181,9 +187,14 @@ impl Slots {
                 Next::Silent { until_ns, .. } => (None, until_ns),
             };
             let left_ns = wake_ns.saturating_sub(now_ns);
-            if left_ns > NAP_NS_MIN {
+            if left_ns > SLEEP_NS_MAX {
                 // Not so that the rest is a short one.
                 alarm::sleep(NAP_NS.min(left_ns / 2));
+                self.between(planned.is_none(), wake_ns);
+                continue;
+            }
+            // Windows follow each other quickly.
+            if left_ns > TIDY_NS && monotonic_ns().saturating_sub(self.tidied_ns) > SLEEP_NS_MAX {
                 self.between(planned.is_none(), wake_ns);
                 continue;
             }
@@ -200,6 +211,7 @@ impl Slots {
     /// time; others read them once a cycle at least.
     fn between(&mut self, silent: bool, wake_ns: u64) {
         let now_ns = monotonic_ns();
+        self.tidied_ns = now_ns;
         self.drop_if_old();
         self.outbound.tidy(now_ns, &mut self.answers);
         let left_ns = || wake_ns.saturating_sub(self.works.now_ns());
