@@ -309,7 +309,9 @@ mod tests {
             p99_ns: 1,
             bound_ns,
             deadline_ns: 10_000_000,
+            kept_worst_ns: 4_000_000,
             over_bound: 0,
+            kept_over_bound: 0,
             over_deadline: 0,
             lost: Vec::new(),
         };

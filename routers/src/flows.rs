@@ -12,6 +12,7 @@ use crate::latencies::Latencies;
 use crate::stats::{Cause, Count};
 use rohrpost_config::{Installation, Module, bounds};
 use rohrpost_mailbox::{Head, Kind, Latency, Name};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// A flow from a module of this node to one of another.
@@ -73,8 +74,12 @@ pub struct FlowCounts {
     deadline_ns: u64,
     bound_ns: u64,
     latency: Latencies,
+    /// The slowest of those whose slots were all kept, ns.
+    kept_worst_ns: AtomicU64,
     /// Packages that took longer than the bound.
     pub over_bound: Count,
+    /// Of these, packages whose slots were all kept: there should be none.
+    pub kept_over_bound: Count,
     /// Packages that took longer than the deadline.
     pub over_deadline: Count,
     lost: [Count; Cause::ALL.len()],
@@ -86,7 +91,9 @@ impl FlowCounts {
             deadline_ns: ns(flow.deadline),
             bound_ns: flow.bound.map_or(u64::MAX, ns),
             latency: Latencies::default(),
+            kept_worst_ns: AtomicU64::new(0),
             over_bound: Count::default(),
+            kept_over_bound: Count::default(),
             over_deadline: Count::default(),
             lost: Default::default(),
         }
@@ -95,6 +102,11 @@ impl FlowCounts {
     /// How long packages took that were sent.
     pub fn latency(&self) -> Latency {
         self.latency.get()
+    }
+
+    /// How long the slowest took of those whose slots were all kept: of which the bound says something.
+    pub fn kept_worst(&self) -> Duration {
+        Duration::from_nanos(self.kept_worst_ns.load(Ordering::Relaxed))
     }
 
     /// Packages lost in this router for a cause.
@@ -107,9 +119,15 @@ impl FlowCounts {
         self.lost.iter().map(Count::get).sum()
     }
 
-    fn took(&self, took_ns: u64) {
+    fn took(&self, took_ns: u64, kept: bool) {
         self.latency.note(took_ns);
         self.over_bound.add(u64::from(took_ns > self.bound_ns));
+        if kept {
+            // One thread writes.
+            let worst_ns = self.kept_worst_ns.load(Ordering::Relaxed).max(took_ns);
+            self.kept_worst_ns.store(worst_ns, Ordering::Relaxed);
+            self.kept_over_bound.add(u64::from(took_ns > self.bound_ns));
+        }
         self.over_deadline.add(u64::from(took_ns > self.deadline_ns));
     }
 }
@@ -162,8 +180,9 @@ impl Flows {
         entry.map(|entry| entry.flow)
     }
 
-    pub(crate) fn took(&self, flow: u16, took_ns: u64) {
-        self.counts[usize::from(flow)].took(took_ns);
+    /// `kept`: no slot was left out since its publishing.
+    pub(crate) fn took(&self, flow: u16, took_ns: u64, kept: bool) {
+        self.counts[usize::from(flow)].took(took_ns, kept);
     }
 
     pub(crate) fn lost(&self, head: &Head, cause: Cause) {

@@ -7,9 +7,10 @@ use rohrpost::interfaces::{FlowState, FlowStates, Links};
 
 /// What the columns say that their heads do not.
 pub(super) const LEGEND: &str = "\
-at worst: the bound that `check` computes; slowest: as the router that sends measured it, up to the arrival at the other computer;
-beyond: packages slower than the bound; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's
-class when they came to its mailbox, by their stamp. All that goes between two modules is put to one of their flows, declared or not";
+at worst: the bound that `check` computes, for slots that are kept; kept: the slowest package since whose publishing none was left out or cut
+short; slowest: of all, as the router that sends measured it, up to the arrival at the other computer; beyond: packages slower than the bound,
+and those of them whose slots were kept; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's class
+when they came to its mailbox, by their stamp. All that goes between two modules is put to one of their flows, declared or not";
 
 /// A row for each flow that leaves one of these nodes; empty without any.
 pub(super) fn measured<'a>(
@@ -27,10 +28,12 @@ pub(super) fn measured<'a>(
         ">bytes",
         ">packages",
         ">at worst",
+        ">kept",
         ">slowest",
         ">99 of 100",
         ">within",
         ">beyond",
+        ">kept",
         ">late",
         ">lost",
         ">oldest",
@@ -38,7 +41,7 @@ pub(super) fn measured<'a>(
     table(heads, rows)
 }
 
-fn row(installation: &Installation, flow: &FlowState, links: &[&Links]) -> [String; 11] {
+fn row(installation: &Installation, flow: &FlowState, links: &[&Links]) -> [String; 13] {
     let ns = |ns: u64| fine(ns as f64 * 1e-9);
     let seen = |of: u64| if flow.packages == 0 { "-".into() } else { ns(of) };
     let lost: u64 = flow.lost.iter().map(|lost| lost.packages).sum();
@@ -47,10 +50,12 @@ fn row(installation: &Installation, flow: &FlowState, links: &[&Links]) -> [Stri
         flow.size.to_string(),
         flow.packages.to_string(),
         flow.bound_ns.map_or("-".into(), ns),
+        flow.bound_ns.filter(|_| flow.kept_worst_ns > 0).map_or("-".into(), |_| ns(flow.kept_worst_ns)),
         seen(flow.worst_ns),
         seen(flow.p99_ns),
         ns(flow.deadline_ns),
         flow.bound_ns.map_or("-".into(), |_| flow.over_bound.to_string()),
+        flow.bound_ns.map_or("-".into(), |_| flow.kept_over_bound.to_string()),
         flow.over_deadline.to_string(),
         lost.to_string(),
         oldest_ns(installation, flow, links).map_or("-".into(), ns),
@@ -82,7 +87,9 @@ mod tests {
             p99_ns: 4_900_000,
             bound_ns,
             deadline_ns: 10_000_000,
+            kept_worst_ns: 5_090_000,
             over_bound: 2,
+            kept_over_bound: 0,
             over_deadline: 1,
             lost: vec![CarriedLoss { cause: "quota".into(), packages: 3 }],
         }
@@ -107,9 +114,9 @@ mod tests {
         let of = |columns: &str| columns.split('|').map(str::to_owned).collect::<Vec<_>>();
         assert_eq!(
             words(flow(7, Some(5_540_000))),
-            of("laser.0 → pilot.0|800|7|5.540 ms|5.100 ms|4.900 ms|10.00 ms|2|1|3|-")
+            of("laser.0 → pilot.0|800|7|5.540 ms|5.090 ms|5.100 ms|4.900 ms|10.00 ms|2|0|1|3|-")
         );
-        assert_eq!(words(flow(0, None)), of("laser.0 → pilot.0|800|0|-|-|-|10.00 ms|-|1|3|-"));
+        assert_eq!(words(flow(0, None)), of("laser.0 → pilot.0|800|0|-|-|-|-|10.00 ms|-|-|1|3|-"));
         assert_eq!(measured(&installation, [&FlowStates { node: "base".into(), flows: Vec::new() }], &[]), "");
     }
 }

@@ -301,8 +301,12 @@ pub struct FlowState {
     pub bound_ns: Option<u64>,
     /// The deadline, ns.
     pub deadline_ns: u64,
+    /// The slowest of those since whose publishing no slot of the node was left out or cut short, ns: the bound is about these. 0 without any.
+    pub kept_worst_ns: u64,
     /// Packages slower than the bound.
     pub over_bound: u64,
+    /// Of these, those since whose publishing no slot was left out or cut short.
+    pub kept_over_bound: u64,
     /// Packages slower than the deadline.
     pub over_deadline: u64,
     /// Packages lost in this router, and why.

@@ -4,31 +4,43 @@ use super::Outbound;
 use crate::frame::{HEAD_BYTES, NodeIndex};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 
-/// Those of the datagram that was made last: the flow, and when the package was published, ns. As many as fit at most.
+/// Those of the datagram that was made last.
 #[derive(Debug)]
-pub(super) struct Aboard(Vec<(u16, u64)>);
+pub(super) struct Aboard {
+    /// The flow, and when the package was published, ns. As many as fit at most.
+    packages: Vec<(u16, u64)>,
+    /// From then on all slots were kept, ns.
+    kept_since_ns: u64,
+}
 
 impl Aboard {
     pub(super) fn new(datagram_bytes: usize) -> Self {
-        Self(Vec::with_capacity(datagram_bytes.saturating_sub(HEAD_BYTES) / PACKAGE_HEAD_BYTES))
+        let room = datagram_bytes.saturating_sub(HEAD_BYTES) / PACKAGE_HEAD_BYTES;
+        Self { packages: Vec::with_capacity(room), kept_since_ns: 0 }
     }
 
     pub(super) fn clear(&mut self) {
-        self.0.clear();
+        self.packages.clear();
     }
 }
 
 impl Outbound {
     /// Whether the datagram that was made last has something aboard for which [`sent`](Self::sent) is to be said.
     pub fn is_measured(&self) -> bool {
-        !self.aboard.0.is_empty()
+        !self.aboard.packages.is_empty()
     }
 
     /// Says that the datagram that was made last has left: that its last bit is at the other computer at this time, ns.
     pub fn sent(&mut self, arrives_ns: u64) {
-        for (flow, published_ns) in self.aboard.0.drain(..) {
-            self.stats.flows.took(flow, arrives_ns.saturating_sub(published_ns));
+        for (flow, published_ns) in self.aboard.packages.drain(..) {
+            let kept = published_ns >= self.aboard.kept_since_ns;
+            self.stats.flows.took(flow, arrives_ns.saturating_sub(published_ns), kept);
         }
+    }
+
+    /// Says that until now, ns, a slot was left out or cut short: of packages that were published before no bound holds.
+    pub fn slot_left_out(&mut self, now_ns: u64) {
+        self.aboard.kept_since_ns = now_ns;
     }
 
     /// The last or only part of a package goes into the datagram.
@@ -36,7 +48,7 @@ impl Outbound {
         self.stats.peer(peer).sent.packages.add(1);
         self.stats.out.passed(head.priority, head.len);
         if let Some(flow) = self.stats.flows.of(head) {
-            self.aboard.0.push((flow, published_ns));
+            self.aboard.packages.push((flow, published_ns));
         }
     }
 }

@@ -153,6 +153,12 @@ impl Discipline {
         Counts { syncs: clock.sync_counts(), ..self.counts }
     }
 
+    /// Slots since the start in which no packages left though some may have waited.
+    pub fn left_out(&self) -> u64 {
+        let Counts { late, skipped, silent, .. } = self.counts;
+        late + skipped + silent
+    }
+
     /// The next window of this node. Whatever came is to be handed to the clock before.
     pub fn next(&mut self, now_ns: u64, clock: &Clock) -> Next {
         if self.role != clock.role() {

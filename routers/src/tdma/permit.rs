@@ -1,9 +1,11 @@
 //! One window being used: what still fits in it.
 
+use super::LATE_NS;
 use super::table::{Kind, Window};
 use super::wire::Wire;
 use crate::broken::broken;
 use crate::time::Allowed;
+use rohrpost_config::wire::HAND_OVER;
 
 /// What a window may be used for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -30,13 +32,26 @@ pub struct Permit {
     pub(super) wire: Wire,
     /// When the wire has carried what was handed over, local ns.
     free_ns: u64,
+    /// So long what was handed over may have kept the window busy, ns.
+    planned_ns: u64,
     datagrams: u64,
     wire_bytes: u64,
 }
 
 impl Permit {
     pub(super) fn new(window: Window, begin_ns: u64, end_ns: u64, carries: Carries, lead_ns: u64, wire: Wire) -> Self {
-        Self { window, begin_ns, end_ns, carries, lead_ns, wire, free_ns: begin_ns, datagrams: 0, wire_bytes: 0 }
+        Self {
+            window,
+            begin_ns,
+            end_ns,
+            carries,
+            lead_ns,
+            wire,
+            free_ns: begin_ns,
+            planned_ns: 0,
+            datagrams: 0,
+            wire_bytes: 0,
+        }
     }
 
     /// The largest datagram that would be off the wire before the guard if it were handed over now, in bytes. None: nothing fits.
@@ -52,7 +67,9 @@ impl Permit {
 
     /// A datagram is being handed over now.
     pub fn takes(&mut self, now_ns: u64, datagram_bytes: usize) {
-        self.free_ns = self.starts_ns(now_ns).saturating_add(self.wire.ns(datagram_bytes));
+        let wire_ns = self.wire.ns(datagram_bytes);
+        self.free_ns = self.starts_ns(now_ns).saturating_add(wire_ns);
+        self.planned_ns += wire_ns.max(HAND_OVER.as_nanos() as u64);
         self.datagrams += 1;
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
@@ -61,6 +78,14 @@ impl Permit {
     /// ns. `to_wire_ns`: how long it takes to the wire, unless that is busy for longer.
     pub fn arrives_after_ns(&self, now_ns: u64, datagram_bytes: usize, to_wire_ns: u64) -> u64 {
         self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
+    }
+
+    /// Whether a datagram that is handed over now would be on the wire later than bounds reckon with, after what the window has carried: the
+    /// thread stood still.
+    pub fn is_behind(&self, now_ns: u64) -> bool {
+        let reckoned_ns =
+            self.begin_ns.saturating_add(LATE_NS + self.planned_ns).saturating_add(HAND_OVER.as_nanos() as u64);
+        self.starts_ns(now_ns) > reckoned_ns
     }
 
     /// When a datagram is on the wire that is handed over now: not before those that were.

@@ -31,7 +31,9 @@ fn state(flow: &Flow, counts: &FlowCounts, classes: &ClassTable) -> FlowState {
         p99_ns: latency.quantile(0.99).map_or(0, ns),
         bound_ns: flow.bound.map(ns),
         deadline_ns: ns(flow.deadline),
+        kept_worst_ns: ns(counts.kept_worst()),
         over_bound: counts.over_bound.get(),
+        kept_over_bound: counts.kept_over_bound.get(),
         over_deadline: counts.over_deadline.get(),
         lost: lost.map(|(cause, packages)| CarriedLoss { cause: cause.into(), packages }).collect(),
     }

@@ -102,3 +102,19 @@ fn what_is_lost_is_counted_with_its_cause_and_not_measured() {
     assert_counts(&end, (0, 0, 0, 0, 3), "all three");
     assert_eq!([Cause::Socket, Cause::Stale].map(|cause| counts(&end).lost(cause)), [2, 1]);
 }
+
+#[test]
+fn a_bound_says_nothing_of_what_was_published_before_a_slot_was_left_out() {
+    let mut end = End::new(0, declare);
+    for (published_ms, left_ms, kept) in [(0, 4, (4, 0)), (10, 18, (4, 0)), (16, 22, (6, 1)), (30, 33, (6, 1))] {
+        end.queue(START + published_ms * MS, to(1, 90), b"one");
+        end.poll(START + left_ms * MS).unwrap();
+        if published_ms == 10 {
+            end.outbound.slot_left_out(START + 16 * MS);
+        }
+        end.outbound.sent(START + left_ms * MS);
+        let found = (counts(&end).kept_worst().as_millis(), counts(&end).kept_over_bound.get());
+        assert_eq!(found, kept, "published after {published_ms} ms");
+    }
+    assert_counts(&end, (4, 8, 2, 0, 0), "all of them");
+}

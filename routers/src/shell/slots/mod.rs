@@ -15,6 +15,7 @@ mod alarm;
 mod granted;
 mod held;
 mod intake;
+mod speech;
 mod state;
 
 pub use granted::Granted;
@@ -27,7 +28,7 @@ use super::socket::InSocket;
 use super::threads::Shared;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::outbound::Outbound;
-use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Permit, Planned, Silent, Verdict};
+use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Permit, Planned, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
 use held::Held;
 use intake::Intake;
@@ -106,6 +107,8 @@ pub(super) struct Slots {
     looked_ns: u64,
     /// When it saw last to what waits.
     tidied_ns: u64,
+    /// Slots that were left out so far, as it has told.
+    left_out: u64,
     /// The first datagram of the last window, if the kernel stamps it.
     first: Option<First>,
     snapshot: Snapshot,
@@ -158,6 +161,7 @@ impl Slots {
             own,
             looked_ns: 0,
             tidied_ns: 0,
+            left_out: 0,
             first: None,
             snapshot,
             state,
@@ -182,6 +186,7 @@ impl Slots {
         while !self.shared.ends() {
             let now_ns = self.works.now_ns();
             let next = self.discipline.next(now_ns, &self.works.clock);
+            self.tell_left_out();
             let (planned, wake_ns) = match next {
                 Next::Window(planned) => (Some(planned), planned.wake_ns),
                 Next::Silent { until_ns, .. } => (None, until_ns),
@@ -241,9 +246,7 @@ impl Slots {
         *looked_ns = now_ns;
         let counts = discipline.counts(&works.clock);
         let (silent, lead_ns) = (discipline.silent(), discipline.lead_ns());
-        if kind(silent) != kind(snapshot.silent) {
-            tell(silent);
-        }
+        speech::tell_change(snapshot.silent, silent);
         *snapshot = Snapshot { counts, silent, lead_ns, ..*snapshot };
         state.show(snapshot);
     }
@@ -354,15 +357,27 @@ impl Slots {
         self.shared.tunnel_bytes.store(bytes, Ordering::Relaxed);
     }
 
+    /// Which packages cannot have kept their bounds.
+    fn tell_left_out(&mut self) {
+        let left_out = self.discipline.left_out();
+        if left_out != self.left_out || self.discipline.silent().is_some() {
+            self.left_out = left_out;
+            self.outbound.slot_left_out(monotonic_ns());
+        }
+    }
+
     fn send_packages(&mut self, permit: &mut Permit) {
         self.drop_if_old();
         while let Some(made) = self.next_datagram(permit) {
             let (Held { to, bytes, .. }, now_ns) = (made, self.works.now_ns());
             if !permit.fits(now_ns, bytes) {
                 self.missed(made);
-                return;
+                break;
             }
             self.hand_over(permit, now_ns, to, bytes);
+        }
+        if permit.is_behind(self.works.now_ns()) {
+            self.outbound.slot_left_out(monotonic_ns());
         }
     }
 
@@ -404,22 +419,5 @@ impl Slots {
             self.outbound.sent(handed_ns + permit.arrives_after_ns(now_ns, bytes, to_wire_ns));
         }
         permit.takes(now_ns, bytes);
-    }
-}
-
-fn kind(silent: Option<Silent>) -> Option<std::mem::Discriminant<Silent>> {
-    silent.as_ref().map(std::mem::discriminant)
-}
-
-/// Says that it does not send any more, and that it does.
-fn tell(silent: Option<Silent>) {
-    match silent {
-        None => tracing::info!("sends in its time slots"),
-        Some(why @ Silent::BoundTooLarge { .. }) => {
-            tracing::warn!(
-                "sends nothing, lest it disturbs others: {why}; is a master of time running, and does the network reach it?"
-            );
-        }
-        Some(why) => tracing::info!("sends nothing yet: {why}"),
     }
 }

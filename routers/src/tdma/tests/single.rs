@@ -2,7 +2,7 @@
 
 use super::world::{CYCLE, MASTERS, SECOND, US, table};
 use crate::frame::{FrameHead, Kind as Frame};
-use crate::tdma::{Carries, Discipline, LATE_NS, Next, Planned, Silent, Verdict};
+use crate::tdma::{Carries, Discipline, LATE_NS, Next, Permit, Planned, Silent, Verdict};
 use crate::time::message::{Message, Reply, Sync};
 use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
@@ -213,6 +213,24 @@ pub(super) fn what_was_handed_over_counts() {
     one.discipline.close(&permit);
     let counts = one.discipline.counts(&one.clock);
     assert_eq!((counts.used, counts.datagrams, counts.wire_bytes), (1, 4, 4 * 1_066));
+}
+
+#[test]
+fn a_window_is_behind_when_more_time_went_by_than_bounds_reckon_with() {
+    let mut one = Lonely::joined();
+    let (_, Verdict::Send(mut permit)) = one.judged(0) else { panic!() };
+    let (late_ns, hand_over_ns, wire_ns) = (LATE_NS, 20 * US, 85_280);
+    let begin_ns = permit.begin_ns;
+    let is_behind = |permit: &Permit, after_ns| {
+        let found = [0, 1].map(|more_ns| permit.is_behind(begin_ns - one.discipline.lead_ns().1 + after_ns + more_ns));
+        assert_eq!(found, [false, true], "at {after_ns} ns");
+    };
+    is_behind(&permit, late_ns + hand_over_ns);
+    permit.takes(begin_ns, 1_000);
+    is_behind(&permit, late_ns + hand_over_ns + wire_ns);
+    // A small one takes the wire 5 µs, and the thread longer.
+    permit.takes(begin_ns + wire_ns, 0);
+    is_behind(&permit, late_ns + 2 * hand_over_ns + wire_ns);
 }
 
 #[test]
