@@ -223,6 +223,17 @@ impl Election {
         }
     }
 
+    /// Something else came than a Sync. Whether it was of the master that this node follows.
+    pub(super) fn speaks(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) -> bool {
+        match &mut self.state {
+            State::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
+                master.heard_ns = master.heard_ns.max(received_ns);
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// Somebody that hears no master. A master whose term is not the latest begins another, so that all take it for the latest.
     pub(super) fn hello(&mut self, request: &Request, received_ns: u64) {
         self.speaks_of(request.term, request.epoch);

@@ -50,6 +50,8 @@ pub(super) struct Slots {
     /// The last cycles of which a Sync of the master came, and of which any did.
     heard_cycle: u64,
     lives_cycle: u64,
+    /// The last one in which anything else of the master came.
+    spoke_cycle: u64,
     /// In this one it woke up, and knows nothing of those before.
     awake_cycle: u64,
     /// The cycle that is being synchronised, and who is next; whether the way to it is warm.
@@ -94,6 +96,7 @@ impl Clock {
             master_error_ns: 0,
             heard_cycle: 0,
             lives_cycle: 0,
+            spoke_cycle: 0,
             awake_cycle: 0,
             synced_cycle: 0,
             next: 0,
@@ -186,7 +189,8 @@ impl Clock {
         let (State::Slave(master), Some(slots)) = (self.election.state(), &self.slots) else { return };
         let is_next = self.election.before(Some(master.node)) == 0;
         let heard_cycle = if is_next { slots.heard_cycle } else { slots.lives_cycle };
-        let misses = self.due_cycle(cycle, &master).saturating_sub(heard_cycle.max(slots.awake_cycle));
+        let since_cycle = heard_cycle.max(slots.spoke_cycle).max(slots.awake_cycle);
+        let misses = self.due_cycle(cycle, &master).saturating_sub(since_cycle);
         if misses < MISSES || self.sure(now_ns).is_none() {
             return;
         }
@@ -239,7 +243,7 @@ impl Clock {
         let Some(slots) = &mut self.slots else { return };
         if turned {
             slots.coarse.clear();
-            slots.heard_cycle = 0;
+            (slots.heard_cycle, slots.spoke_cycle) = (0, 0);
         }
         slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
         // Until it is measured, its time may be another: to go on by the old one is to send in the slots of those who follow it.
@@ -252,6 +256,16 @@ impl Clock {
             slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
         }
         (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
+    }
+
+    /// Something of somebody came that is no Sync. If it is the master, it lives, though its Sync may be missing.
+    pub(super) fn speaks_in_slots(&mut self, received: Stamp, head: &FrameHead) {
+        let cycle = self.line.at(received.ns).ns / self.interval_ns;
+        if let Some(slots) = &mut self.slots
+            && self.election.speaks(head.from, head.incarnation, received.ns)
+        {
+            slots.spoke_cycle = cycle;
+        }
     }
 
     /// Somebody hears no master either, and has time: whoever takes over goes on by that.
