@@ -5,6 +5,7 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
+use common::relay::Relay;
 use common::talk::{Ears, mouths};
 use common::{Capture, NODES, Segment, Station, assert_kept};
 use rohrpost_routers::frame::Kind;
@@ -18,6 +19,10 @@ const PAUSE: Duration = Duration::from_micros(2300);
 const DRIFT_PPB: i64 = 100_000;
 const SWING_PPB: f64 = 1500.0;
 const DRIFTS: Duration = Duration::from_secs(5);
+/// A slow bridge takes so long for each frame: more than any slot lasts, and than clocks may be off.
+const HELD_BACK: Duration = Duration::from_millis(2);
+/// With this it is 100 µs further off after five seconds.
+const DRIFT_NS_S_MAX: u64 = 20_000;
 
 fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
     let mut mouths = mouths(segment, nodes);
@@ -72,5 +77,24 @@ fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_an
     stations[2].late = None;
     stations[2].start(lab);
     segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    talk(&segment, &mut ears, &ALL, 50);
+}
+
+#[test]
+fn behind_a_bridge_that_becomes_slow_a_node_keeps_its_slots_and_loses_nothing() {
+    let Some(segment) = Segment::start() else { return };
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    let mut ears = Ears::new(&segment);
+    // From then on it can go by its own clock for seconds.
+    let knows = |station: &Station| station.clock().record.drift_ns_s < DRIFT_NS_S_MAX;
+    segment.wait_until("node 2 knows its rate", |segment| knows(&segment.stations[2]));
+    let time = segment.stations[0].clock().record;
+    let capture = Capture::start(&segment.lab);
+    let relay = Relay::start(&segment, 2, HELD_BACK);
+    talk(&segment, &mut ears, &ALL, 300);
+    let silent = segment.stations[2].slots().silent;
+    assert!(relay.end() > 300, "data and time take that way");
+    assert_kept("behind a slow bridge", &capture.end(), &time);
+    assert_eq!(silent, None);
     talk(&segment, &mut ears, &ALL, 50);
 }

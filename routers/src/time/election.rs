@@ -203,7 +203,9 @@ impl Election {
                 }
             }
             State::Slave(master) if theirs.claim() > master.claim() => Heard::Turned,
-            State::Slave(master) if theirs.term > master.term && self.is_succeeded(&master, received_ns) => Heard::Turned,
+            State::Slave(master) if theirs.term > master.term && self.is_succeeded(&master, received_ns) => {
+                Heard::Turned
+            }
             State::Slave(_) => Heard::Ignored,
         };
         match (heard, self.state) {

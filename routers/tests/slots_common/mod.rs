@@ -2,7 +2,9 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+pub(crate) mod hog;
 pub(crate) mod process;
+pub(crate) mod relay;
 pub(crate) mod talk;
 
 use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
