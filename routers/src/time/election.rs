@@ -249,9 +249,13 @@ impl Election {
         }
     }
 
-    /// This node stood still until now: that it heard nobody says nothing of the others. What they sent is still to be read.
-    pub(super) fn awakes(&mut self, now_ns: u64) {
+    /// This node stood still until now: that it heard nobody says nothing of the others. What they sent is still to be read. Who waits to
+    /// begin a time has waited so much less.
+    pub(super) fn awakes(&mut self, stood_since_ns: u64, now_ns: u64) {
         self.awake_since_ns = now_ns;
+        let later = |since_ns: u64| since_ns.saturating_add(now_ns.saturating_sub(stood_since_ns)).min(now_ns);
+        self.quiet_since_ns = later(self.quiet_since_ns);
+        self.timed_heard_ns = self.timed_heard_ns.map(later);
     }
 
     /// Somebody that has time sent in the place of the master.
@@ -324,12 +328,13 @@ impl Election {
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = self.before(last) + if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
-        let (since_ns, patience_ns) = match (origin, self.begins_after_ns, self.state) {
-            (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => (since_ns, patience_ns),
-            (Origin::New, begins_ns, State::Slave(master)) => (master.heard_ns, patience_ns.max(begins_ns)),
-            (Origin::New, begins_ns, _) => (since_ns.max(self.timed_heard_ns.unwrap_or(0)), patience_ns.max(begins_ns)),
+        let takes_over_ns = since_ns.max(self.awake_since_ns).saturating_add(patience_ns);
+        let begins_ns = match (origin, self.begins_after_ns, self.state) {
+            (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => 0,
+            (Origin::New, begins_ns, State::Slave(master)) => master.heard_ns.saturating_add(begins_ns),
+            (Origin::New, begins_ns, _) => since_ns.max(self.timed_heard_ns.unwrap_or(0)).saturating_add(begins_ns),
         };
-        Some(since_ns.max(self.awake_since_ns).saturating_add(patience_ns).saturating_add(staggered_ns))
+        Some(takes_over_ns.max(begins_ns).saturating_add(staggered_ns))
     }
 }
 

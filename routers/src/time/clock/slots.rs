@@ -130,7 +130,7 @@ impl Clock {
         let before_ns = std::mem::replace(&mut slots.advanced_ns, now_ns);
         if now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
             slots.awake_cycle = cycle;
-            self.election.awakes(now_ns);
+            self.election.awakes(before_ns, now_ns);
         }
     }
 
@@ -245,7 +245,8 @@ impl Clock {
             slots.coarse.clear();
             (slots.heard_cycle, slots.spoke_cycle) = (0, 0);
         }
-        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+        // All who follow a master are off alike by what it may be off.
+        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
         // Until it is measured, its time may be another: to go on by the old one is to send in the slots of those who follow it.
         let is_measured = self.timeline == sync.began;
         let off_ns = slots.coarse.off_ns(received.ns, self.line.at(received.ns).ns);
@@ -271,7 +272,7 @@ impl Clock {
     /// Somebody hears no master either, and has time: whoever takes over goes on by that.
     pub(super) fn hello_in_slots(&mut self, received: Stamp, hello: &Request) {
         if let (Some(slots), State::Listening, true) = (&mut self.slots, self.election.state(), hello.timed) {
-            slots.coarse.add(hello.epoch, hello.sent_ns, received.ns);
+            slots.coarse.add(hello.epoch, hello.sent_ns, received.ns, hello.error_ns);
         }
     }
 
@@ -287,7 +288,7 @@ impl Clock {
         slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
         slots.lives_cycle = slots.lives_cycle.max(sync.cycle);
         if broken!(ReplacementCalibrates) {
-            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
         }
         Ok(())
     }
