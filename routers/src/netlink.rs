@@ -177,6 +177,11 @@ impl Netlink {
         self.ask(Message::new(RTM_NEWLINK, 0, &link(device, flags, IFF_UP))).map(drop)
     }
 
+    /// Moves a port to a bridge.
+    pub(crate) fn set_bridge(&mut self, port: Device, bridge: Device) -> io::Result<()> {
+        self.ask(Message::new(RTM_NEWLINK, 0, &link(port, 0, 0)).number(IFLA_MASTER, bridge)).map(drop)
+    }
+
     /// Changes the largest packet.
     pub(crate) fn set_mtu(&mut self, device: Device, mtu: u32) -> io::Result<()> {
         self.ask(Message::new(RTM_NEWLINK, 0, &link(device, 0, 0)).number(IFLA_MTU, mtu)).map(drop)

@@ -157,3 +157,21 @@ fn a_node_that_is_not_there_is_named_with_those_that_are() {
     let said = lab.command("n0", &mut Command::new("/no/such/program")).unwrap_err().to_string();
     assert!(said.starts_with("cannot start /no/such/program: "), "{said}");
 }
+
+#[test]
+fn a_network_that_was_divided_is_one_again() {
+    let addresses = ["10.77.0.1", "10.77.0.2", "10.77.0.3", "10.77.0.4"];
+    let Some(lab) = lab(&addresses, 1500) else { return };
+    let sockets = [0, 1, 2, 3].map(|index| socket(&lab, &format!("n{index}"), addresses[index]));
+    let [a, b, c, d] = &sockets;
+    arrives(a, c);
+    lab.divide(&["n2", "n3"]).unwrap();
+    arrives(a, b);
+    arrives(c, d);
+    a.send_to(b"lost", c.local_addr().unwrap()).unwrap();
+    d.send_to(b"lost", b.local_addr().unwrap()).unwrap();
+    lab.unite(&["n2", "n3"]).unwrap();
+    // What had been sent would have come before this.
+    arrives(a, c);
+    arrives(d, b);
+}

@@ -10,9 +10,10 @@ use common::{PATIENCE, Pair, Side, label, module};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::{Kind, Name, Options, Receiver, SendError, Shape, Type, local};
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
+use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_routers::link::State;
-use rohrpost_routers::shell::Shell;
-use std::net::{IpAddr, Ipv4Addr, UdpSocket};
+use rohrpost_routers::shell::{Shell, listen};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
 fn until(what: &str, mut done: impl FnMut() -> bool) {
@@ -163,4 +164,44 @@ fn without_the_right_to_the_address_a_router_does_not_start_and_leaves_the_node_
     // What is sent meanwhile waits.
     let mut sender = side.sender(module(1));
     assert!(!matches!(sender.send(&label(module(0), 1, 1), &[]), Err(SendError::NoRouter { .. })));
+}
+
+#[test]
+fn what_waited_for_a_router_for_long_says_nothing_of_who_lives_now() {
+    let mut pair = Pair::new();
+    pair.sides.iter_mut().for_each(|side| side.shell = None);
+    let [there, here] = [0, 1].map(|node: usize| pair.sides[1].settings.nodes[node].address);
+    let at = SocketAddr::new(here, pair.sides[1].settings.network.port);
+    pair.sides[1].socket = Some(listen(at).unwrap());
+    let peer = UdpSocket::bind((there, 0)).unwrap();
+    let says = |sequence: u32| {
+        let (incarnation, told) = (99, [0; 24]);
+        let head = FrameHead {
+            kind: FrameKind::Alive,
+            system: 1,
+            from: 0,
+            to: 1,
+            digest: 7,
+            incarnation,
+            sequence: sequence.into(),
+        };
+        peer.send_to(&[&head.to_bytes(&[&told])[..], &told].concat(), at).unwrap();
+    };
+    says(0);
+    std::thread::sleep(Duration::from_nanos(SOCKET_MAX_NS) + Duration::from_millis(100));
+    pair.sides[1].start();
+    // Behind it in the socket, and young.
+    let stranger = UdpSocket::bind((IpAddr::V4(Ipv4Addr::new(127, 127, 127, 127)), 0)).unwrap();
+    until("what is behind it is counted", || {
+        stranger.send_to(b"anything", at).unwrap();
+        pair.sides[1].shell().stats().foreign.get() > 0
+    });
+    let heard = || pair.sides[1].shell().stats().peer(0).link.incarnation.get();
+    assert_eq!(heard(), 0, "it waited for longer than the peer that sent it may have lived");
+    let mut sequence = 1;
+    until("what comes now is heard", || {
+        says(sequence);
+        sequence += 1;
+        heard() == 99
+    });
 }

@@ -20,6 +20,8 @@ const SEEDS: u64 = 100;
 const ROUGH_SEEDS: u64 = 6;
 /// Of these, those in which a mistake must show.
 const MISTAKE_SEEDS: u64 = 20;
+/// Cycles of a network in which a master might be taken for dead.
+const LOSSY_CYCLES: u64 = 1000;
 /// The test of all promises.
 const NETWORKS: &str = "a_hundred_networks";
 /// The same with time slots: a quarter as many.
@@ -234,6 +236,30 @@ fn rough_slotted_networks_keep_their_promises() {
     let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 10;
     let seen = keep_promises(ROUGH_SLOTTED, seeds, Plan::rough_slotted);
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED_ROUGH_SLOTTED);
+}
+
+/// A network whose master does not die keeps it: at most one change in 100 000 cycles, where up to one datagram of 20 is lost. A quarter as many
+/// networks.
+#[test]
+fn losses_and_late_wake_ups_change_no_master() {
+    if let Some(seed) = number("ROHRPOST_SIM_SEED") {
+        return replay(Plan::lossy_slotted(seed, LOSSY_CYCLES));
+    }
+    let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 4;
+    let changes = for_all(seeds, |seed| {
+        let plan = Plan::lossy_slotted(seed, LOSSY_CYCLES);
+        let loss_ppm = plan.quality.loss_ppm;
+        let outcome = run(plan, guard, false);
+        assert!(outcome.problems.is_empty(), "{}", told("losses", seed, &outcome.problems[0]));
+        let changes = outcome.seen.get("took over").copied().unwrap_or_default();
+        if changes > 0 {
+            eprintln!("seed {seed}: {changes} changes, where {loss_ppm} of a million datagrams are lost");
+        }
+        changes
+    });
+    let (changes, cycles) = (changes.iter().sum::<u64>(), seeds * LOSSY_CYCLES);
+    eprintln!("{changes} changes of master in {cycles} cycles");
+    assert!(changes <= cycles.div_ceil(100_000), "{changes} changes of master in {cycles} cycles");
 }
 
 #[test]

@@ -5,10 +5,14 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
+use common::relay::Relay;
 use common::talk::{Ears, mouths};
-use common::{Capture, NODES, Segment, Station, assert_kept};
+use common::{Capture, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
 use rohrpost_routers::frame::Kind;
+use rohrpost_routers::shell::Failure;
 use rohrpost_routers::tdma::Silent;
+use std::io::Write;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 const ALL: [u8; NODES as usize] = [0, 1, 2];
@@ -18,6 +22,10 @@ const PAUSE: Duration = Duration::from_micros(2300);
 const DRIFT_PPB: i64 = 100_000;
 const SWING_PPB: f64 = 1500.0;
 const DRIFTS: Duration = Duration::from_secs(5);
+/// A slow bridge takes so long for each frame: more than any slot lasts, and than clocks may be off.
+const HELD_BACK: Duration = Duration::from_millis(2);
+/// With this it is 100 µs further off after five seconds.
+const DRIFT_NS_S_MAX: u64 = 20_000;
 
 fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
     let mut mouths = mouths(segment, nodes);
@@ -73,4 +81,58 @@ fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_an
     stations[2].start(lab);
     segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
     talk(&segment, &mut ears, &ALL, 50);
+}
+
+#[test]
+fn behind_a_bridge_that_becomes_slow_a_node_keeps_its_slots_and_loses_nothing() {
+    let Some(segment) = Segment::start() else { return };
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    let mut ears = Ears::new(&segment);
+    // From then on it can go by its own clock for seconds.
+    let knows = |station: &Station| station.clock().record.drift_ns_s < DRIFT_NS_S_MAX;
+    segment.wait_until("node 2 knows its rate", |segment| knows(&segment.stations[2]));
+    let time = segment.stations[0].clock().record;
+    let capture = Capture::start(&segment.lab);
+    let relay = Relay::start(&segment, 2, HELD_BACK);
+    talk(&segment, &mut ears, &ALL, 300);
+    let silent = segment.stations[2].slots().silent;
+    assert!(relay.end() > 300, "data and time take that way");
+    assert_kept("behind a slow bridge", &capture.end(), &time);
+    assert_eq!(silent, None);
+    talk(&segment, &mut ears, &ALL, 50);
+}
+
+/// Has a node's device changed by `tc`; false where that is not possible.
+fn shape(segment: &Segment, node: u8, words: &str) -> bool {
+    let mut command = Command::new("tc");
+    let command = command.args(words.split(' ')).stderr(Stdio::null());
+    segment.lab.command(&name(node), command).is_ok_and(|mut tc| tc.wait().unwrap().success())
+}
+
+#[test]
+fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
+    let Some(segment) = Segment::start() else { return };
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    // A thousandth of what `link` says.
+    if !shape(&segment, 2, "qdisc add dev lan root tbf rate 1mbit burst 1600 limit 10000000") {
+        // Past the test harness, which keeps what passing tests print to itself.
+        let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: a device that is too slow (`tc` with tbf)");
+        return;
+    }
+    let (mut ears, slow) = (Ears::new(&segment), &segment.stations[2]);
+    let full = || slow.shell().failures().of(Failure::Full);
+    let (mut flood, mut id, began) = (slow.sender(1), 0, Instant::now());
+    while full() < 100 {
+        assert!(began.elapsed() < PATIENCE, "all is taken: {:?}", slow.slots());
+        // What finds no room in the router's mailbox comes a little later.
+        if flood.send(&label(2, 100, id), &[&[7; 1000]]).is_err() {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        id = id.wrapping_add(1);
+    }
+    let used = slow.slots().counts.used;
+    talk(&segment, &mut ears, &[0, 1], 50);
+    segment.wait_until("it goes on with its slots", |segment| segment.stations[2].slots().counts.used > used);
+    assert!(shape(&segment, 2, "qdisc del dev lan root"));
+    talk(&segment, &mut ears, &[0, 2], 50);
 }

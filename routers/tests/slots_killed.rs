@@ -5,12 +5,14 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
+use common::hog::{Hog, be_a_hog};
 use common::process::{Router, be_a_router};
 use common::talk::{Ears, Mouth, mouths};
 use common::{Capture, MASTERS, Segment, assert_kept};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::link::State;
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -125,6 +127,7 @@ impl Scene {
 #[test]
 fn in_a_process_of_its_own() {
     be_a_router();
+    be_a_hog();
 }
 
 #[test]
@@ -172,4 +175,30 @@ fn a_master_that_stumbles_disturbs_nobody() {
         stumbles.unwrap().join().unwrap();
         scene.all_talk();
     }
+}
+
+#[test]
+fn under_a_hog_that_goes_first_slots_are_left_out_and_counted() {
+    let Some(mut scene) = Scene::new() else { return };
+    let counts = |scene: &Scene| scene.segment.stations[usize::from(WITNESS)].slots().counts;
+    let [mut before, mut after] = [counts(&scene); 2];
+    let mut hog = None;
+    let begin = |scene: &mut Scene, _| {
+        before = counts(scene);
+        hog = Hog::start(PROCESS, scene.segment.stations[usize::from(WITNESS)].slots().granted);
+    };
+    let end = |scene: &mut Scene, _| after = counts(scene);
+    scene.round("beside a hog", begin, end);
+    if hog.take().is_none() {
+        // Past the test harness, which keeps what passing tests print to itself.
+        let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: a hog that goes before routers");
+        return;
+    }
+    let [left_out, used] = [
+        after.late + after.skipped - before.late - before.skipped,
+        after.used + after.empty - before.used - before.empty,
+    ];
+    println!("beside a hog: {left_out} slots left out, {used} used");
+    assert!(left_out > 0, "{before:?}, then {after:?}");
+    scene.all_talk();
 }

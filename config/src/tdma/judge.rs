@@ -67,7 +67,8 @@ impl Judge<'_> {
 
     fn guard(&self) {
         let guard = self.tdma.guard;
-        // From a node to a switch and on.
+        // From a node to a switch and on. What the node takes before that is not in it: of eight frames the quickest counts, and from the call
+        // to the wire that takes some microseconds, not the 20 that bounds are computed with.
         let way = Duration::from_nanos(2 * self.link.time_wire_ns());
         let least = round_up(GUARD_MIN.max(way * ARRIVES_WITHIN));
         if guard >= least {

@@ -90,6 +90,8 @@ fn hint(error: &io::Error) -> &'static str {
 pub struct Lab {
     nodes: Vec<Node>,
     hub: Namespace,
+    /// Of all links at first, bytes.
+    mtu: u32,
 }
 
 #[derive(Debug)]
@@ -110,15 +112,16 @@ impl Lab {
         let node =
             |(spec, port): (&NodeSpec, Device)| Ok(Node { spec: spec.clone(), namespace: Namespace::new()?, port });
         let nodes = nodes.iter().zip(FIRST_PORT..).map(node).collect::<Result<Vec<_>, LabError>>()?;
-        let lab = Self { nodes, hub };
-        lab.join(mtu.into())?;
+        let lab = Self { nodes, hub, mtu: mtu.into() };
+        lab.join()?;
         for node in &lab.nodes {
             lab.wait_until_it_runs(node)?;
         }
         Ok(lab)
     }
 
-    fn join(&self, mtu: u32) -> Result<(), LabError> {
+    fn join(&self) -> Result<(), LabError> {
+        let mtu = self.mtu;
         let mut hub = self.hub.netlink()?;
         told("make a bridge", hub.add_bridge(BRIDGE, "bridge", mtu))?;
         told("set the bridge up", hub.set_up(BRIDGE, true))?;
@@ -193,6 +196,36 @@ impl Lab {
         let node = self.node(node)?;
         told(&format!("join {} again", node.spec.name), self.hub.netlink()?.set_up(node.port, true))?;
         self.wait_until_it_runs(node)
+    }
+
+    /// Divides the network: these nodes reach each other, and so do the others, but none of these any of those. [`Lab::capture`] sees both
+    /// parts. Once in the life of a lab.
+    ///
+    /// # Errors
+    /// As for [`Lab::cut`].
+    pub fn divide(&self, nodes: &[&str]) -> Result<(), LabError> {
+        let (mut hub, second) = (self.hub.netlink()?, FIRST_PORT + self.nodes.len() as Device);
+        told("make a second bridge", hub.add_bridge(second, "second", self.mtu))?;
+        told("set the second bridge up", hub.set_up(second, true))?;
+        self.move_to(nodes, second)
+    }
+
+    /// Joins again what [`Lab::divide`] divided.
+    ///
+    /// # Errors
+    /// As for [`Lab::cut`].
+    pub fn unite(&self, nodes: &[&str]) -> Result<(), LabError> {
+        self.move_to(nodes, BRIDGE)
+    }
+
+    fn move_to(&self, nodes: &[&str], bridge: Device) -> Result<(), LabError> {
+        let mut hub = self.hub.netlink()?;
+        for name in nodes {
+            let node = self.node(name)?;
+            told(&format!("move {name} to another bridge"), hub.set_bridge(node.port, bridge))?;
+            self.wait_until_it_runs(node)?;
+        }
+        Ok(())
     }
 
     /// Changes the largest packet of a node's link, at both ends, in bytes.

@@ -68,7 +68,9 @@ impl Failure {
                 "there is no way to its address; is the network up, and does a firewall forbid it? (`ip route get ADDRESS`)"
             }
             Self::TooLong => "the datagram was too long for the network; lower `mtu` in [network], on all nodes",
-            Self::NoRoom => "the kernel had no room; lower `rate` in [network] to what the network can carry",
+            Self::NoRoom => {
+                "the kernel had no room; lower `rate` in [network], or with time slots `link` in [tdma], to what the network can carry"
+            }
             Self::Full => {
                 "its device has not sent what earlier slots brought; does it carry what `link` in [tdma] says (`ethtool DEVICE`), and is \
                  net.core.wmem_max enough for a slot (`sysctl`)?"

@@ -112,6 +112,18 @@ impl Plan {
         plan
     }
 
+    /// A network with time slots in which nothing goes wrong but that datagrams are lost and threads wake late, for so many cycles.
+    pub fn lossy_slotted(seed: u64, cycles: u64) -> Self {
+        let mut plan = Self::slotted(seed);
+        plan.faults.clear();
+        plan.flows.clear();
+        plan.calls.clear();
+        plan.divide();
+        plan.mended_ns = S + cycles * plan.shape.interval_ns;
+        plan.time();
+        plan
+    }
+
     /// What slots carry well: a large package is through long before it is too old. Commands that wait behind it come all at once: no more
     /// of them than fit in a mailbox, else some are lost though all is well.
     fn fit_traffic(&mut self) {

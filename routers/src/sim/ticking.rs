@@ -2,7 +2,7 @@
 
 use super::book::Promise;
 use super::clock::Now;
-use super::plan::{Plan, SYSTEM};
+use super::plan::{Plan, S, SYSTEM};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::tdma::{Permit, Table};
@@ -17,6 +17,8 @@ use std::time::Duration;
 pub const PORT: Port = 1;
 /// How far off a kernel's stamp is at most, ns; the kernel stamps CLOCK_REALTIME, and the other clock is read around it.
 const DOUBT_NS: u32 = 100;
+/// All routers have begun, and one of them is master.
+const STARTED_NS: u64 = S;
 /// Stamps that are waited for at a time.
 const AWAITED_MAX: usize = 16;
 
@@ -39,6 +41,7 @@ pub struct Ticking {
     has_stamps: bool,
     /// Term and cycle of the Sync that was heard last.
     heard: (Term, u64),
+    was_master: bool,
     /// Which datagrams of this layer are to be stamped, by how many went before.
     awaited: VecDeque<(u64, SentId)>,
     sent: u64,
@@ -48,7 +51,7 @@ impl Ticking {
     /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
     pub fn new(settings: TimeSettings, now: Now, page: Option<TimeRecord>, has_stamps: bool) -> Self {
         let clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, page);
-        Self { clock, has_stamps, heard: (Term::NONE, 0), awaited: VecDeque::new(), sent: 0 }
+        Self { clock, has_stamps, heard: (Term::NONE, 0), was_master: false, awaited: VecDeque::new(), sent: 0 }
     }
 
     /// The same with time slots; all of its datagrams leave in windows.
@@ -110,7 +113,12 @@ impl Ticking {
         Stamp { ns: at.monotonic_ns.saturating_add_signed(wrong_ns), doubt_ns: DOUBT_NS, by_kernel: true }
     }
 
-    fn look(&self, io: &mut Io<'_>) {
+    fn look(&mut self, io: &mut Io<'_>) {
+        let is_master = self.clock.role() == Role::Master;
+        if is_master && !std::mem::replace(&mut self.was_master, is_master) && io.now.true_ns > STARTED_NS {
+            io.book.saw("took over");
+        }
+        self.was_master = is_master;
         io.book.times.look(io.now, io.node, &self.clock, &mut io.book.problems);
     }
 }

@@ -153,7 +153,10 @@ impl Clock {
             return Err(Ignored::Stranger);
         }
         match Message::parse(head.kind, rest)? {
-            Message::WarmUp => Ok(()),
+            Message::WarmUp => {
+                self.speaks_in_slots(received, head);
+                Ok(())
+            }
             Message::Sync(sync) => self.sync(now_ns, received, head, &sync),
             Message::Request(request) => self.request(received, head.from, &request),
             Message::Reply(reply) => self.reply(now_ns, received, head, &reply),

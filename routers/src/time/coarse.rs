@@ -14,6 +14,8 @@ const SYNCS: usize = JOINING_SYNCS as usize;
 struct Came {
     local_ns: u64,
     system_ns: u64,
+    /// Its sender may be so far off what others go by.
+    error_ns: u64,
 }
 
 /// The last frames that told the time.
@@ -34,12 +36,12 @@ impl Coarse {
         self.count
     }
 
-    /// A frame that said `system_ns` when it was handed over came at `local_ns`.
-    pub(super) fn add(&mut self, epoch: u64, system_ns: u64, local_ns: u64) {
+    /// A frame that said `system_ns` when it was handed over came at `local_ns`. `error_ns`: how far its sender may be off what others go by.
+    pub(super) fn add(&mut self, epoch: u64, system_ns: u64, local_ns: u64, error_ns: u64) {
         if epoch != self.epoch {
             *self = Self { epoch, ..Self::default() };
         }
-        self.syncs[self.next] = Came { local_ns, system_ns };
+        self.syncs[self.next] = Came { local_ns, system_ns, error_ns };
         self.next = (self.next + 1) % SYNCS;
         self.count = (self.count + 1).min(JOINING_SYNCS);
     }
@@ -55,7 +57,8 @@ impl Coarse {
         self.syncs[..usize::from(self.count)].iter().max_by_key(|came| came.score(now_ns))
     }
 
-    /// The way is taken to last from nothing to `delay_max_ns`: that is an assumption.
+    /// The way is taken to last from nothing to `delay_max_ns`: that is an assumption. What the sender may be off is not in it: who becomes master
+    /// by this makes it the time of all, and a network whose slaves are less sure than that would have none until they fall silent.
     pub(super) fn reckoning(&self, now_ns: u64, delay_max_ns: u64) -> Option<Reckoning> {
         if self.count < JOINING_SYNCS {
             return None;
@@ -74,9 +77,10 @@ impl Coarse {
 }
 
 impl Came {
-    /// What took long says that it is earlier than it is; what is old may have drifted.
+    /// What took long says that it is earlier than it is; what is old may have drifted, and who said it may be off.
     fn score(&self, now_ns: u64) -> i128 {
         let age_ns = i128::from(now_ns.saturating_sub(self.local_ns));
-        i128::from(self.system_ns) - i128::from(self.local_ns) - age_ns * i128::from(RATE_MAX_PPB) / 1_000_000_000
+        let sure_ns = i128::from(self.system_ns) - i128::from(self.error_ns);
+        sure_ns - i128::from(self.local_ns) - age_ns * i128::from(RATE_MAX_PPB) / 1_000_000_000
     }
 }

@@ -8,6 +8,8 @@ use crate::frame::NodeIndex;
 const DEAF_NS_MIN: u64 = 200_000_000;
 /// In time slots others may be unheard for so long since the last frame was due, and send by a time that they have.
 const BEGINS_AFTER_NS: u64 = 100_000_000;
+/// In time slots a master that misses three Syncs has a successor in the third cycle: one that misses two may still be heard.
+const SUCCEEDED_HALF_INTERVALS: u64 = 5;
 
 /// By what time a node would reign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -66,6 +68,8 @@ pub(super) struct Election {
     deaf_ns: u64,
     /// Who would begin a time hears nobody that has one for so long before; 0: its turn is enough.
     begins_after_ns: u64,
+    /// Whoever has not heard its master for so long turns to a later one, though nobody may follow that yet.
+    succeeded_after_ns: u64,
     state: State,
     /// Since when no master is heard, and who was the last.
     quiet_since_ns: u64,
@@ -87,6 +91,7 @@ impl Election {
             interval_ns,
             deaf_ns: DEAF_NS_MIN,
             begins_after_ns: 0,
+            succeeded_after_ns: u64::MAX,
             state: State::Listening,
             quiet_since_ns: now_ns,
             lost: None,
@@ -98,8 +103,9 @@ impl Election {
     }
 
     /// A slave takes so many intervals until it asks: a master must not be replaced before that for not having answered. A time begins
-    /// only where for so long nobody that has one was heard.
+    /// only where for so long nobody that has one was heard. A successor speaks before the silence of its master is over.
     pub(super) fn asks_after(&mut self, intervals: u64) {
+        self.succeeded_after_ns = self.interval_ns.saturating_mul(SUCCEEDED_HALF_INTERVALS) / 2;
         self.deaf_ns = DEAF_NS_MIN.max(self.interval_ns.saturating_mul(2 * intervals));
         self.begins_after_ns = BEGINS_AFTER_NS.saturating_add(self.interval_ns.saturating_mul(intervals));
     }
@@ -117,14 +123,33 @@ impl Election {
     }
 
     fn rank(&self) -> Option<u8> {
-        let rank = self.masters.iter().position(|master| *master == self.own)?;
+        self.rank_of(self.own)
+    }
+
+    fn rank_of(&self, node: NodeIndex) -> Option<u8> {
+        let rank = self.masters.iter().position(|master| *master == node)?;
         u8::try_from(rank).ok()
     }
 
-    /// Whether somebody who stands behind the master of a term may act for it.
-    pub(super) fn stands_behind(&self, node: NodeIndex, term: Term) -> bool {
-        let mut behind = self.masters.iter().skip(usize::from(term.rank()) + 1);
-        behind.any(|master| *master == node)
+    /// Whether somebody else may act for the master of a term.
+    pub(super) fn stands_in(&self, node: NodeIndex, term: Term) -> bool {
+        self.rank_of(node).is_some_and(|rank| rank != term.rank())
+    }
+
+    /// Whether this node's turn in an interval comes after that of the master of a term.
+    pub(super) fn stands_behind(&self, term: Term) -> bool {
+        self.rank().is_some_and(|rank| rank > term.rank())
+    }
+
+    /// How many others would take the place of a master before this node does.
+    pub(super) fn before(&self, last: Option<NodeIndex>) -> usize {
+        let before = self.masters.iter().take_while(|master| **master != self.own);
+        before.filter(|master| Some(**master) != last).count()
+    }
+
+    /// Whether a master that was heard last then has had the time to tell, and has not.
+    pub(super) fn is_succeeded(&self, master: &Followed, now_ns: u64) -> bool {
+        now_ns.saturating_sub(master.heard_ns) >= self.succeeded_after_ns
     }
 
     pub(super) fn silence_ns(&self) -> u64 {
@@ -178,6 +203,9 @@ impl Election {
                 }
             }
             State::Slave(master) if theirs.claim() > master.claim() => Heard::Turned,
+            State::Slave(master) if theirs.term > master.term && self.is_succeeded(&master, received_ns) => {
+                Heard::Turned
+            }
             State::Slave(_) => Heard::Ignored,
         };
         match (heard, self.state) {
@@ -197,6 +225,17 @@ impl Election {
         }
     }
 
+    /// Something else came than a Sync. Whether it was of the master that this node follows.
+    pub(super) fn speaks(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) -> bool {
+        match &mut self.state {
+            State::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
+                master.heard_ns = master.heard_ns.max(received_ns);
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// Somebody that hears no master. A master whose term is not the latest begins another, so that all take it for the latest.
     pub(super) fn hello(&mut self, request: &Request, received_ns: u64) {
         self.speaks_of(request.term, request.epoch);
@@ -210,9 +249,13 @@ impl Election {
         }
     }
 
-    /// This node stood still until now: that it heard nobody says nothing of the others. What they sent is still to be read.
-    pub(super) fn awakes(&mut self, now_ns: u64) {
+    /// This node stood still until now: that it heard nobody says nothing of the others. What they sent is still to be read. Who waits to
+    /// begin a time has waited so much less.
+    pub(super) fn awakes(&mut self, stood_since_ns: u64, now_ns: u64) {
         self.awake_since_ns = now_ns;
+        let later = |since_ns: u64| since_ns.saturating_add(now_ns.saturating_sub(stood_since_ns)).min(now_ns);
+        self.quiet_since_ns = later(self.quiet_since_ns);
+        self.timed_heard_ns = self.timed_heard_ns.map(later);
     }
 
     /// Somebody that has time sent in the place of the master.
@@ -249,6 +292,11 @@ impl Election {
         if self.takeover_ns(now_ns, origin)? > now_ns {
             return None;
         }
+        self.succeeds()
+    }
+
+    /// Takes over: it is known to be this node's turn.
+    pub(super) fn succeeds(&mut self) -> Option<Term> {
         let term = self.next_term(self.rank()?);
         self.state = State::Master(term);
         Some(term)
@@ -269,24 +317,24 @@ impl Election {
 
     /// When it is this node's turn. A master that is heard, but answers nobody, hears nobody: it has to be replaced as well.
     fn takeover_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
-        let rank = self.rank()?;
+        self.rank()?;
         let (since_ns, patience_ns, last) = match self.state {
             State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
             State::Slave(master) => (master.answered_ns, self.silence_ns().max(self.deaf_ns), Some(master.node)),
             State::Master(_) => return None,
         };
-        let before = self.masters[..usize::from(rank)].iter().filter(|master| Some(**master) != last).count();
         // Who has no time leaves it to who has, as long as there is one.
         let recently_ns = self.interval_ns.saturating_mul(4);
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
-        let waits = before + if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
+        let waits = self.before(last) + if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
-        let (since_ns, patience_ns) = match (origin, self.begins_after_ns, self.state) {
-            (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => (since_ns, patience_ns),
-            (Origin::New, begins_ns, State::Slave(master)) => (master.heard_ns, patience_ns.max(begins_ns)),
-            (Origin::New, begins_ns, _) => (since_ns.max(self.timed_heard_ns.unwrap_or(0)), patience_ns.max(begins_ns)),
+        let takes_over_ns = since_ns.max(self.awake_since_ns).saturating_add(patience_ns);
+        let begins_ns = match (origin, self.begins_after_ns, self.state) {
+            (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => 0,
+            (Origin::New, begins_ns, State::Slave(master)) => master.heard_ns.saturating_add(begins_ns),
+            (Origin::New, begins_ns, _) => since_ns.max(self.timed_heard_ns.unwrap_or(0)).saturating_add(begins_ns),
         };
-        Some(since_ns.max(self.awake_since_ns).saturating_add(patience_ns).saturating_add(staggered_ns))
+        Some(takes_over_ns.max(begins_ns).saturating_add(staggered_ns))
     }
 }
 

@@ -17,7 +17,7 @@
 //! While a network is split, each part may have a master, and so two terms are two times.
 //!
 //! # Masters
-//! Masters are ordered. One that hears no master for [`TAKEOVER_INTERVALS`] (3.5) intervals, and one interval more for each that stands
+//! Masters are ordered. One that hears no master for [`TAKEOVER_HALF_INTERVALS`] (3.5) intervals, and one interval more for each that stands
 //! before it and is not the one that fell silent, takes over: same epoch, its own estimate of the time, the next term. One without
 //! time waits longer still, when it has heard of one that has time. So a router that starts listens first; if there is a master, it is
 //! its slave, and it stays so until that one fails: each change of master makes the bound a little larger, and none is made without need.
@@ -37,6 +37,10 @@
 //! out what the master may be off an earlier term, as all nodes are off alike. Whoever becomes master without time of its own goes on by
 //! what it heard, from Syncs or from those who have time and hear no master; a time is begun only where for 100 ms and eight cycles nobody who
 //! has one was heard. Until others have turned to it, for eight cycles, such a master sends nothing but Syncs.
+//!
+//! Whoever may be master and is sure of the time stands in for one whose Sync is missing, in its own window: those behind it in the same
+//! cycle, those before it in the next, if nobody did. At the third in a row it takes over there and then, unless anything else of the
+//! master came. Others turn to it when they have missed two.
 //!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 

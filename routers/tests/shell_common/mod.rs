@@ -8,6 +8,7 @@ use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
 use rohrpost_routers::time::TimeSettings;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
@@ -40,6 +41,8 @@ impl Faults for Words {
 pub(crate) struct Side {
     pub(crate) node: Arc<Node>,
     pub(crate) settings: Settings,
+    /// What launch keeps for its routers; none: each makes its own.
+    pub(crate) socket: Option<OwnedFd>,
     pub(crate) shell: Option<Shell>,
 }
 
@@ -91,7 +94,7 @@ impl Side {
             senders: vec![vec![module(own)]],
             flows: vec![declared(module(own), there)],
         };
-        Self { node, settings, shell: None }
+        Self { node, settings, socket: None, shell: None }
     }
 
     /// Ends its router, if it has one, and starts it anew.
@@ -100,7 +103,8 @@ impl Side {
         self.settings.incarnation += 1;
         let name = router(self.settings.own);
         let (settings, faults, clock) = (self.settings.clone(), Arc::new(Words), self.clock());
-        let parts = Parts { node: &self.node, name, settings, faults, socket: None, impair: None, clock };
+        let socket = self.socket.as_ref().map(|kept| kept.try_clone().unwrap());
+        let parts = Parts { node: &self.node, name, settings, faults, socket, impair: None, clock };
         self.shell = Some(Shell::start(parts).unwrap());
     }
 

@@ -2,7 +2,9 @@
 
 #![allow(dead_code, reason = "each test uses a part")]
 
+pub(crate) mod hog;
 pub(crate) mod process;
+pub(crate) mod relay;
 pub(crate) mod talk;
 
 use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
@@ -18,6 +20,7 @@ use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered, slots};
 use rohrpost_routers::tdma::Table;
 use rohrpost_routers::time::TimeSettings;
+use rohrpost_routers::time::message::{Message, Sync};
 use std::io::Write;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -199,8 +202,6 @@ pub(crate) fn label(from: u8, priority: u8, id: u16) -> Label {
 pub(crate) struct Segment {
     pub(crate) stations: Vec<Station>,
     pub(crate) lab: Lab,
-    /// Since then clocks are skewed.
-    begin_ns: u64,
     _folder: tempfile::TempDir,
     _turn: MutexGuard<'static, ()>,
 }
@@ -240,7 +241,7 @@ impl Segment {
             Station::new(own, node, tunnel, begin_ns)
         };
         let stations: Vec<_> = (0..NODES).map(station).collect();
-        Some(Self { stations, lab, begin_ns, _folder: folder, _turn: turn })
+        Some(Self { stations, lab, _folder: folder, _turn: turn })
     }
 
     /// In the place of a node's router.
@@ -293,6 +294,8 @@ pub(crate) struct Crossed {
     pub(crate) at_ns: u64,
     pub(crate) from: u8,
     pub(crate) kind: Kind,
+    /// If it is a Sync of a master, not one in the place of another.
+    pub(crate) sync: Option<Sync>,
     /// Of the whole packages in it.
     pub(crate) heads: Vec<Head>,
 }
@@ -311,38 +314,47 @@ impl Crossed {
     fn of(crossing: &Crossing<'_>) -> Option<Self> {
         let (head, inside) = FrameHead::parse(crossing.datagram).ok()?;
         let from = (0..NODES).find(|node| address(*node) == crossing.source)?;
-        Some(Self { at_ns: crossing.at_ns, from, kind: head.kind, heads: heads(head.kind, inside) })
+        let sync = match Message::parse(head.kind, inside) {
+            Ok(Message::Sync(sync)) if !sync.replacement => Some(sync),
+            _ => None,
+        };
+        Some(Self { at_ns: crossing.at_ns, from, kind: head.kind, sync, heads: heads(head.kind, inside) })
     }
 }
 
 /// Watches the bridge from a thread of its own.
 pub(crate) struct Capture {
     ends: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Vec<Crossed>>>,
+    seen: Arc<Mutex<Vec<Crossed>>>,
+    thread: JoinHandle<()>,
 }
 
 impl Capture {
     pub(crate) fn start(lab: &Lab) -> Self {
         let mut bridge = lab.capture().unwrap();
-        let ends = Arc::new(AtomicBool::new(false));
+        let (ends, seen) = (Arc::new(AtomicBool::new(false)), Arc::new(Mutex::new(Vec::new())));
         let thread = std::thread::spawn({
-            let ends = ends.clone();
+            let (ends, seen) = (ends.clone(), seen.clone());
             move || {
-                let mut seen = Vec::new();
                 while !ends.load(Ordering::Relaxed) {
                     std::thread::sleep(Duration::from_millis(20));
-                    bridge.drain(|crossing| seen.extend(Crossed::of(&crossing)));
+                    bridge.drain(|crossing| seen.lock().unwrap().extend(Crossed::of(&crossing)));
                 }
-                seen
             }
         });
-        Self { ends, thread: Some(thread) }
+        Self { ends, seen, thread }
+    }
+
+    /// What was seen so far.
+    pub(crate) fn so_far<R>(&self, look: impl FnOnce(&[Crossed]) -> R) -> R {
+        look(&self.seen.lock().unwrap())
     }
 
     /// All that was seen.
-    pub(crate) fn end(mut self) -> Vec<Crossed> {
+    pub(crate) fn end(self) -> Vec<Crossed> {
         self.ends.store(true, Ordering::Relaxed);
-        self.thread.take().unwrap().join().unwrap()
+        self.thread.join().unwrap();
+        std::mem::take(&mut *self.seen.lock().unwrap())
     }
 }
 

@@ -5,6 +5,7 @@ use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost_mailbox::Node;
+use rohrpost_routers::shell::clock::Skew;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -22,9 +23,10 @@ pub(crate) struct Router {
 impl Router {
     /// Starts one. `test` is the test of this program that calls [`be_a_router`].
     pub(crate) fn start(segment: &Segment, own: u8, test: &str) -> Self {
-        let path = segment.stations[usize::from(own)].node.path().display();
+        let Station { node, skew, .. } = &segment.stations[usize::from(own)];
+        let (path, Skew { begin_ns, rate_ppb, .. }) = (node.path().display(), skew);
         let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(["--exact", test, "--nocapture"]).env(STATION, format!("{own} {} {path}", segment.begin_ns));
+        command.args(["--exact", test, "--nocapture"]).env(STATION, format!("{own} {begin_ns} {rate_ppb} {path}"));
         command.stdin(Stdio::null()).stdout(Stdio::null());
         Self { child: segment.lab.command(&name(own), &mut command).unwrap() }
     }
@@ -67,11 +69,12 @@ pub(crate) fn be_a_router() {
     let Ok(station) = std::env::var(STATION) else { return };
     // Of the thread that started it.
     set_pdeathsig(Some(Signal::SIGKILL)).unwrap();
-    let mut words = station.splitn(3, ' ');
+    let mut words = station.splitn(4, ' ');
     let mut word = || words.next().unwrap();
-    let (own, begin_ns) = (word().parse().unwrap(), word().parse().unwrap());
+    let (own, begin_ns, rate_ppb) = (word().parse().unwrap(), word().parse().unwrap(), word().parse().unwrap());
     let node = Node::open(Path::new(word())).unwrap();
     let mut station = Station::new(own, node, None, begin_ns);
+    station.skew.rate_ppb = rate_ppb;
     station.start_here();
     loop {
         std::thread::park();

@@ -25,7 +25,7 @@ const QUIET_QUICK: Duration = Duration::from_secs(1);
 const GOLDEN: f64 = 0.618_034;
 
 /// Who dies. Each time the other takes its place and keeps it, so they die in turns. Only a later one in the order of masters stands in for
-/// a silent master in the same cycle: its window lies behind.
+/// a silent master in the same cycle: its window lies behind. An earlier one does so in the next.
 const DEAD: [&str; 2] = ["the first dies", "the second dies"];
 
 const REPLACED: [Goal; 2] = [Goal { name: "must 2 cycles", most: 2.0 }, Goal { name: "hoped 1, and 1 ms", most: 1.2 }];

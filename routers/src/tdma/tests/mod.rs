@@ -8,7 +8,7 @@ mod world;
 use crate::broken::{Broken, with};
 
 /// Checks that hold; with each mistake one of them fails.
-const CHECKS: [fn(); 10] = [
+const CHECKS: [fn(); 11] = [
     arithmetic::windows_end_where_their_guard_begins,
     single::what_is_late_is_not_sent,
     single::silence_begins_right_above_the_allowance,
@@ -18,6 +18,7 @@ const CHECKS: [fn(); 10] = [
     single::who_turns_while_the_first_master_lives_is_not_sure,
     scenes::nodes_join_one_by_one_and_never_meet,
     scenes::a_master_dies_and_no_slot_is_lost,
+    scenes::a_master_of_which_two_syncs_are_missing_remains_it,
     scenes::two_masters_become_one,
 ];
 

@@ -7,7 +7,7 @@ use super::{Clock, Draft};
 use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::time::coarse::Coarse;
-use crate::time::election::{Origin, State};
+use crate::time::election::{Followed, Origin, State};
 use crate::time::line::EVEN_PPB;
 use crate::time::message::{Request, Sync};
 use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES, Term};
@@ -15,6 +15,9 @@ use rohrpost_mailbox::TimeRecord;
 
 /// Who reigns by a time that is not its own sends nothing but Syncs in so many cycles: who goes by another hears of it meanwhile.
 const BEGINNING_CYCLES: u8 = JOINING_SYNCS;
+
+/// So many Syncs of a master in a row are missing when another takes its place.
+const MISSES: u64 = 3;
 
 const MS: u64 = 1_000_000;
 
@@ -47,6 +50,10 @@ pub(super) struct Slots {
     /// The last cycles of which a Sync of the master came, and of which any did.
     heard_cycle: u64,
     lives_cycle: u64,
+    /// The last one in which anything else of the master came.
+    spoke_cycle: u64,
+    /// In this one it woke up, and knows nothing of those before.
+    awake_cycle: u64,
     /// The cycle that is being synchronised, and who is next; whether the way to it is warm.
     synced_cycle: u64,
     next: usize,
@@ -89,6 +96,8 @@ impl Clock {
             master_error_ns: 0,
             heard_cycle: 0,
             lives_cycle: 0,
+            spoke_cycle: 0,
+            awake_cycle: 0,
             synced_cycle: 0,
             next: 0,
             is_warm: false,
@@ -116,10 +125,12 @@ impl Clock {
 
     /// In time slots this node is awake at least once in a cycle, from the first time on that it is asked.
     pub(super) fn stood_still(&mut self, now_ns: u64) {
+        let cycle = self.line.at(now_ns).ns / self.interval_ns;
         let Some(slots) = &mut self.slots else { return };
         let before_ns = std::mem::replace(&mut slots.advanced_ns, now_ns);
         if now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
-            self.election.awakes(now_ns);
+            slots.awake_cycle = cycle;
+            self.election.awakes(before_ns, now_ns);
         }
     }
 
@@ -147,16 +158,18 @@ impl Clock {
 
     /// The next Sync of a cycle, or what goes before it; none when everyone has got one.
     fn next_sync(&mut self, now_ns: u64, cycle: u64, nominal_ns: u64) -> Option<(NodeIndex, Draft)> {
-        let is_master = matches!(self.election.state(), State::Master(_));
         if self.slots.as_ref()?.synced_cycle != cycle {
             if !self.synchronises(cycle) {
                 return None;
             }
+            self.succeed(now_ns, cycle);
+            let is_master = self.is_master();
             let slots = self.slots.as_mut()?;
             (slots.synced_cycle, slots.next, slots.is_warm) = (cycle, 0, false);
             slots.beginning = slots.beginning.saturating_sub(1);
             *(if is_master { &mut slots.counts.sent } else { &mut slots.counts.replacements_sent }) += 1;
         }
+        let is_master = self.is_master();
         let slots = self.slots.as_ref()?;
         let to = self.receiver(cycle, slots.next)?;
         let warms = slots.settings.warm_ups && is_master && !slots.is_warm;
@@ -168,6 +181,22 @@ impl Clock {
         }
         slots.next += 1;
         Some((to, if is_master { Draft::Sync { nominal_ns } } else { Draft::Replacement { nominal_ns } }))
+    }
+
+    /// Whoever stands in for a master takes its place when as many Syncs are missing as must be. Who is not the next does so only if nobody
+    /// else stood in.
+    fn succeed(&mut self, now_ns: u64, cycle: u64) {
+        let (State::Slave(master), Some(slots)) = (self.election.state(), &self.slots) else { return };
+        let is_next = self.election.before(Some(master.node)) == 0;
+        let heard_cycle = if is_next { slots.heard_cycle } else { slots.lives_cycle };
+        let since_cycle = heard_cycle.max(slots.spoke_cycle).max(slots.awake_cycle);
+        let misses = self.due_cycle(cycle, &master).saturating_sub(since_cycle);
+        if misses < MISSES || self.sure(now_ns).is_none() {
+            return;
+        }
+        if let Some(term) = self.election.succeeds() {
+            self.reign(now_ns, term, Origin::Own);
+        }
     }
 
     /// Who gets the Sync at this place of a cycle: each time another one first, since the first finds the wire empty.
@@ -204,7 +233,7 @@ impl Clock {
     pub(super) fn is_contested(&self, received_ns: u64) -> bool {
         match self.election.state() {
             State::Listening => false,
-            State::Slave(master) => received_ns.saturating_sub(master.heard_ns) < 3 * self.interval_ns,
+            State::Slave(master) => !self.election.is_succeeded(&master, received_ns),
             State::Master(_) => true,
         }
     }
@@ -214,9 +243,10 @@ impl Clock {
         let Some(slots) = &mut self.slots else { return };
         if turned {
             slots.coarse.clear();
-            slots.heard_cycle = 0;
+            (slots.heard_cycle, slots.spoke_cycle) = (0, 0);
         }
-        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+        // All who follow a master are off alike by what it may be off.
+        slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
         // Until it is measured, its time may be another: to go on by the old one is to send in the slots of those who follow it.
         let is_measured = self.timeline == sync.began;
         let off_ns = slots.coarse.off_ns(received.ns, self.line.at(received.ns).ns);
@@ -229,10 +259,20 @@ impl Clock {
         (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
     }
 
+    /// Something of somebody came that is no Sync. If it is the master, it lives, though its Sync may be missing.
+    pub(super) fn speaks_in_slots(&mut self, received: Stamp, head: &FrameHead) {
+        let cycle = self.line.at(received.ns).ns / self.interval_ns;
+        if let Some(slots) = &mut self.slots
+            && self.election.speaks(head.from, head.incarnation, received.ns)
+        {
+            slots.spoke_cycle = cycle;
+        }
+    }
+
     /// Somebody hears no master either, and has time: whoever takes over goes on by that.
     pub(super) fn hello_in_slots(&mut self, received: Stamp, hello: &Request) {
         if let (Some(slots), State::Listening, true) = (&mut self.slots, self.election.state(), hello.timed) {
-            slots.coarse.add(hello.epoch, hello.sent_ns, received.ns);
+            slots.coarse.add(hello.epoch, hello.sent_ns, received.ns, hello.error_ns);
         }
     }
 
@@ -241,14 +281,14 @@ impl Clock {
         let (State::Slave(master), Some(slots)) = (self.election.state(), &mut self.slots) else {
             return Err(Ignored::Late);
         };
-        if sync.term != master.term || !self.election.stands_behind(head.from, sync.term) {
+        if sync.term != master.term || !self.election.stands_in(head.from, sync.term) {
             return Err(Ignored::Late);
         }
         self.election.replaced(received.ns);
         slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
         slots.lives_cycle = slots.lives_cycle.max(sync.cycle);
         if broken!(ReplacementCalibrates) {
-            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns);
+            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
         }
         Ok(())
     }
@@ -297,8 +337,7 @@ impl Clock {
 
     /// Whether this node reigns by a time that others may not go by yet: it sends nothing but Syncs.
     pub fn is_beginning(&self) -> bool {
-        let is_master = matches!(self.election.state(), State::Master(_));
-        is_master && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
+        self.is_master() && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
     }
 
     /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.
@@ -317,16 +356,31 @@ impl Clock {
     pub fn may_synchronise(&self) -> bool {
         match self.election.state() {
             State::Master(_) => true,
-            State::Slave(master) => self.election.stands_behind(self.settings.own, master.term),
+            State::Slave(master) => self.election.stands_in(self.settings.own, master.term),
             State::Listening => false,
         }
     }
 
     /// Whether it has to, in that of this cycle: as the master, or in place of one whose Sync has not come.
     pub fn synchronises(&self, cycle: u64) -> bool {
-        let is_master = matches!(self.election.state(), State::Master(_));
-        let is_missing = self.slots.as_ref().is_some_and(|slots| slots.lives_cycle < cycle);
-        is_master || ((is_missing || broken!(ReplacesHeard)) && self.may_synchronise())
+        let is_missing = |master: &Followed| {
+            let due_cycle = self.due_cycle(cycle, master);
+            self.slots.as_ref().is_some_and(|slots| slots.lives_cycle < due_cycle)
+        };
+        match self.election.state() {
+            State::Master(_) => true,
+            State::Slave(master) => self.may_synchronise() && (is_missing(&master) || broken!(ReplacesHeard)),
+            State::Listening => false,
+        }
+    }
+
+    /// The last cycle whose Sync must have come before this node's own window of a cycle.
+    fn due_cycle(&self, cycle: u64, master: &Followed) -> u64 {
+        if self.election.stands_behind(master.term) { cycle } else { cycle.saturating_sub(1) }
+    }
+
+    fn is_master(&self) -> bool {
+        matches!(self.election.state(), State::Master(_))
     }
 
     /// What was sent and heard of synchronisation in time slots.

@@ -1,0 +1,146 @@
+//! A network with time slots is divided, and each part has a master and a time; when it is one again, it has one of each.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+#[path = "slots_common/mod.rs"]
+mod common;
+
+use common::process::{Router, be_a_router};
+use common::talk::{Ears, mouths};
+use common::{Capture, Crossed, MASTERS, Segment, assert_kept, judge, name, table};
+use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
+use rohrpost_routers::link::State;
+use rohrpost_routers::time::Role;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// What the processes run.
+const PROCESS: &str = "in_a_process_of_its_own";
+/// Alone in its part, in this process and by the true clock. Nobody follows it, so it is the one to yield.
+const LONELY: u8 = MASTERS[0];
+/// The master of the other part, and its slave.
+const OTHERS: [u8; 2] = [MASTERS[1], 2];
+const ALL: [u8; 3] = [0, 1, 2];
+/// So much faster is the clock of the other master: the two times part.
+const FAST_PPB: i64 = 200_000;
+/// When they are so far from each other, the windows of the one lie in those of others by the other.
+const APART_NS: u64 = 1_300_000;
+/// So many cycles after the network is one again nobody sends any more by the time that is given up.
+const HEALED_CYCLES: u32 = 16;
+const PAUSE: Duration = Duration::from_micros(2300);
+
+/// Reads the page of a node all the time: what it says goes back in no epoch.
+fn watch_time(node: &Arc<Node>, ends: &Arc<AtomicBool>) -> JoinHandle<()> {
+    let (clock, ends) = (SystemClock::open(node), ends.clone());
+    std::thread::spawn(move || {
+        let mut before = clock.now();
+        while !ends.load(Ordering::Relaxed) {
+            let now = clock.now();
+            assert!((now.epoch, now.ns) >= (before.epoch, before.ns), "from {before:?} to {now:?}");
+            before = now;
+            std::thread::sleep(Duration::from_micros(200));
+        }
+    })
+}
+
+/// How much more than the true clock a master says with each of its Syncs, ns, if its clock is so fast.
+fn ahead_ns(crossed: &[Crossed], master: u8, rate_ppb: i64) -> impl DoubleEndedIterator<Item = (u64, i128)> {
+    let syncs = crossed.iter().filter(move |frame| frame.from == master).filter_map(|frame| Some((frame, frame.sync?)));
+    syncs.map(move |(frame, sync)| {
+        let true_ns = i128::from(frame.at_ns);
+        (frame.at_ns, i128::from(sync.sent_ns) - true_ns - true_ns * i128::from(rate_ppb) / 1_000_000_000)
+    })
+}
+
+/// The time of the master of the others: that of the Sync which took the least time from the call to the bridge.
+fn time_of_others(crossed: &[Crossed]) -> TimeRecord {
+    let (monotonic_ns, ahead_ns) = ahead_ns(crossed, OTHERS[0], FAST_PPB).max_by_key(|sync| sync.1).unwrap();
+    let fast_ns = i128::from(monotonic_ns) * i128::from(FAST_PPB) / 1_000_000_000;
+    TimeRecord {
+        epoch: 1,
+        source: TimeSource::Master,
+        monotonic_ns,
+        system_ns: (i128::from(monotonic_ns) + ahead_ns + fast_ns) as u64,
+        pace_ppb: 1_000_000_000_u64.strict_add_signed(FAST_PPB),
+        error_ns: 0,
+        drift_ns_s: 0,
+    }
+}
+
+/// Whether both masters have spoken lately, by times that are so far from each other.
+fn are_apart(crossed: &[Crossed]) -> bool {
+    let last = |master| ahead_ns(crossed, master, 0).next_back();
+    let off = last(LONELY).zip(last(OTHERS[0]));
+    off.is_some_and(|((_, one_ns), (_, other_ns))| (one_ns - other_ns).unsigned_abs() > APART_NS.into())
+}
+
+fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
+    let mut mouths = mouths(segment, nodes);
+    for id in 0..rounds {
+        mouths.iter_mut().for_each(|mouth| mouth.say(id));
+        ears.listen();
+        std::thread::sleep(PAUSE);
+    }
+    ears.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
+}
+
+#[test]
+fn in_a_process_of_its_own() {
+    be_a_router();
+}
+
+#[test]
+fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
+    let Some(mut segment) = Segment::at_rest(None) else { return };
+    let Segment { stations, lab, .. } = &mut segment;
+    stations[usize::from(OTHERS[0])].skew.rate_ppb = FAST_PPB;
+    let lonely = &mut stations[usize::from(LONELY)];
+    lonely.skew = Default::default();
+    let capture = Capture::start(lab);
+    lonely.start(lab);
+    let ends = Arc::new(AtomicBool::new(false));
+    let reader = watch_time(&lonely.node, &ends);
+    // Its kernel has to know where it sends them, else nobody would see them later on.
+    let speaks = |crossed: &[Crossed]| ahead_ns(crossed, LONELY, 0).count() > 10;
+    segment.wait_until("the first is master", |_| capture.so_far(speaks));
+    segment.lab.divide(&[&name(LONELY)]).unwrap();
+    let _routers = OTHERS.map(|own| Router::start(&segment, own, PROCESS));
+    let mut ears = Ears::new(&segment);
+    let lonely = |segment: &Segment| segment.stations[usize::from(LONELY)].clock();
+    assert_eq!(lonely(&segment).role, Role::Master, "nobody disturbs it");
+    // Where they may send to each other, their routers have begun.
+    segment.wait_until("the others send", |_| {
+        capture.so_far(|crossed| OTHERS.iter().all(|own| crossed.iter().any(|frame| frame.from == *own)))
+    });
+    talk(&segment, &mut ears, &OTHERS, 100);
+    segment.wait_until("the parts have two times", |_| capture.so_far(are_apart));
+
+    segment.lab.unite(&[&name(LONELY)]).unwrap();
+    let united_ns = monotonic_ns();
+    segment.wait_until("all send", |segment| {
+        let lonely = &segment.stations[usize::from(LONELY)];
+        let is_heard = |own: &u8| lonely.shell().stats().state(*own, monotonic_ns()) == State::Alive;
+        lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
+    });
+    talk(&segment, &mut ears, &ALL, 100);
+    assert_eq!(lonely(&segment).master, Some(OTHERS[0]), "it yields to who is followed");
+    ends.store(true, Ordering::Relaxed);
+    reader.join().unwrap();
+
+    let crossed = capture.end();
+    let time = time_of_others(&crossed);
+    // When both know of each other.
+    let meets_ns = ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).find(|at_ns| *at_ns > united_ns).unwrap();
+    let healed_ns = meets_ns + (HEALED_CYCLES * table().cycle).as_nanos() as u64;
+    let [before, after] = {
+        let (before, rest) = crossed.split_at(crossed.partition_point(|frame| frame.at_ns < united_ns));
+        [before, &rest[rest.partition_point(|frame| frame.at_ns < healed_ns)..]]
+    };
+    let foreign = judge(before, &time).outside.len();
+    assert!(foreign > 20, "the parts had two times: {foreign} frames of {}", before.len());
+    let reigns = ahead_ns(after, LONELY, 0).count();
+    assert_eq!(reigns, 0, "there is one master");
+    assert_kept("two parts that are one again", after, &time);
+}
