@@ -99,8 +99,6 @@ mod variants {
         TakesAnyRange,
         /// Session: what was made ready for a connection that broke goes by the next one.
         SendsCutAgain,
-        /// Session: what waited too long leaves nevertheless.
-        LeavesStale,
         /// Session: what was under way too long is delivered.
         DeliversOld,
         /// Session: half of the way is no part of a time's bound.
@@ -178,12 +176,11 @@ mod variants {
         ];
 
         /// All mistakes of sessions.
-        pub const SESSION: [Self; 19] = [
+        pub const SESSION: [Self; 18] = [
             Self::ForgetsPieces,
             Self::TakesTwice,
             Self::TakesAnyRange,
             Self::SendsCutAgain,
-            Self::LeavesStale,
             Self::DeliversOld,
             Self::TrustsTheWay,
             Self::KeepsHops,

@@ -118,6 +118,7 @@ impl Outgoing {
                 fates.lost(&waiting.head, beginning, Cause::Stale);
                 continue;
             }
+            self.forget_taken();
             let start = self.ready.len();
             self.make_ready(shift_ns, &Parcel { head: &head, body: &[], published_ns, hops, level: 0 }, fates);
             let body = self.ready.len();
@@ -157,11 +158,13 @@ impl Outgoing {
         }
     }
 
+    fn forget_taken(&mut self) {
+        self.ready.drain(..self.taken);
+        self.taken = 0;
+    }
+
     fn make_ready(&mut self, shift_ns: i64, parcel: &Parcel<'_>, fates: &mut impl Fates) {
-        if self.taken > 0 {
-            self.ready.drain(..self.taken);
-            self.taken = 0;
-        }
+        self.forget_taken();
         let Parcel { head, body, published_ns, hops, .. } = *parcel;
         // 0 says that nobody knows.
         let published_ns = published_ns.saturating_add_signed(shift_ns).max(1);
@@ -171,5 +174,5 @@ impl Outgoing {
 }
 
 pub(super) fn is_stale(now_ns: u64, published_ns: u64) -> bool {
-    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS && !broken!(LeavesStale)
+    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS
 }

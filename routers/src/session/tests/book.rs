@@ -39,7 +39,7 @@ pub(super) struct Book {
     pub(super) clients: Vec<Known>,
     /// The last number of each sender, receiver and priority, by who delivers.
     last: BTreeMap<(usize, Name, Name, u8), usize>,
-    /// When what of others was delivered, for comparing runs.
+    /// Of each delivery: age, from whom, to whom.
     pub(super) log: Vec<(u64, usize, usize)>,
     pub(super) problems: Vec<String>,
     pub(super) seen: BTreeMap<&'static str, u64>,
@@ -100,7 +100,7 @@ impl Book {
         let before = self.last.insert(flow, number);
         check(before.is_none_or(|before| before < number), "out of order");
         wrong.into_iter().for_each(|text| self.broken(text));
-        self.log.push((now_ns, from, number));
+        self.log.push((age_ns, from, to));
         self.saw(if to_all { "to all" } else { "delivered" });
     }
 }
@@ -122,8 +122,9 @@ impl Answers for Teller<'_> {
         let Some(number) = number_of(call) else { return false };
         self.book.saw(why.word());
         let package = &mut self.book.packages[number];
-        package.said_lost = true;
-        if !package.delivered.is_empty() {
+        // What goes to all systems each of them answers for itself.
+        package.said_lost = package.head.to.system() != ALL_SYSTEMS;
+        if package.said_lost && !package.delivered.is_empty() {
             self.book.broken(format!("{number} was delivered, and is said to be lost: {}", why.word()));
         }
         answer.extend(LOST);

@@ -22,9 +22,9 @@ pub(super) struct Pipe {
 }
 
 impl Pipe {
-    pub(super) fn new(mut chance: Chance, bytes_ms: u64) -> Self {
+    pub(super) fn new(mut chance: Chance, bytes_ms: u64, is_wide: bool) -> Self {
         let delay_ms = chance.scale(1, 60);
-        let capacity = chance.scale(2000, 100_000) as usize;
+        let capacity = if is_wide { 1 << 22 } else { chance.scale(2000, 100_000) as usize };
         Self {
             pieces: VecDeque::new(),
             held: 0,

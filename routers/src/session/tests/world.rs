@@ -325,7 +325,7 @@ impl World {
         };
         let line = self.plan.lines[index];
         let (up, down) = (node.chance.fork(), node.chance.fork());
-        let (mut up, mut down) = (Pipe::new(up, line), Pipe::new(down, line));
+        let (mut up, mut down) = (Pipe::new(up, line, self.plan.calm), Pipe::new(down, line, self.plan.calm));
         if self.plan.stalled == Some(index) && self.now_ns >= S {
             down.stalled_until_ns = u64::MAX;
         }
@@ -384,7 +384,8 @@ impl World {
     fn break_connection(&mut self, client: usize) {
         for connection in self.connections.iter_mut().filter(|connection| connection.client == client) {
             let line = self.plan.lines[client];
-            (connection.up, connection.down) = (Pipe::new(self.faults.fork(), line), Pipe::new(self.faults.fork(), line));
+            (connection.up, connection.down) =
+                (Pipe::new(self.faults.fork(), line, false), Pipe::new(self.faults.fork(), line, false));
             (connection.up.is_closed, connection.down.is_closed) = (true, true);
         }
     }
