@@ -33,5 +33,6 @@ pub mod settings;
 pub mod shell;
 pub mod sim;
 pub mod stats;
+pub mod tcp;
 pub mod tdma;
 pub mod time;

@@ -36,6 +36,7 @@ mod status;
 mod summary;
 mod table;
 mod target;
+mod tcp;
 mod time;
 mod top;
 mod units;
@@ -119,6 +120,10 @@ enum Command {
     Run(run::Arguments),
     /// Carry packages between this node and the others.
     Router(router::Arguments),
+    /// Carry packages beyond the LAN: the server.
+    TcpRouter(tcp::Arguments),
+    /// Carry packages between this node and the TCP router.
+    TcpClient(tcp::Arguments),
 }
 
 /// Runs the command that was typed.
@@ -156,6 +161,8 @@ pub(crate) fn main() -> ExitCode {
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Router(arguments) => router::run(arguments),
+        Command::TcpRouter(arguments) => tcp::serve(arguments),
+        Command::TcpClient(arguments) => tcp::join(arguments),
     };
     result.unwrap_or_else(|error| {
         // Who would read it may be gone, too.

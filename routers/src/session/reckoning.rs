@@ -65,6 +65,11 @@ impl Reckoning {
         true
     }
 
+    /// The shortest way there and back of those that are kept, ns.
+    pub fn round_trip_ns(&self) -> Option<u64> {
+        self.kept.iter().flatten().map(|sample| sample.ways_ns).min()
+    }
+
     /// The server's session clock.
     pub fn session(&self, now_ns: u64) -> Option<Bounded> {
         let best = self.kept.iter().flatten().min_by_key(|sample| sample.error_ns(now_ns))?;

@@ -226,6 +226,21 @@ impl Client {
         &self.inn
     }
 
+    /// Connections that were made so far.
+    pub fn connections(&self) -> u64 {
+        self.attempt
+    }
+
+    /// Whether there is a connection.
+    pub fn is_connected(&self) -> bool {
+        matches!(self.state, State::Greeting { .. } | State::Member)
+    }
+
+    /// The shortest way there and back of late, ns.
+    pub fn round_trip_ns(&self) -> Option<u64> {
+        self.reckoning.round_trip_ns()
+    }
+
     /// The server's session clock.
     pub fn session(&self, now_ns: u64) -> Option<Bounded> {
         self.reckoning.session(now_ns)

@@ -43,6 +43,25 @@ pub struct ServerSettings {
     pub levels: [u8; 256],
 }
 
+/// A connection, for people.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Its place.
+    pub index: ClientIndex,
+    /// Its name; until its hello, where it comes from.
+    pub name: &'a str,
+    /// First byte of the names that it may host; 0 until its hello.
+    pub system: u8,
+    /// Whether it takes part.
+    pub is_member: bool,
+    /// When the connection was made, ns.
+    pub began_ns: u64,
+    /// When something came last, ns.
+    pub heard_ns: u64,
+    /// Bytes of memory that it takes up; what all share is not counted.
+    pub bytes: usize,
+}
+
 /// What to do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Output {
@@ -145,6 +164,19 @@ impl Server {
     /// Name and state of each client.
     pub fn clients(&self) -> impl Iterator<Item = (ClientIndex, &str, State)> {
         self.present().map(|(index, member)| (index, member.name.as_str(), member.state))
+    }
+
+    /// All connections.
+    pub fn views(&self) -> impl Iterator<Item = View<'_>> {
+        self.present().map(|(index, member)| View {
+            index,
+            name: &member.name,
+            system: member.system,
+            is_member: member.is_member(),
+            began_ns: member.began_ns,
+            heard_ns: member.heard_ns,
+            bytes: member.bytes(),
+        })
     }
 
     /// Bytes of memory that a client takes up; what all share is not counted.
