@@ -153,7 +153,13 @@ impl Page<'_> {
             size_text(tcp.quota_bytes as u64)
         );
         self.entry("beyond", &words);
-        self.entry("security", Tcp::UNPROTECTED);
+        match &tcp.certificates {
+            None => self.entry("security", Tcp::UNPROTECTED),
+            Some(folder) => {
+                let words = format!("TLS 1.3 to the TCP router, both ends with a certificate in {}", folder.display());
+                self.entry("security", &words);
+            }
+        }
     }
 
     fn classes(&mut self) {

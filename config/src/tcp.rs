@@ -15,6 +15,7 @@ use crate::tdma::Tdma;
 use rohrpost_mailbox::{Name, Priority, local};
 use std::net::{IpAddr, SocketAddr};
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// The built-in module that is a node's client.
@@ -40,6 +41,8 @@ const SERVER_INSTANCE: u8 = u8::MAX;
 pub struct Tcp {
     /// Where clients reach it.
     pub address: SocketAddr,
+    /// The folder of certificates, from that of the file on; none: nothing is sealed.
+    pub certificates: Option<PathBuf>,
     /// The node of this system that it runs on; none: another installation runs it.
     pub server: Option<String>,
     /// Clients that may take part at a time.
@@ -62,8 +65,9 @@ impl Tcp {
 
     /// `tdma` are the time slots in which the nodes of the LAN send, if they do.
     pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) -> Self {
-        let security = section.required("security", "security = \"none\"");
-        security.and_then(|item| item.choice(&[("none", ())]));
+        let security = section.required("security", "security = \"tls\"");
+        let is_sealed = security.and_then(|item| item.choice(&[("none", false), ("tls", true)]));
+        let certificates = certificates(&section, is_sealed);
         let address = section.required("address", "address = \"192.168.0.1\"").and_then(|item| {
             let text = item.text("192.168.0.1")?;
             let address = text.parse::<IpAddr>().ok().filter(|address| !address.is_unspecified() && !address.is_multicast());
@@ -99,11 +103,33 @@ impl Tcp {
         let address = SocketAddr::new(address.unwrap_or(IpAddr::from([127, 0, 0, 1])), port);
         Self {
             address,
+            certificates,
             server,
             clients: clients as u16,
             quota_bytes: quota.unwrap_or(QUOTA) as usize,
             bulk_below: bulk.map_or(BULK_BELOW, |bulk| bulk as u8),
         }
+    }
+}
+
+/// The folder of certificates: there exactly when sessions are sealed.
+fn certificates(section: &Section<'_>, is_sealed: Option<bool>) -> Option<PathBuf> {
+    const EXAMPLE: &str = "certificates = \"certificates\"";
+    match (section.get("certificates"), is_sealed?) {
+        (Some(item), true) => item.text("certificates").map(PathBuf::from),
+        (None, true) => {
+            section.report(format!(
+                "`certificates` is missing; write for example `{EXAMPLE}`, the folder that `rohrpost certificates` fills"
+            ));
+            None
+        }
+        (Some(item), false) => {
+            item.report(
+                "`certificates` are of no use with `security = \"none\"`; write `security = \"tls\"`, or drop this",
+            );
+            None
+        }
+        (None, false) => None,
     }
 }
 

@@ -19,6 +19,20 @@ fn every_key_arrives() {
 }
 
 #[test]
+fn sealed_sessions_need_a_folder_of_certificates_and_open_ones_must_not_have_one() {
+    let sealed = TCP.replace("security = \"none\"", "security = \"tls\"\ncertificates = \"certificates\"");
+    assert_eq!(parse(&sealed).tcp.unwrap().certificates, Some("certificates".into()));
+    for (section, words) in [
+        ("security = \"tls\"", "`certificates` is missing"),
+        ("security = \"none\"\ncertificates = \"certificates\"", "of no use"),
+    ] {
+        let text = TCP.replace("security = \"none\"", section);
+        let errors = Installation::parse(&text, Path::new("tcp.toml")).unwrap_err().to_string();
+        assert!(errors.contains(words), "{errors}");
+    }
+}
+
+#[test]
 fn the_server_and_a_client_of_each_node_are_there_by_themselves() {
     let north = parse(TCP);
     let names: Vec<Name> = north.modules.iter().map(|module| module.name).collect();

@@ -3,6 +3,7 @@
 mod bench;
 mod bw;
 mod call;
+mod certificates;
 mod check;
 mod clean;
 mod completions;
@@ -114,6 +115,8 @@ enum Command {
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
+    /// Make the certificates by which the TCP router and its clients know each other.
+    Certificates(certificates::Arguments),
     /// Print versions, of this program and of what nodes share.
     Version(version::Arguments),
     /// Run a built-in module by hand.
@@ -158,6 +161,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Bench(arguments) => bench::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
+        Command::Certificates(arguments) => certificates::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Router(arguments) => router::run(arguments),

@@ -172,6 +172,9 @@ impl Running {
             Some(_) => {
                 format!("{name} does not run, and no launch watches over it; start it as you started the others")
             }
+            None if self.is_beyond(module) => {
+                format!("{name} does not run; start it in system {}, where it belongs", module.system())
+            }
             None => format!(
                 "{name} does not run, and the configuration has no such module; `rohrpost list` shows what runs"
             ),

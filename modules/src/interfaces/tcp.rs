@@ -89,6 +89,8 @@ pub struct BeyondClients {
     pub left: u64,
     /// Connections that might not take part, or not any more.
     pub refused: u64,
+    /// Who was the last of them, and why; empty without one.
+    pub refusal: String,
     /// Classes of which something passed, the most urgent first.
     pub classes: Vec<ClassPassed>,
 }

@@ -87,7 +87,7 @@ fn without_hurry(head: &Head) -> Head {
 }
 
 /// The same mailbox in another system.
-fn in_system(name: Name, system: u8) -> Name {
+pub(crate) fn in_system(name: Name, system: u8) -> Name {
     Name::new(system, name.class().0, name.instance(), name.local())
 }
 

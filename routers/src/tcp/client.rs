@@ -7,17 +7,19 @@
 //! ```
 
 use super::desk::Desk;
+use super::seal::ClientSeal;
 use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::report::NotDelivered;
 use crate::session::client::{Client, ClientSettings, Event, Host, Output, Package};
 use crate::session::frame::{Carried, Range};
-use crate::session::{Answers, Cause};
+use crate::session::{Answers, Cause, in_system};
 use crate::shell::Faults;
 use crate::shell::transit;
 use crate::shell::ways::{Reach, Ways};
 use rohrpost_mailbox::{
-    CreateError, Interest, Name, Node, NodeError, Participant, Receiver, SendError, Watch, Watches, monotonic_ns,
+    ALL_SYSTEMS, CreateError, Head, Interest, Name, Node, NodeError, Participant, Receiver, SendError, Watch, Watches,
+    monotonic_ns,
 };
 use std::io;
 use std::net::SocketAddr;
@@ -64,6 +66,8 @@ pub struct ClientParts<'a> {
     pub beyond: Vec<(Name, Name)>,
     /// How commands are answered that cannot be carried.
     pub faults: Arc<dyn Faults>,
+    /// Its certificates; none: nothing is sealed.
+    pub seal: Option<ClientSeal>,
 }
 
 /// A client at work; dropped, it ends. What waits in its mailbox stays there.
@@ -86,13 +90,13 @@ impl ClientShell {
     /// # Errors
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
-        let ClientParts { node, name, server, settings, hosts, beyond, faults } = parts;
+        let ClientParts { node, name, server, settings, hosts, beyond, faults, seal } = parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
         let watches = Watches::new(&participant).map_err(ClientError::Watches)?;
         node.set_routes_beyond(via, &beyond)?;
-        let shared = Arc::new(Shared::default());
+        let (shared, system) = (Arc::new(Shared::default()), settings.system);
         let ranges = hosts.into_iter().map(|(first, last)| Range { first, last }).collect();
         let work = Work {
             shared: shared.clone(),
@@ -103,7 +107,10 @@ impl ClientShell {
                 ways: Ways::new(&participant, Reach::Here),
                 desk: Desk::new(faults, format!("beyond the TCP router at {server}")),
                 why: String::new(),
+                by_server: false,
             },
+            system,
+            seal,
             mailbox,
             watches,
             connection: None,
@@ -142,6 +149,8 @@ struct Voice {
     desk: Desk,
     /// Why it takes no part, as it was last told; empty if it does.
     why: String,
+    /// The server has said that, or what it said is why.
+    by_server: bool,
 }
 
 impl Voice {
@@ -152,15 +161,14 @@ impl Voice {
             self.server
         );
         // What it said itself is better than that its connection then ended.
-        if self.why.is_empty() {
-            tracing::warn!("{why}");
-            self.why = why;
+        if !self.by_server && self.why != why {
+            self.says(why, false);
         }
     }
 
-    fn told(&mut self, why: String) {
+    fn says(&mut self, why: String, by_server: bool) {
         tracing::warn!("{why}");
-        self.why = why;
+        (self.why, self.by_server) = (why, by_server);
     }
 }
 
@@ -187,12 +195,18 @@ impl Host for Voice {
                 self.why.clear();
                 tracing::info!("takes part at the TCP router at {server}");
             }
-            Event::Down => self.told(format!("takes part at the TCP router at {server} no more; it tries again")),
-            Event::Refused(refusal) => self.told(format!("may not take part at the TCP router at {server}: {refusal}")),
-            Event::Objected(verdict) => {
-                self.told(format!("may not host its names at the TCP router at {server}: {verdict}"));
+            Event::Down => {
+                self.says(format!("takes part at the TCP router at {server} no more; it tries again"), false)
             }
-            Event::Damaged(bad) => self.told(format!("cannot read what came from the TCP router at {server}: {bad}")),
+            Event::Refused(refusal) => {
+                self.says(format!("may not take part at the TCP router at {server}: {refusal}"), true);
+            }
+            Event::Objected(verdict) => {
+                self.says(format!("may not host its names at the TCP router at {server}: {verdict}"), true);
+            }
+            Event::Damaged(bad) => {
+                self.says(format!("cannot read what came from the TCP router at {server}: {bad}"), true);
+            }
         }
     }
 }
@@ -211,6 +225,9 @@ struct Work {
     server: SocketAddr,
     client: Client,
     voice: Voice,
+    /// First byte of the names of its node.
+    system: u8,
+    seal: Option<ClientSeal>,
     mailbox: Receiver,
     watches: Watches,
     connection: Option<Connection>,
@@ -251,6 +268,10 @@ impl Work {
         for _ in 0..BURST {
             let Some(waiting) = self.mailbox.try_receive() else { return false };
             let (head, published_ns, body) = (*waiting.head(), waiting.published_ns(), waiting.body());
+            if head.to.system() == ALL_SYSTEMS {
+                // Its own system is one of them. What is not on this node another client brings there.
+                let _ = self.voice.ways.send(&Head { to: in_system(head.to, self.system), ..head }, body);
+            }
             self.client.send(monotonic_ns(), &Package { head, body, published_ns, hops: 0 }, &mut self.voice);
         }
         true
@@ -263,7 +284,8 @@ impl Work {
     }
 
     fn connect(&mut self, now_ns: u64) {
-        let begun = Stream::connect(self.server);
+        let sealed = self.seal.as_ref().map(ClientSeal::begin).transpose();
+        let begun = sealed.and_then(|sealed| Stream::connect(self.server, sealed));
         let begun = begun.and_then(|stream| Ok((self.watches.add(&stream, Interest::Write)?, stream)));
         match begun {
             Ok((watch, stream)) => {
@@ -279,8 +301,11 @@ impl Work {
     fn writable(&mut self) {
         let Some(connection) = &mut self.connection else { return };
         if !connection.is_begun {
-            self.await_room(false);
-            return self.client.writable();
+            if self.flush() {
+                self.await_room(false);
+                self.client.writable();
+            }
+            return;
         }
         match connection.stream.connected() {
             Ok(()) => {
@@ -296,16 +321,27 @@ impl Work {
         let Some(connection) = self.connection.as_mut().filter(|connection| !connection.is_begun) else { return };
         match connection.stream.read(&mut self.piece) {
             Moved::Bytes(bytes) => self.client.received(monotonic_ns(), &self.piece[..bytes], &mut self.voice),
-            Moved::Nothing => {}
+            Moved::Nothing => drop(self.flush()),
             Moved::Over(error) => self.broke(error.as_ref()),
         }
+    }
+
+    /// Hands on what the connection took; whether all of it has left.
+    fn flush(&mut self) -> bool {
+        let Some(connection) = &mut self.connection else { return false };
+        match connection.stream.flush() {
+            Ok(()) if connection.stream.has_unsent() => self.await_room(true),
+            Ok(()) => return true,
+            Err(error) => self.broke(Some(&error)),
+        }
+        false
     }
 
     fn write(&mut self) {
         let Some(connection) = &mut self.connection else { return };
         let ready = self.client.ready();
         let moved = connection.stream.write(ready);
-        let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len());
+        let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len()) && !connection.stream.has_unsent();
         match moved {
             Moved::Bytes(bytes) => self.client.took(monotonic_ns(), bytes),
             Moved::Nothing => self.client.took(monotonic_ns(), 0),

@@ -10,10 +10,12 @@
 
 mod client;
 mod desk;
+mod seal;
 mod seen;
 mod server;
 mod stream;
 
 pub use client::{ClientError, ClientParts, ClientShell};
+pub use seal::{AUTHORITY, ClientSeal, Holder, SealError, ServerSeal};
 pub use seen::{Class, Link, LinkState, Member, Members};
 pub use server::{ServerError, ServerParts, ServerShell};

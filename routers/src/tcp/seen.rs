@@ -94,6 +94,8 @@ pub struct Members {
     pub left: u64,
     /// Connections that were told why they may not take part, or not any more.
     pub refused: u64,
+    /// Who was the last of them, and why; empty without one.
+    pub refusal: String,
     /// What went through.
     pub classes: Vec<Class>,
 }

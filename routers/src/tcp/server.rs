@@ -3,6 +3,7 @@
 //! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the client's own queue.
 
 use super::desk::Desk;
+use super::seal::{Holder, ServerSeal};
 use super::seen::{Class, Member, Members, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::session::frame::Reason;
@@ -29,6 +30,9 @@ const EVENTS: usize = 256;
 /// What is no client's place.
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
+/// Connections that cannot be sealed are closed after so long, and there are so many of them at most.
+const PARTING_NS: u64 = 1_000_000_000;
+const PARTING_MAX: usize = 64;
 /// When accepting fails, since there is no descriptor left, it is tried again after so long.
 const ACCEPT_AGAIN_NS: u64 = 100_000_000;
 
@@ -62,6 +66,8 @@ pub struct ServerParts<'a> {
     pub settings: ServerSettings,
     /// How commands are answered that cannot be handed on.
     pub faults: Arc<dyn Faults>,
+    /// Its certificates; none: nothing is sealed, and nobody shows who he is.
+    pub seal: Option<ServerSeal>,
     /// The node whose system time it tells.
     pub node: &'a Arc<Node>,
 }
@@ -85,7 +91,7 @@ impl ServerShell {
     /// # Errors
     /// [`ServerError`]
     pub fn start(parts: ServerParts<'_>) -> Result<Self, ServerError> {
-        let ServerParts { address, settings, faults, node } = parts;
+        let ServerParts { address, settings, faults, seal, node } = parts;
         let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
         let listener = listen(address)?;
         let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|errno| io("epoll")(errno.into()))?;
@@ -101,7 +107,9 @@ impl ServerShell {
         let work = Work {
             shared: shared.clone(),
             server: Server::new(settings),
-            host: Voice { desk, left: 0, refused: 0 },
+            host: Voice { desk, left: 0, refused: 0, refusal: String::new() },
+            seal,
+            parting: Vec::new(),
             listener,
             accept_ns: None,
             epoll,
@@ -158,6 +166,16 @@ struct Voice {
     desk: Desk,
     left: u64,
     refused: u64,
+    /// The last of them, in words.
+    refusal: String,
+}
+
+impl Voice {
+    fn refuses(&mut self, refusal: String) {
+        tracing::warn!("{refusal}");
+        self.refused += 1;
+        self.refusal = refusal;
+    }
 }
 
 impl Answers for Voice {
@@ -183,18 +201,15 @@ impl Host for Voice {
                 tracing::warn!("{name} takes part no more: {}", why.word());
             }
             Event::Refused { reason: Reason::Ending, .. } => {}
-            Event::Refused { name, reason, digests: (theirs, ours), text } => {
-                self.refused += 1;
-                match reason {
-                    Reason::Common | Reason::System => tracing::warn!(
-                        "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
-                         (`rohrpost check`, on both)",
-                        reason.word()
-                    ),
-                    _ if text.is_empty() => tracing::warn!("{name} may not take part: {}", reason.word()),
-                    _ => tracing::warn!("{name} may not take part: {}: {text}", reason.word()),
-                }
-            }
+            Event::Refused { name, reason, digests: (theirs, ours), text } => self.refuses(match reason {
+                Reason::Common | Reason::System => format!(
+                    "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
+                     (`rohrpost check`, on both)",
+                    reason.word()
+                ),
+                _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),
+                _ => format!("{name} may not take part: {}: {text}", reason.word()),
+            }),
             Event::Objected { name, verdict } => tracing::warn!("{name} may not host what it says: {verdict}"),
         }
     }
@@ -203,6 +218,8 @@ impl Host for Voice {
 struct Connection {
     stream: Stream,
     peer: String,
+    /// It has shown a certificate, if it must.
+    is_known: bool,
     /// It is looked whether it takes bytes again.
     awaits_room: bool,
 }
@@ -212,6 +229,9 @@ struct Work {
     shared: Arc<Shared>,
     server: Server,
     host: Voice,
+    seal: Option<ServerSeal>,
+    /// Connections without a seal that holds, until the other end has read why, or this time has come, ns.
+    parting: Vec<(u64, Stream)>,
     listener: TcpListener,
     /// There is no descriptor left: nothing is accepted before, ns.
     accept_ns: Option<u64>,
@@ -231,6 +251,7 @@ impl Work {
             let now_ns = monotonic_ns();
             if now_ns >= say_ns {
                 say_ns = now_ns + SAY_EVERY_NS;
+                self.parting.retain(|(until_ns, _)| now_ns < *until_ns);
                 self.server.set_time(self.clock.record());
                 self.say(now_ns);
             }
@@ -266,7 +287,7 @@ impl Work {
 
     /// Something happened to a client's socket; if the place has another client by now, there is nothing to read.
     fn happened(&mut self, client: ClientIndex, flags: EpollFlags) {
-        if flags.contains(EpollFlags::EPOLLOUT) {
+        if flags.contains(EpollFlags::EPOLLOUT) && self.flush(client) {
             self.await_room(client, false);
             self.server.writable(client);
         }
@@ -277,20 +298,67 @@ impl Work {
 
     fn read(&mut self, client: ClientIndex) {
         let Some(connection) = connection(&mut self.connections, client) else { return };
-        match connection.stream.read(&mut self.piece) {
+        let moved = connection.stream.read(&mut self.piece);
+        let is_new = !connection.is_known;
+        match moved {
+            Moved::Over(Some(error)) if is_new && error.kind() == io::ErrorKind::Other => self.unsealed(client, &error),
+            Moved::Over(_) => self.broke(client),
+            Moved::Nothing => drop(self.flush(client)),
+            Moved::Bytes(_) if is_new && !self.is_known(client) => {
+                let error =
+                    io::Error::other("its certificate names no node; make new ones with `rohrpost certificates`");
+                self.unsealed(client, &error);
+            }
             Moved::Bytes(bytes) => {
                 self.server.received(monotonic_ns(), client, &self.piece[..bytes], &mut self.host);
             }
-            Moved::Nothing => {}
-            Moved::Over(_) => self.broke(client),
         }
+    }
+
+    /// Learns who a client is from its certificate; false: that says it not.
+    fn is_known(&mut self, client: ClientIndex) -> bool {
+        let Some(connection) = connection(&mut self.connections, client) else { return false };
+        if connection.stream.is_sealed() {
+            let Some(Holder::Node { node, system }) = connection.stream.holder() else { return false };
+            self.server.certify(client, system, &format!("node {node} of system {system}"));
+        }
+        connection.is_known = true;
+        true
+    }
+
+    /// A connection cannot be sealed. The other end reads why, if this one waits a moment before it closes.
+    fn unsealed(&mut self, client: ClientIndex, error: &io::Error) {
+        let now_ns = monotonic_ns();
+        let Some(Connection { stream, peer, .. }) =
+            self.connections.get_mut(usize::from(client.0)).and_then(Option::take)
+        else {
+            return;
+        };
+        self.host.refuses(format!("{peer} may not take part: {error}"));
+        stream.end();
+        // Closed when the place is needed, or the time is over; until then nothing is asked of it.
+        if self.epoll.delete(&stream).is_ok() && self.parting.len() < PARTING_MAX {
+            self.parting.push((now_ns + PARTING_NS, stream));
+        }
+        self.server.closed(now_ns, client, &mut self.host);
+    }
+
+    /// Hands on what a connection took; whether all of it has left.
+    fn flush(&mut self, client: ClientIndex) -> bool {
+        let Some(connection) = connection(&mut self.connections, client) else { return false };
+        match connection.stream.flush() {
+            Ok(()) if connection.stream.has_unsent() => self.await_room(client, true),
+            Ok(()) => return true,
+            Err(_) => self.broke(client),
+        }
+        false
     }
 
     fn write(&mut self, client: ClientIndex) {
         let Some(connection) = connection(&mut self.connections, client) else { return };
         let ready = self.server.ready(client);
         let moved = connection.stream.write(ready);
-        let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len());
+        let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len()) && !connection.stream.has_unsent();
         match moved {
             Moved::Bytes(bytes) => self.server.took(monotonic_ns(), client, bytes),
             Moved::Nothing => self.server.took(monotonic_ns(), client, 0),
@@ -319,7 +387,8 @@ impl Work {
         for _ in 0..ACCEPTS {
             match self.listener.accept() {
                 Ok((socket, peer)) => {
-                    if let Ok(stream) = Stream::new(socket) {
+                    let sealed = self.seal.as_ref().map(ServerSeal::begin).transpose();
+                    if let Ok(stream) = sealed.and_then(|sealed| Stream::new(socket, sealed)) {
                         self.take_in(now_ns, stream, peer);
                     }
                 }
@@ -352,7 +421,7 @@ impl Work {
         if self.connections.len() <= index {
             self.connections.resize_with(index + 1, || None);
         }
-        self.connections[index] = Some(Connection { stream, peer, awaits_room: false });
+        self.connections[index] = Some(Connection { is_known: !stream.is_sealed(), stream, peer, awaits_room: false });
     }
 
     fn broke(&mut self, client: ClientIndex) {
@@ -383,9 +452,10 @@ impl Work {
             bytes: client.bytes as u64,
         };
         let classes = Class::all(self.server.counts());
-        let (left, refused) = (self.host.left, self.host.refused);
+        let Voice { left, refused, ref refusal, .. } = self.host;
+        let refusal = refusal.clone();
         let members = self.server.views().map(member).collect();
-        self.shared.seen.say(Members { members, left, refused, classes });
+        self.shared.seen.say(Members { members, left, refused, refusal, classes });
     }
 }
 

@@ -1,8 +1,9 @@
-//! One connection of a session: bytes in and out, without waiting.
+//! One connection of a session: bytes in and out, sealed or not, without waiting.
 
+use super::seal::{Holder, Sealed};
 use socket2::{Domain, Protocol, SockRef, Socket, Type};
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 
 /// What the kernel takes before it has sent it: what is more important than that waits for no more.
@@ -21,42 +22,77 @@ pub(super) enum Moved {
 
 /// A connection.
 #[derive(Debug)]
-pub(super) struct Stream(TcpStream);
+pub(super) struct Stream {
+    socket: TcpStream,
+    sealed: Option<Sealed>,
+}
 
 impl Stream {
     /// Begins to connect; when it may be written to, [`Stream::connected`] says how that ended.
-    pub(super) fn connect(to: SocketAddr) -> io::Result<Self> {
+    pub(super) fn connect(to: SocketAddr, sealed: Option<Sealed>) -> io::Result<Self> {
         let socket = Socket::new(Domain::for_address(to), Type::STREAM, Some(Protocol::TCP))?;
         socket.set_nonblocking(true)?;
         match socket.connect(&to.into()) {
             Err(error) if error.raw_os_error() != Some(nix::errno::Errno::EINPROGRESS as i32) => return Err(error),
             _ => {}
         }
-        Self::new(socket.into())
+        Self::new(socket.into(), sealed)
     }
 
     /// One that was accepted.
-    pub(super) fn new(socket: TcpStream) -> io::Result<Self> {
+    pub(super) fn new(socket: TcpStream, sealed: Option<Sealed>) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         socket.set_nodelay(true)?;
         SockRef::from(&socket).set_tcp_notsent_lowat(UNSENT_BYTES)?;
-        Ok(Self(socket))
+        Ok(Self { socket, sealed })
     }
 
     /// Whether the connection that was begun is made.
     pub(super) fn connected(&self) -> io::Result<()> {
-        match self.0.take_error()? {
+        match self.socket.take_error()? {
             Some(error) => Err(error),
-            None => self.0.peer_addr().map(drop),
+            None => self.socket.peer_addr().map(drop),
         }
     }
 
     pub(super) fn read(&mut self, into: &mut [u8]) -> Moved {
-        moved(self.0.read(into))
+        moved(match &mut self.sealed {
+            Some(sealed) => sealed.read(into, &mut self.socket),
+            None => self.socket.read(into),
+        })
     }
 
     pub(super) fn write(&mut self, bytes: &[u8]) -> Moved {
-        moved(self.0.write(bytes))
+        moved(match &mut self.sealed {
+            Some(sealed) => sealed.write(bytes, &mut self.socket),
+            None => self.socket.write(bytes),
+        })
+    }
+
+    /// Hands on what was taken and has not left.
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        self.sealed.as_mut().map_or(Ok(()), |sealed| sealed.flush(&mut self.socket))
+    }
+
+    /// Whether something that was taken has not left.
+    pub(super) fn has_unsent(&self) -> bool {
+        self.sealed.as_ref().is_some_and(Sealed::has_unsent)
+    }
+
+    /// Who the other end is, if it has shown that.
+    pub(super) fn holder(&self) -> Option<Holder> {
+        self.sealed.as_ref().and_then(Sealed::holder)
+    }
+
+    /// Whether the other end must show who it is.
+    pub(super) fn is_sealed(&self) -> bool {
+        self.sealed.is_some()
+    }
+
+    /// Nothing more is sent; what was said can still be read.
+    pub(super) fn end(&self) {
+        // It may be closed at the other end already.
+        let _ = self.socket.shutdown(Shutdown::Write);
     }
 }
 
@@ -65,12 +101,14 @@ fn moved(result: io::Result<usize>) -> Moved {
         Ok(0) => Moved::Over(None),
         Ok(bytes) => Moved::Bytes(bytes),
         Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Moved::Nothing,
+        // By TLS: closed without a farewell, which a process that dies says not either.
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Moved::Over(None),
         Err(error) => Moved::Over(Some(error)),
     }
 }
 
 impl AsFd for Stream {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.0.as_fd()
+        self.socket.as_fd()
     }
 }

@@ -38,7 +38,7 @@ fn links(links: &[&BeyondLink]) -> String {
     };
     let heads =
         ["node", "TCP router", "state", ">reconnects", ">there and back", ">time", ">sent", ">received", ">memory"];
-    if links.is_empty() { String::new() } else { table(heads, links.iter().map(row).collect()) }
+    if links.is_empty() { String::new() } else { table(heads, links.iter().map(row)) }
 }
 
 fn whys(links: &[&BeyondLink]) -> String {
@@ -63,8 +63,11 @@ fn clients(servers: &[&BeyondClients]) -> String {
             ]
         });
         let heads = ["client", "from", ">system", "state", ">ranges", ">since", ">heard", ">memory"];
-        text += &table(heads, rows.collect());
+        text += &table(heads, rows);
         text += &format!("(TCP router at {}: {} left, {} refused)\n", server.address, server.left, server.refused);
+        if !server.refusal.is_empty() {
+            text += &format!("the last that was refused: {}\n", server.refusal);
+        }
     }
     text
 }

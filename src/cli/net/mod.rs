@@ -63,7 +63,7 @@ struct Rates {
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let alone = "this installation has one node and no [tcp], and so no routers; `rohrpost list` shows what runs";
+    let alone = "this installation has one node, and so no routers; `rohrpost list` shows what runs";
     let mut round = rounds.begin(alone, |installation| installation.network.is_some() || installation.tcp.is_some())?;
     let mut before = look(&mut round);
     let mut wait = LOOK_AGAIN;

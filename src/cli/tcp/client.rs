@@ -7,7 +7,7 @@ use rohrpost::interfaces::{BeyondLink, BeyondState, Tcp, TcpInterface};
 use rohrpost::mailbox::realtime_ns;
 use rohrpost::{Context, Module, ModuleError};
 use rohrpost_routers::session::client::ClientSettings;
-use rohrpost_routers::tcp::{ClientParts, ClientShell, LinkState};
+use rohrpost_routers::tcp::{ClientParts, ClientSeal, ClientShell, Holder, LinkState};
 use std::net::SocketAddr;
 use std::sync::Arc;
 
@@ -26,8 +26,15 @@ impl Module for ClientModule {
     fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         let installation = context.installation();
         let tcp = installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))?;
-        tracing::warn!("{}", Configured::UNPROTECTED);
         let node_name = installation.node_of(context.me()).unwrap_or_default().to_owned();
+        let holder = Holder::Node { node: node_name.clone(), system: installation.system.id };
+        let seal = match &tcp.certificates {
+            Some(folder) => Some(ClientSeal::load(&installation.resolve(folder), &holder)?),
+            None => {
+                tracing::warn!("{}", Configured::UNPROTECTED);
+                None
+            }
+        };
         let digest = installation.digest();
         let settings = ClientSettings {
             name: short(&format!("node {node_name} of {}", installation.system.name)),
@@ -49,6 +56,7 @@ impl Module for ClientModule {
             hosts: installation.names_on(&node_name),
             beyond: installation.names_beyond(&node_name),
             faults: Arc::new(Encoded::new(digest.lan())),
+            seal,
         })?;
         context.set_period(PERIOD);
         Ok(Self { shell, node: node_name, server })

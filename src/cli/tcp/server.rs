@@ -7,7 +7,7 @@ use rohrpost::interfaces::{BeyondClient, BeyondClients, Tcp, TcpInterface};
 use rohrpost::mailbox::{monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError};
 use rohrpost_routers::session::server::ServerSettings;
-use rohrpost_routers::tcp::{Member, ServerParts, ServerShell};
+use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
 use std::net::SocketAddr;
 use std::sync::Arc;
 
@@ -26,7 +26,13 @@ impl Module for ServerModule {
     fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         let installation = context.installation();
         let tcp = installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))?;
-        tracing::warn!("{}", Configured::UNPROTECTED);
+        let seal = match &tcp.certificates {
+            Some(folder) => Some(ServerSeal::load(&installation.resolve(folder))?),
+            None => {
+                tracing::warn!("{}", Configured::UNPROTECTED);
+                None
+            }
+        };
         let digest = installation.digest();
         let settings = ServerSettings {
             name: short(&format!("the TCP router of {}", installation.system.name)),
@@ -41,7 +47,7 @@ impl Module for ServerModule {
         let address = tcp.address;
         let faults = Arc::new(Encoded::new(digest.lan()));
         let node = context.link().borrow().participant().node().clone();
-        let shell = ServerShell::start(ServerParts { address, settings, faults, node: &node })?;
+        let shell = ServerShell::start(ServerParts { address, settings, faults, seal, node: &node })?;
         context.set_period(PERIOD);
         Ok(Self { shell, address, began_ns: monotonic_ns() })
     }
@@ -58,6 +64,7 @@ impl Module for ServerModule {
                 clients: seen.members.into_iter().map(client).collect(),
                 left: seen.left,
                 refused: seen.refused,
+                refusal: seen.refusal,
                 classes: classes(&seen.classes),
             },
         )?;

@@ -96,7 +96,7 @@ impl Client {
 
     fn refused(&mut self, now_ns: u64, refusal: &Refusal<'_>, host: &mut impl Host) {
         let reason = refusal.reason;
-        if matches!(reason, Reason::Version | Reason::Common | Reason::System) {
+        if matches!(reason, Reason::Version | Reason::Common | Reason::System | Reason::Certificate) {
             self.backoff.hopeless();
         }
         self.over(now_ns, Told::Refused(reason), Event::Refused(refusal), host);

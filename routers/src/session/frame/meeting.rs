@@ -119,10 +119,12 @@ pub enum Reason {
     Stalled = 8,
     /// The server ends.
     Ending = 9,
+    /// Its certificate is of another system.
+    Certificate = 10,
 }
 
 impl Reason {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Version,
         Self::Common,
         Self::System,
@@ -132,6 +134,7 @@ impl Reason {
         Self::Silent,
         Self::Stalled,
         Self::Ending,
+        Self::Certificate,
     ];
 
     /// A word for people and programs.
@@ -146,6 +149,7 @@ impl Reason {
             Self::Silent => "silent",
             Self::Stalled => "stalled",
             Self::Ending => "ending",
+            Self::Certificate => "certificate",
         }
     }
 }
@@ -211,6 +215,9 @@ impl std::fmt::Display for Refusal<'_> {
             Reason::Silent => write!(f, "the TCP router heard nothing for too long"),
             Reason::Stalled => write!(f, "nothing was read here for too long"),
             Reason::Ending => write!(f, "the TCP router ends"),
+            Reason::Certificate => {
+                write!(f, "the certificate here does not fit: {text}; use that of this node (`rohrpost certificates`)")
+            }
         }
     }
 }

@@ -66,7 +66,14 @@ impl Server {
 
     fn greet(&mut self, now_ns: u64, client: ClientIndex, hello: &Hello<'_>, host: &mut impl Host) {
         if let Some(member) = self.member_mut(client) {
-            hello.name.clone_into(&mut member.name);
+            match member.certified {
+                None => hello.name.clone_into(&mut member.name),
+                Some(system) if system != hello.system => {
+                    let text = format!("its certificate is of system {system}, its hello of {}", hello.system);
+                    return self.refuse(now_ns, client, Reason::Certificate, (0, 0), &text, host);
+                }
+                Some(_) => {}
+            }
         }
         if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
             return self.refuse(now_ns, client, reason, digests, &holder, host);

@@ -49,6 +49,8 @@ pub(super) struct Member {
     /// Its name for people; until the hello, where it comes from.
     pub(super) name: String,
     pub(super) system: u8,
+    /// The system that it has proven to be of; none: it need not.
+    pub(super) certified: Option<u8>,
     pub(super) system_digest: u64,
     pub(super) reaches_own: bool,
     pub(super) life: u64,
@@ -76,6 +78,7 @@ impl Member {
             state: State::Greeting,
             name: peer.to_owned(),
             system: 0,
+            certified: None,
             system_digest: 0,
             reaches_own: false,
             life: 0,
@@ -96,7 +99,9 @@ impl Member {
     /// It said hello, and may take part.
     pub(super) fn joins(&mut self, now_ns: u64, hello: &Hello<'_>) {
         self.state = State::Member;
-        hello.name.clone_into(&mut self.name);
+        if self.certified.is_none() {
+            hello.name.clone_into(&mut self.name);
+        }
         self.system = hello.system;
         self.system_digest = hello.system_digest;
         self.reaches_own = hello.reaches_own;

@@ -206,6 +206,14 @@ impl Server {
         Some(ClientIndex(index as u16))
     }
 
+    /// A client has proven, before its hello, of which system it is, and what people call it: it may say no other in its hello.
+    pub fn certify(&mut self, client: ClientIndex, system: u8, name: &str) {
+        if let Some(member) = self.member_mut(client) {
+            name.clone_into(&mut member.name);
+            member.certified = Some(system);
+        }
+    }
+
     /// Bytes to be written to a client.
     pub fn ready(&self, client: ClientIndex) -> &[u8] {
         self.member(client).map_or(&[], |member| member.outgoing.ready())
