@@ -126,7 +126,10 @@ fn claims(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
         let mut callers = Senders::of(installation, module, |other| calls(other, module));
         // Tools on other nodes call every module, through the router.
         callers.router |= installation.nodes.len() > 1 && module.is_in_file();
-        let called = Senders::of(installation, module, |other| calls(module, other));
+        let mut called = Senders::of(installation, module, |other| calls(module, other));
+        // Who is beyond the LAN calls every module, and may be called by each.
+        let beyond = installation.tcp.is_some() && module.is_in_file();
+        (callers.beyond, called.beyond) = (beyond, beyond);
         for ((key, spec), line) in module.mailboxes.each().into_iter().zip(lines.mailboxes) {
             let (senders, tools) = if key == "commands" { (&callers, TOOLS) } else { (&called, 0) };
             let claims = (senders.count() + tools) * usize::from(spec.claims);
@@ -156,6 +159,8 @@ fn calls(caller: &Module, called: &Module) -> bool {
 struct Senders {
     local: usize,
     router: bool,
+    /// The client of the TCP router, for all beyond the LAN.
+    beyond: bool,
 }
 
 impl Senders {
@@ -164,11 +169,12 @@ impl Senders {
         Self {
             local: senders().filter(|other| other.node == module.node).count(),
             router: senders().any(|other| other.node != module.node),
+            beyond: false,
         }
     }
 
     fn count(&self) -> usize {
-        self.local + usize::from(self.router)
+        self.local + usize::from(self.router) + usize::from(self.beyond)
     }
 
     fn text(&self, tools: usize) -> String {
@@ -179,6 +185,7 @@ impl Senders {
         };
         let router = self.router.then(|| String::from("the router"));
         let tools = (tools > 0).then(|| format!("{tools} tools"));
-        modules.into_iter().chain(router).chain(tools).collect::<Vec<_>>().join(" + ")
+        let beyond = self.beyond.then(|| String::from("the client of the TCP router"));
+        modules.into_iter().chain(router).chain(beyond).chain(tools).collect::<Vec<_>>().join(" + ")
     }
 }

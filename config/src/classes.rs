@@ -9,6 +9,9 @@ pub const TOOL: &str = "tool";
 /// Class of the routers, which are there by themselves when there are several nodes.
 pub const ROUTER: &str = "router";
 
+/// Class of the TCP router and of its clients, which are there by themselves with `[tcp]`.
+pub const TCP: &str = "tcp";
+
 /// One class of an installation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClassEntry {

@@ -1,6 +1,6 @@
 //! Who owns which module name: collected in a first pass, so that what a module refers to may stand below it.
 
-use crate::classes::{ClassTable, ROUTER, TOOL, class_of};
+use crate::classes::{ClassTable, ROUTER, TCP, TOOL, class_of};
 use crate::reader::{Section, nearest};
 use rohrpost_mailbox::Name;
 use std::collections::BTreeMap;
@@ -10,8 +10,8 @@ pub(crate) struct Directory<'d> {
     pub(crate) classes: &'d ClassTable,
     /// By the text in the file. A name that is wrong in itself stays known: its own message is enough.
     owners: BTreeMap<String, Name>,
-    /// Whether each node has a router, which no `[[module]]` describes.
-    has_routers: bool,
+    /// Classes of what is there though no `[[module]]` describes it.
+    reserved: Vec<&'static str>,
 }
 
 /// A text that names no module.
@@ -33,7 +33,9 @@ impl<'d> Directory<'d> {
     /// `routers` are there by themselves.
     pub(crate) fn read(modules: &[Section<'d>], classes: &'d ClassTable, routers: &[Name]) -> Self {
         let owners = routers.iter().map(|name| (classes.format(*name), *name)).collect();
-        let mut directory = Self { classes, owners, has_routers: !routers.is_empty() };
+        let is_there = |class: &&str| routers.iter().any(|name| classes.name(name.class()) == Some(class));
+        let reserved = [ROUTER, TCP].into_iter().filter(is_there).collect();
+        let mut directory = Self { classes, owners, reserved };
         let mut lines: BTreeMap<&str, usize> = BTreeMap::new();
         for module in modules {
             let name = module.required("name", "name = \"laser.0\"");
@@ -68,13 +70,14 @@ impl<'d> Directory<'d> {
                 ),
             );
         }
-        if self.has_routers && class_of(text) == ROUTER {
+        let whose = match class_of(text) {
+            ROUTER => "for the routers, which are there by themselves when there are several nodes",
+            _ => "for the TCP router and its clients, which are there by themselves with [tcp]",
+        };
+        if self.reserved.contains(&class_of(text)) {
             module.reader.report(
                 line,
-                format!(
-                    "module `{text}`: class `router` is for the routers, which are there by themselves when there are several \
-                     nodes; give the module a class of its own"
-                ),
+                format!("module `{text}`: class `{}` is {whose}; give the module a class of its own", class_of(text)),
             );
         }
         self.owners.insert(text.into(), name.unwrap_or_default());

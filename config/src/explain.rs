@@ -11,6 +11,7 @@ use crate::network::{LEVEL_NOT_REAL_TIME, Network, TRANSIT};
 use crate::node::Node;
 use crate::output::LineFormat;
 use crate::saved::SavedValue;
+use crate::tcp::{TCP_CLIENT, TCP_ROUTER, Tcp};
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
@@ -100,6 +101,7 @@ impl Page<'_> {
             self.entry("parameters", &words);
         }
         self.network();
+        self.tcp();
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
@@ -135,6 +137,29 @@ impl Page<'_> {
             ),
         );
         self.entry("security", Network::UNPROTECTED);
+    }
+
+    fn tcp(&mut self) {
+        let Some(tcp) = &self.installation.tcp else { return };
+        let runs = match &tcp.server {
+            Some(node) => {
+                format!("it runs on node {node}, takes {}", count(tcp.clients.into(), "client"))
+            }
+            None => "another installation runs it".into(),
+        };
+        let words = format!(
+            "TCP router at {}: what neither a node nor its LAN has goes there; {runs}; {} wait for a connection at most",
+            tcp.address,
+            size_text(tcp.quota_bytes as u64)
+        );
+        self.entry("beyond", &words);
+        match &tcp.certificates {
+            None => self.entry("security", Tcp::UNPROTECTED),
+            Some(folder) => {
+                let words = format!("TLS 1.3 to the TCP router, both ends with a certificate in {}", folder.display());
+                self.entry("security", &words);
+            }
+        }
     }
 
     fn classes(&mut self) {
@@ -212,7 +237,7 @@ impl Page<'_> {
         for (key, spec) in module.mailboxes.each() {
             self.entry(key, &mailbox(spec));
         }
-        if !module.is_in_file() {
+        if module.has_transit() {
             self.entry("transit", &mailbox(&TRANSIT));
         }
     }
@@ -288,7 +313,14 @@ impl Page<'_> {
 
 fn runs(module: &Module) -> String {
     let what = match &module.program {
-        _ if !module.is_in_file() => return "the router of this node, there by itself".into(),
+        Program::Builtin(name) if !module.is_in_file() => {
+            let what = match name.as_str() {
+                TCP_CLIENT => "this node's client of the TCP router",
+                TCP_ROUTER => "the TCP router",
+                _ => "the router of this node",
+            };
+            return format!("{what}, there by itself");
+        }
         Program::Builtin(name) => format!("builtin `{name}`"),
         Program::Command(words) => format!("program `{}`", words.join(" ")),
     };

@@ -13,6 +13,7 @@ use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
+use crate::tcp::{self, Tcp};
 use crate::tdma::Tdma;
 use crate::time::TimeSource;
 use rohrpost_mailbox::{Class, Name};
@@ -38,12 +39,14 @@ pub struct Installation {
     pub classes: ClassTable,
     /// The nodes, in the order of the file; at least one.
     pub nodes: Vec<Node>,
-    /// The modules, in the order of their start: the routers, if there are several nodes, then those of the file.
+    /// The modules, in the order of their start: the routers, if there are several nodes, what `[tcp]` brings, then those of the file.
     pub modules: Vec<Module>,
     /// How nodes reach each other; none if there is one only.
     pub network: Option<Network>,
     /// When each node sends; none if each sends as packages come.
     pub tdma: Option<Tdma>,
+    /// The TCP router beyond the LAN; none if nothing goes there.
+    pub tcp: Option<Tcp>,
     /// Where system time comes from.
     pub time: TimeSource,
     /// What the output service keeps.
@@ -150,12 +153,17 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
     let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
     network::judge(&file, &nodes, &classes);
+    let tcp = file.section("tcp", "[tcp]").map(|section| Tcp::read(section, &nodes, tdma.as_ref()));
+    if tcp.is_some() {
+        tcp::judge(&file, &classes, scheduling);
+    }
 
     let sections = self::sections(&file, "module");
     if sections.is_empty() {
         file.report("no module; add one: `[[module]]` with `name` and `builtin` or `program`");
     }
-    let routers = network::routers(&nodes, &classes, system.id);
+    let mut routers = network::routers(&nodes, &classes, system.id);
+    routers.extend(tcp::modules(tcp.as_ref(), &nodes, &classes, system.id));
     let router_names: Vec<Name> = routers.iter().map(|(router, _)| router.name).collect();
     let directory = Directory::read(&sections, &classes, &router_names);
     let context = Context { directory: &directory, nodes: &nodes };
@@ -182,6 +190,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         modules,
         network,
         tdma,
+        tcp,
         time,
         output,
         gui,

@@ -52,13 +52,14 @@ mod reader;
 mod saved;
 mod scheduling;
 mod settings;
+mod tcp;
 mod tdma;
 mod time;
 mod units;
 pub mod wire;
 
 pub use bounds::{Bound, FlowBound, TAKEN_BEFORE, Unbounded, bounds};
-pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TOOL, is_word as is_class_name};
+pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TCP, TOOL, is_word as is_class_name};
 pub use digest::Digest;
 pub use errors::{Errors, Problem};
 pub use explain::explain;
@@ -76,6 +77,7 @@ pub use rohrpost_mailbox::Full;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
+pub use tcp::{TCP_CLIENT, TCP_ROUTER, Tcp};
 pub use tdma::{LATE, Tdma, TimeSlot, Tunnel};
 pub use time::TimeSource;
 pub use units::{

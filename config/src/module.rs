@@ -2,10 +2,11 @@
 
 use crate::calls::Calls;
 use crate::directory::Directory;
-use crate::mailbox::{MailboxLines, Mailboxes};
+use crate::mailbox::{MailboxLines, Mailboxes, lines_at};
 use crate::network::TRANSIT;
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
+use crate::tcp::TCP_ROUTER;
 use crate::units::duration_text;
 use rohrpost_mailbox::Name;
 use serde::Deserialize;
@@ -17,7 +18,7 @@ pub const BUILTINS: [&str; 5] = ["sim", "carmen", "mapper", "pilot", "output"];
 /// What runs as a module.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Program {
-    /// One of [`BUILTINS`], or the router of a node.
+    /// One of [`BUILTINS`], the router of a node, its client of the TCP router, or that router.
     Builtin(String),
     /// A program and its arguments.
     Command(Vec<String>),
@@ -114,15 +115,44 @@ impl Module {
         std::iter::once(self.name).chain(self.faces.iter().copied())
     }
 
-    /// Whether it is one `[[module]]` of the file. Routers are not: they are there by themselves when there are several nodes.
+    /// Whether it is one `[[module]]` of the file. Routers are not: they are there by themselves when there are several nodes; nor is what
+    /// `[tcp]` brings along.
     pub fn is_in_file(&self) -> bool {
         self.index.is_some()
+    }
+
+    /// One that is there by itself, with what is true of all of these.
+    pub(crate) fn by_itself(name: Name, node: &Node, builtin: &str, restart: Restart) -> (Self, Lines) {
+        let module = Self {
+            name,
+            faces: Vec::new(),
+            node: node.name.clone(),
+            program: Program::Builtin(builtin.into()),
+            optional: false,
+            calls: Vec::new(),
+            although: Vec::new(),
+            settings: toml::Table::new(),
+            start: Start::On,
+            restart,
+            ready_within: Duration::from_secs(10),
+            stop_within: Duration::from_secs(2),
+            spin: Duration::ZERO,
+            mailboxes: Mailboxes::default(),
+            line: node.line,
+            index: None,
+        };
+        (module, Lines { mailboxes: lines_at(node.line), calls: Vec::new() })
+    }
+
+    /// Whether it has a mailbox for packages that go elsewhere.
+    pub fn has_transit(&self) -> bool {
+        !self.is_in_file() && self.program != Program::Builtin(TCP_ROUTER.into())
     }
 
     /// Bytes of its mailboxes; each face has a command mailbox like the module's.
     pub fn memory(&self) -> u64 {
         let [commands, replies, data] = self.mailboxes.each().map(|(_, spec)| spec.memory());
-        let transit = if self.is_in_file() { 0 } else { TRANSIT.memory() };
+        let transit = if self.has_transit() { TRANSIT.memory() } else { 0 };
         commands * (1 + self.faces.len() as u64) + replies + data + transit
     }
 }

@@ -5,8 +5,8 @@
 
 use crate::classes::{ClassTable, ROUTER};
 use crate::installation::Installation;
-use crate::mailbox::{MailboxSpec, Mailboxes, lines_at};
-use crate::module::{Lines, Module, Program, Restart, RestartPolicy, Start};
+use crate::mailbox::MailboxSpec;
+use crate::module::{Lines, Module, Restart, RestartPolicy};
 use crate::node::Node;
 use crate::reader::Section;
 use crate::tdma::Tdma;
@@ -90,7 +90,7 @@ impl Network {
     /// others are empty. The highest four bits of the priority count, as in RTnet (seed 002, 4.2); each of its 16 levels takes two of ours,
     /// so that there is room for what routers themselves have to say.
     pub fn level(&self, priority: Priority) -> u8 {
-        if priority.0 < self.bulk_below { LEVEL_NOT_REAL_TIME } else { (15 - (priority.0 >> 4)) * 2 }
+        level(priority, self.bulk_below)
     }
 
     /// What IP and UDP put before each datagram.
@@ -142,6 +142,11 @@ impl Network {
     }
 }
 
+/// The level of a priority, if classes below `bulk_below` are not real time.
+pub(crate) fn level(priority: Priority, bulk_below: u8) -> u8 {
+    if priority.0 < bulk_below { LEVEL_NOT_REAL_TIME } else { (15 - (priority.0 >> 4)) * 2 }
+}
+
 /// Judges what several nodes need beside `[network]`: addresses that can reach each other, and the class of routers.
 pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
     if nodes.len() < 2 {
@@ -169,33 +174,17 @@ pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
 /// The routers of all nodes, which no `[[module]]` describes; their messages name the line of the node.
 pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(Module, Lines)> {
     let Some(class) = classes.id(ROUTER).filter(|_| nodes.len() > 1) else { return Vec::new() };
+    // Without it the node is cut off, so it is never given up: pauses grow, so that so many in a second cannot be. The first is short,
+    // since what peers send meanwhile soon is too old.
+    let restart = Restart {
+        policy: RestartPolicy::Always,
+        backoff: Duration::from_millis(10),
+        at_most: 1000,
+        within: Duration::from_secs(1),
+    };
     let router = |(index, node): (usize, &Node)| {
-        let module = Module {
-            name: Name::new(system, class.0, index as u8, rohrpost_mailbox::local::COMMANDS),
-            faces: Vec::new(),
-            node: node.name.clone(),
-            program: Program::Builtin(ROUTER.into()),
-            optional: false,
-            calls: Vec::new(),
-            although: Vec::new(),
-            settings: toml::Table::new(),
-            start: Start::On,
-            // Without it the node is cut off, so it is never given up: pauses grow, so that so many in a second cannot be. The first is short,
-            // since what peers send meanwhile soon is too old.
-            restart: Restart {
-                policy: RestartPolicy::Always,
-                backoff: Duration::from_millis(10),
-                at_most: 1000,
-                within: Duration::from_secs(1),
-            },
-            ready_within: Duration::from_secs(10),
-            stop_within: Duration::from_secs(2),
-            spin: Duration::ZERO,
-            mailboxes: Mailboxes::default(),
-            line: node.line,
-            index: None,
-        };
-        (module, Lines { mailboxes: lines_at(node.line), calls: Vec::new() })
+        let name = Name::new(system, class.0, index as u8, rohrpost_mailbox::local::COMMANDS);
+        Module::by_itself(name, node, ROUTER, restart)
     };
     nodes.iter().take(NODES_MAX).enumerate().map(router).collect()
 }

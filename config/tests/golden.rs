@@ -40,9 +40,15 @@ fn every_mistake_gets_its_message() {
 
 #[test]
 fn files_that_ship_load_and_explain_themselves() {
-    for file in
-        ["demo.toml", "demo-log.toml", "demo-nodes.toml", "demo-tdma.toml", "tests/tdma.toml", "tests/full.toml"]
-    {
+    for file in [
+        "demo.toml",
+        "demo-log.toml",
+        "demo-nodes.toml",
+        "demo-tdma.toml",
+        "tests/tdma.toml",
+        "tests/tcp.toml",
+        "tests/full.toml",
+    ] {
         let text = fs::read_to_string(folder().join(file)).unwrap();
         let installation = Installation::parse(&text, Path::new(file)).unwrap_or_else(|errors| panic!("{errors}"));
         let page = explain(&installation, None);
@@ -77,9 +83,15 @@ fn programs_that_are_not_here_are_named_for_their_node() {
 #[test]
 fn manual_names_every_key_and_its_example_loads() {
     let manual = fs::read_to_string(folder().join("../docs/src/configuration.md")).unwrap();
-    let full = fs::read_to_string(folder().join("tests/full.toml")).unwrap();
+    let read = |file: &str| fs::read_to_string(folder().join("tests").join(file)).unwrap();
+    let (full, tcp) = (read("full.toml"), read("tcp.toml"));
     let modules = full.split_once("[[module]]").unwrap().1;
-    let keys = modules.lines().filter(|line| !line.starts_with("settings")).filter_map(|line| line.split_once(" = "));
+    let beyond = tcp.split_once("[tcp]").unwrap().1;
+    let keys = modules
+        .lines()
+        .chain(beyond.lines())
+        .filter(|line| !line.starts_with("settings"))
+        .filter_map(|line| line.split_once(" = "));
     for (key, _) in keys {
         assert!(manual.contains(&format!("`{key}`")) || manual.contains(&format!(".{key}]`")), "no word on `{key}`");
     }

@@ -22,6 +22,8 @@ const HEAD_BYTES: usize = 24;
 const RANGE_BYTES: usize = 8;
 
 const FILE: &str = "routes";
+/// Of the same form: for names that the other leads nowhere.
+const BEYOND: &str = "routes.beyond";
 
 /// Why the file cannot be believed; another process wrote it.
 const DAMAGED: &str = "its file `routes` is damaged, or another version's; start the node's router again";
@@ -37,6 +39,22 @@ impl Node {
     /// When there are more than [`ROUTES_MAX`] ranges, or they are not in order and apart: the caller makes them from a
     /// configuration that was checked.
     pub fn set_routes(&self, via: Name, ranges: &[(Name, Name)]) -> Result<(), NodeError> {
+        self.write_routes(FILE, via, ranges)
+    }
+
+    /// The same for names that have no mailbox here and for which [`set_routes`](Self::set_routes) names no range: what is beyond the nodes
+    /// that the router knows.
+    ///
+    /// # Errors
+    /// As there.
+    ///
+    /// # Panics
+    /// As there.
+    pub fn set_routes_beyond(&self, via: Name, ranges: &[(Name, Name)]) -> Result<(), NodeError> {
+        self.write_routes(BEYOND, via, ranges)
+    }
+
+    fn write_routes(&self, file: &str, via: Name, ranges: &[(Name, Name)]) -> Result<(), NodeError> {
         assert!(ranges.len() <= ROUTES_MAX && ranges.iter().all(|(first, last)| first <= last));
         assert!(ranges.windows(2).all(|pair| pair[0].1 < pair[1].0), "ranges are in order, and none overlaps another");
         let mut bytes = Vec::with_capacity(HEAD_BYTES + ranges.len() * RANGE_BYTES);
@@ -49,7 +67,7 @@ impl Node {
             bytes.extend_from_slice(&last.raw().to_ne_bytes());
         }
         // Named after its writer: two that write at once must not write into one.
-        let (path, unfinished) = (self.path().join(FILE), self.path().join(format!("{FILE}.{}", std::process::id())));
+        let (path, unfinished) = (self.path().join(file), self.path().join(format!("{file}.{}", std::process::id())));
         let write = || {
             let _ = fs::remove_file(&unfinished);
             open_shared(&unfinished, true)?.write_all(&bytes)?;
@@ -69,11 +87,12 @@ impl Node {
     /// # Errors
     /// When the file cannot be removed.
     pub fn forget_routes(&self) -> Result<(), NodeError> {
-        let path = self.path().join(FILE);
-        match fs::remove_file(&path) {
-            Ok(()) => self.raise_registry_epoch(),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Err(error) => return Err(NodeError::of(&path, error)),
+        for path in [FILE, BEYOND].map(|file| self.path().join(file)) {
+            match fs::remove_file(&path) {
+                Ok(()) => self.raise_registry_epoch(),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(NodeError::of(&path, error)),
+            }
         }
         Ok(())
     }
@@ -87,8 +106,15 @@ impl Node {
 
 /// The mailbox that packages for a name go to, or what is wrong with the file.
 pub(crate) fn find(node: &Path, name: Name) -> Result<Option<Name>, String> {
+    match find_in(&node.join(FILE), name)? {
+        None => find_in(&node.join(BEYOND), name),
+        found => Ok(found),
+    }
+}
+
+fn find_in(path: &Path, name: Name) -> Result<Option<Name>, String> {
     let mut bytes = Vec::new();
-    match open_to_read(&node.join(FILE)) {
+    match open_to_read(path) {
         Ok(file) => {
             let most = (HEAD_BYTES + ROUTES_MAX * RANGE_BYTES) as u64;
             file.take(most).read_to_end(&mut bytes).map_err(|error| format!("its file `routes`: {error}"))?;
@@ -157,6 +183,18 @@ mod tests {
         node.forget_routes().unwrap();
         node.forget_routes().unwrap();
         assert!(node.route(name).is_none() && !node.path().join(FILE).exists());
+    }
+
+    #[test]
+    fn what_has_no_route_is_looked_for_beyond() {
+        const BEYOND_VIA: Name = Name::new(1, 64, 0, 3);
+        let (near, far) = (Name::new(1, 200, 0, 0), Name::new(2, 200, 0, 0));
+        let (_folder, node) = routes(&[(near, near)]);
+        let all = (Name::new(1, 1, 0, 0), Name::new(255, 255, 255, 255));
+        node.set_routes_beyond(BEYOND_VIA, &[all]).unwrap();
+        assert_eq!((node.route(near), node.route(far)), (Some(VIA), Some(BEYOND_VIA)));
+        node.forget_routes().unwrap();
+        assert_eq!((node.route(near), node.route(far)), (None, None));
     }
 
     #[test]

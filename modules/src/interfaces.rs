@@ -2,11 +2,14 @@
 //! modules.
 
 mod router;
+mod tcp;
 
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkState,
     Links, PeerLink, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
 };
+
+pub use tcp::{BeyondClient, BeyondClients, BeyondLink, BeyondState, ClassPassed, Tcp, TcpInterface, TcpProxy};
 
 use crate::interface;
 use crate::output::OutputLine;

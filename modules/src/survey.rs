@@ -19,7 +19,7 @@ pub use form::Seen;
 pub use usage::Usage;
 
 use postcard_schema::Schema;
-use rohrpost_config::{Installation, ROUTER};
+use rohrpost_config::{Installation, ROUTER, TCP};
 use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
 use rohrpost_mailbox::{
     ClassTraffic, FlowInfo, InspectError, Latency, Loss, MailboxDetail, MailboxInfo, Name, Node, NodeError,
@@ -271,9 +271,9 @@ pub fn node_of(installation: &Installation, name: Name) -> Option<&str> {
 
 /// The same, but of packages in transit only those that were lost there: the others are received once more where they go.
 fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<ClassTraffic> {
-    let router = installation.classes.id(ROUTER);
+    let routers = [ROUTER, TCP].map(|class| installation.classes.id(class));
     let mut mailboxes = mailboxes.to_vec();
-    let is_transit = |name: Name| Some(name.class()) == router && name.local() == local::TRANSIT;
+    let is_transit = |name: Name| routers.contains(&Some(name.class())) && name.local() == local::TRANSIT;
     for class in
         mailboxes.iter_mut().filter(|mailbox| is_transit(mailbox.name)).flat_map(|mailbox| &mut mailbox.classes)
     {

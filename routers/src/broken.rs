@@ -91,6 +91,42 @@ mod variants {
         KeepsParts,
         /// Fragment: as many packages are put together at a time as have begun.
         Unbounded,
+        /// Session: what came of a frame before it was split is forgotten.
+        ForgetsPieces,
+        /// Session: what two clients host is registered for both.
+        TakesTwice,
+        /// Session: a name is looked up in any range that it lies in.
+        TakesAnyRange,
+        /// Session: what was made ready for a connection that broke goes by the next one.
+        SendsCutAgain,
+        /// Session: what was under way too long is delivered.
+        DeliversOld,
+        /// Session: half of the way is no part of a time's bound.
+        TrustsTheWay,
+        /// Session: a package that is handed on is no further than before.
+        KeepsHops,
+        /// Session: a client may send in the names of others.
+        TakesForeignNames,
+        /// Session: what a client cannot deliver comes back to it.
+        HandsBack,
+        /// Session: who reaches its own system gets what it sends to all back.
+        ToOwnTwice,
+        /// Session: a client that has gone still hosts its names.
+        KeepsNames,
+        /// Session: what waited for a client that has gone is not counted.
+        ForgetsGone,
+        /// Session: who does not say hello is waited for.
+        GreetsForEver,
+        /// Session: who says nothing is waited for.
+        WaitsForSilent,
+        /// Session: another digest of what must be equal everywhere is taken.
+        TakesOtherCommon,
+        /// Session: another digest of what must be equal inside a system is taken.
+        TakesOtherSystems,
+        /// Session: a client that was connected again does not say what it hosts.
+        RegistersOnce,
+        /// Session: a client tries again at once, however often it fails.
+        NeverBacksOff,
         /// Time slots: a wake-up that comes too late is none too late.
         NoLateGate,
         /// Time slots: a node sends however far off its clock may be.
@@ -137,6 +173,28 @@ mod variants {
             Self::CountsPartsTwice,
             Self::KeepsParts,
             Self::Unbounded,
+        ];
+
+        /// All mistakes of sessions.
+        pub const SESSION: [Self; 18] = [
+            Self::ForgetsPieces,
+            Self::TakesTwice,
+            Self::TakesAnyRange,
+            Self::SendsCutAgain,
+            Self::DeliversOld,
+            Self::TrustsTheWay,
+            Self::KeepsHops,
+            Self::TakesForeignNames,
+            Self::HandsBack,
+            Self::ToOwnTwice,
+            Self::KeepsNames,
+            Self::ForgetsGone,
+            Self::GreetsForEver,
+            Self::WaitsForSilent,
+            Self::TakesOtherCommon,
+            Self::TakesOtherSystems,
+            Self::RegistersOnce,
+            Self::NeverBacksOff,
         ];
 
         /// All mistakes of what leaves in a slot. Where packages leave as they come they do not show.

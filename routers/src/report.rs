@@ -2,7 +2,7 @@
 
 use crate::frame::{NodeIndex, Reason};
 use crate::stats::Cause;
-use rohrpost_mailbox::Head;
+use rohrpost_mailbox::{Head, SendError};
 use std::net::IpAddr;
 
 /// How much of a lost package's body is there to be read: enough for what a call begins with.
@@ -39,6 +39,18 @@ pub enum NotDelivered {
     /// Its slots are smaller.
     #[error("larger than the mailbox's slots")]
     TooLarge,
+}
+
+impl From<SendError> for NotDelivered {
+    fn from(error: SendError) -> Self {
+        match error {
+            SendError::Full(_) | SendError::InUse(_) => Self::MailboxFull,
+            SendError::TooLarge { .. } => Self::TooLarge,
+            SendError::NoMailbox(_) | SendError::NoRouter { .. } | SendError::Reclaimed(_) | SendError::Bad(..) => {
+                Self::NoMailbox
+            }
+        }
+    }
 }
 
 /// What happens between routers.

@@ -8,9 +8,9 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
     ("One of its modules", &["restart", "stop", "start"]),
     ("To measure", &["hz", "bw", "delay", "mailbox", "graph", "ping", "send"]),
-    ("Several nodes", &["net", "time"]),
+    ("Several nodes", &["net", "time", "certificates"]),
     ("This computer", &["doctor", "bench", "clean", "completions", "version"]),
-    ("Else", &["run", "router", "help"]),
+    ("Else", &["run", "router", "tcp-router", "tcp-client", "help"]),
 ];
 
 /// The command line, with its subcommands in groups.

@@ -3,6 +3,7 @@
 mod bench;
 mod bw;
 mod call;
+mod certificates;
 mod check;
 mod clean;
 mod completions;
@@ -36,6 +37,7 @@ mod status;
 mod summary;
 mod table;
 mod target;
+mod tcp;
 mod time;
 mod top;
 mod units;
@@ -113,12 +115,18 @@ enum Command {
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
+    /// Make the certificates by which the TCP router and its clients know each other.
+    Certificates(certificates::Arguments),
     /// Print versions, of this program and of what nodes share.
     Version(version::Arguments),
     /// Run a built-in module by hand.
     Run(run::Arguments),
     /// Carry packages between this node and the others.
     Router(router::Arguments),
+    /// Carry packages beyond the LAN: the server.
+    TcpRouter(tcp::Arguments),
+    /// Carry packages between this node and the TCP router.
+    TcpClient(tcp::Arguments),
 }
 
 /// Runs the command that was typed.
@@ -153,9 +161,12 @@ pub(crate) fn main() -> ExitCode {
         Command::Bench(arguments) => bench::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
+        Command::Certificates(arguments) => certificates::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Router(arguments) => router::run(arguments),
+        Command::TcpRouter(arguments) => tcp::serve(arguments),
+        Command::TcpClient(arguments) => tcp::join(arguments),
     };
     result.unwrap_or_else(|error| {
         // Who would read it may be gone, too.

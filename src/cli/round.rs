@@ -3,7 +3,9 @@
 use super::Failure;
 use super::target::{Running, Target};
 use super::units::{Stop, seconds};
+use rohrpost::Name;
 use rohrpost::common::GET_DATA;
+use rohrpost::config::Installation;
 use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::{CallError, Fault, ToolLink};
@@ -37,10 +39,10 @@ pub(super) struct Round {
 }
 
 impl Rounds {
-    /// Finds the installation; of one without routers, `alone` says what to look at instead.
-    pub(super) fn begin(&self, alone: &str) -> Result<Round, Failure> {
+    /// Finds the installation; of one that has nobody to ask, `alone` says what to look at instead.
+    pub(super) fn begin(&self, alone: &str, has: impl Fn(&Installation) -> bool) -> Result<Round, Failure> {
         let running = self.target.find()?;
-        if running.installation.network.is_none() {
+        if !has(&running.installation) {
             return Err(alone.into());
         }
         let (interval, stop) = (seconds(self.interval)?, Stop::new()?);
@@ -58,11 +60,20 @@ impl Round {
     /// The newest value that a node's router has published and of when it is, or why there is none.
     pub(super) fn newest<T: DeserializeOwned>(&mut self, node: &str, port: DataPort<T>) -> Result<(u64, T), String> {
         let router = self.running.installation.router_of(node).ok_or("it has no router")?;
+        self.newest_of(router, port)
+    }
+
+    /// The same of any module.
+    pub(super) fn newest_of<T: DeserializeOwned>(
+        &mut self,
+        module: Name,
+        port: DataPort<T>,
+    ) -> Result<(u64, T), String> {
         let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let newest = self.tool.call(router, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
+        let newest = self.tool.call(module, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
         newest.map_err(|error| match error {
             CallError::Fault(_, Fault::NothingYet) => "it has just begun; ask again".into(),
-            error => self.running.told(router, &error).to_string(),
+            error => self.running.told(module, &error).to_string(),
         })
     }
 

@@ -136,7 +136,12 @@ impl Running {
 
     /// Whether it is on the node that the tool takes part on.
     pub(super) fn is_own(&self, module: Name) -> bool {
-        self.node_of(module) == self.node_name
+        self.node_of(module) == self.node_name && !self.is_beyond(module)
+    }
+
+    /// Whether it is of another system, and so nowhere but at the TCP router: this configuration knows nothing of it.
+    pub(super) fn is_beyond(&self, module: Name) -> bool {
+        self.installation.tcp.is_some() && module.system() != self.installation.system.id
     }
 
     /// The module or face that a user names, or a program run by hand: one of the configuration, or with mailboxes here.
@@ -144,7 +149,7 @@ impl Running {
         let classes = &self.installation.classes;
         let module = classes.parse_name(text)?.module();
         let known = self.installation.module(module).is_some() || module.class() == classes.tool();
-        if known || self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module) {
+        if known || self.is_beyond(module) || self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module) {
             return Ok(module);
         }
         let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
@@ -166,6 +171,9 @@ impl Running {
             }
             Some(_) => {
                 format!("{name} does not run, and no launch watches over it; start it as you started the others")
+            }
+            None if self.is_beyond(module) => {
+                format!("{name} does not run; start it in system {}, where it belongs", module.system())
             }
             None => format!(
                 "{name} does not run, and the configuration has no such module; `rohrpost list` shows what runs"

@@ -42,7 +42,8 @@ struct Nodes {
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let mut round = rounds.begin("this installation has one node, whose time is its own; `rohrpost top` shows it")?;
+    let alone = "this installation has one node, whose time is its own; `rohrpost top` shows it";
+    let mut round = rounds.begin(alone, |installation| installation.network.is_some())?;
     let clock = SystemClock::open(&round.running.node);
     let agree = loop {
         let told = round.nodes().into_iter().map(|node| ask(&mut round, &clock, node)).collect();

@@ -283,7 +283,7 @@ impl Robot {
         }
         // Launch takes the first place of a tool. Until it has heard from each module, a stop is a start that failed.
         let tools = self.installation.node(&self.node_name).unwrap().tools.clone();
-        let replies = Name::new(1, 16, *tools.start(), local::REPLIES);
+        let replies = Name::new(self.installation.system.id, 16, *tools.start(), local::REPLIES);
         wait("launch has heard from all", || {
             let heard = self.node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
             (heard >= on).then_some(())

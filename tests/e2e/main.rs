@@ -8,6 +8,7 @@
 
 mod all_nodes;
 mod bench;
+mod beyond;
 mod boot;
 mod check;
 mod completions;

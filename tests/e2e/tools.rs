@@ -29,8 +29,8 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run" => {
             return None;
         }
-        // Of several nodes, see `lan`.
-        "net" | "time" | "router" => return None,
+        // Of several nodes, see `lan`; of several systems, see `beyond`.
+        "net" | "time" | "router" | "certificates" | "tcp-router" | "tcp-client" => return None,
         other => panic!("`{other}` is new: say here how it is tested"),
     };
     Some([&[command], after].concat())

@@ -11,10 +11,10 @@ pub use check::{check, check_saved};
 
 use crate::description::Description;
 use crate::interface::{Interface, Interfaces};
-use crate::interfaces::RouterInterface;
+use crate::interfaces::{RouterInterface, TcpInterface};
 use crate::module::Module;
 use crate::runtime::{Start, StartError, run_started};
-use rohrpost_config::{Installation, Module as Configured, Problem, ROUTER, SettingsError};
+use rohrpost_config::{Installation, Module as Configured, Problem, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER};
 
 /// What can be done with a built-in module.
 struct Builtin {
@@ -53,9 +53,14 @@ pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
 
 /// What a built-in module offers under the name of a class, its own or a face's; none if it knows no such class.
 pub fn description(builtin: &str, class: &str) -> Option<Description> {
-    if builtin == ROUTER {
-        // Its program is not here: this crate knows no network.
-        return Some(RouterInterface::description()).filter(|description| description.class == class);
+    // The programs of these are not here: this crate knows no network.
+    let beyond_here = match builtin {
+        ROUTER => Some(RouterInterface::description()),
+        TCP_CLIENT | TCP_ROUTER => Some(TcpInterface::description()),
+        _ => None,
+    };
+    if beyond_here.is_some() {
+        return beyond_here.filter(|description| description.class == class);
     }
     let all = (Builtin::find(builtin)?.descriptions)();
     all.into_iter().find(|description| description.class == class)

@@ -34,6 +34,8 @@ pub struct Waiting {
     pub sender: u16,
     /// Its level; 0 goes first.
     pub level: u8,
+    /// How often it was handed on, where that counts.
+    pub hops: u8,
     /// If parts of it have left: the sequence of the first.
     pub first: u64,
     /// How many parts have left.

@@ -92,16 +92,10 @@ impl Deliver for Desk {
             self.ages.note(head, body);
             return Ok(());
         };
-        Err(match error {
-            SendError::Full(_) | SendError::InUse(_) => NotDelivered::MailboxFull,
-            SendError::TooLarge { max, .. } => {
-                self.takes_bytes = Some(max);
-                NotDelivered::TooLarge
-            }
-            SendError::NoMailbox(_) | SendError::NoRouter { .. } | SendError::Reclaimed(_) | SendError::Bad(..) => {
-                NotDelivered::NoMailbox
-            }
-        })
+        if let SendError::TooLarge { max, .. } = error {
+            self.takes_bytes = Some(max);
+        }
+        Err(error.into())
     }
 
     fn event(&mut self, event: Event) {

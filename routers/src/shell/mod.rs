@@ -26,9 +26,9 @@ mod news;
 pub mod slots;
 mod socket;
 mod threads;
-mod transit;
+pub(crate) mod transit;
 pub mod tunnel;
-mod ways;
+pub(crate) mod ways;
 
 pub use ages::Ages;
 pub use answers::{Faults, Undelivered};

@@ -16,12 +16,12 @@ pub(super) fn ranges(routes: &[Route]) -> Vec<(Name, Name)> {
 }
 
 /// The mailbox of a router, by the router's name.
-pub(super) fn name(router: Name) -> Name {
+pub(crate) fn name(router: Name) -> Name {
     router.with_local(local::TRANSIT)
 }
 
 /// What that mailbox is made as: the same in each life of the router, so that what waits there outlives it.
-pub(super) fn shape() -> Shape {
+pub(crate) fn shape() -> Shape {
     Shape {
         slots: TRANSIT.slots,
         body_bytes_max: TRANSIT.size.min(u16::MAX.into()) as u16,

@@ -10,7 +10,7 @@ const ABSENT_MAX: usize = 64;
 
 /// Where packages may go.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Reach {
+pub(crate) enum Reach {
     /// To mailboxes of this node: what came from other nodes must not go back.
     Here,
     /// Also through this node's own router.
@@ -24,7 +24,7 @@ struct Way {
 }
 
 /// Ways to mailboxes.
-pub(super) struct Ways {
+pub(crate) struct Ways {
     participant: Arc<Participant>,
     reach: Reach,
     /// By name.
@@ -37,13 +37,13 @@ pub(super) struct Ways {
 }
 
 impl Ways {
-    pub(super) fn new(participant: &Arc<Participant>, reach: Reach) -> Self {
+    pub(crate) fn new(participant: &Arc<Participant>, reach: Reach) -> Self {
         let (ways, absent) = (Vec::with_capacity(WAYS_MAX), Vec::with_capacity(ABSENT_MAX));
         Self { participant: participant.clone(), reach, ways, packages: 0, absent, epoch: 0 }
     }
 
     /// Sends a package on, as it is, to the mailbox that its head names.
-    pub(super) fn send(&mut self, head: &Head, body: &[u8]) -> Result<(), SendError> {
+    pub(crate) fn send(&mut self, head: &Head, body: &[u8]) -> Result<(), SendError> {
         let Head { to, from, kind, id, priority, options, .. } = *head;
         let at = match self.ways.binary_search_by_key(&to, |way| way.to) {
             Ok(at) => at,

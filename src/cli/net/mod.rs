@@ -1,10 +1,13 @@
 //! `rohrpost net`: how the routers of all nodes are: who hears whom, what waits, what was lost and why, and whose time is how good.
 
+mod beyond;
 mod show;
 
 use super::round::{Round, Rounds};
 use super::{Failure, say};
-use rohrpost::interfaces::{ClockState, FlowStates, Links, RouterInterface, SlotState};
+use rohrpost::interfaces::{
+    BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, Links, RouterInterface, SlotState, TcpInterface,
+};
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -28,7 +31,7 @@ pub(super) struct Arguments {
 }
 
 /// What a node's router says.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 struct Told {
     node: String,
     /// When it said so, system time.
@@ -37,6 +40,12 @@ struct Told {
     clock: Option<ClockState>,
     slots: Option<SlotState>,
     flows: Option<FlowStates>,
+    /// How its client stands with the TCP router.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beyond: Option<BeyondLink>,
+    /// What the TCP router says, if it runs there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clients: Option<BeyondClients>,
     /// Bytes and packages a second, by peer; empty at the first look.
     rates: Vec<Rates>,
     /// Why there is nothing.
@@ -54,8 +63,8 @@ struct Rates {
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let mut round =
-        rounds.begin("this installation has one node, and so no routers; `rohrpost list` shows what runs")?;
+    let alone = "this installation has one node, and so no routers; `rohrpost list` shows what runs";
+    let mut round = rounds.begin(alone, |installation| installation.network.is_some() || installation.tcp.is_some())?;
     let mut before = look(&mut round);
     let mut wait = LOOK_AGAIN;
     let mut stopped = round.stop.within(wait);
@@ -84,6 +93,26 @@ fn look(round: &mut Round) -> Vec<Told> {
 }
 
 fn ask(round: &mut Round, node: String) -> Told {
+    let mut told = if round.running.installation.network.is_some() {
+        ask_router(round, node)
+    } else {
+        Told { node, ..Told::default() }
+    };
+    let installation = &round.running.installation;
+    let client = installation.tcp_client_of(&told.node);
+    let server = installation.tcp_router().filter(|router| installation.node_of(*router) == Some(&told.node));
+    if let Some(client) = client {
+        match round.newest_of(client, TcpInterface::LINK) {
+            Ok((_, link)) => told.beyond = Some(link),
+            Err(failure) => told.failure = told.failure.or(Some(failure)),
+        }
+    }
+    told.clients =
+        server.and_then(|server| round.newest_of(server, TcpInterface::CLIENTS).ok()).map(|(_, clients)| clients);
+    told
+}
+
+fn ask_router(round: &mut Round, node: String) -> Told {
     let links = round.newest(&node, RouterInterface::LINKS);
     // A router that has no clock publishes none, and none slots that has none.
     let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
@@ -97,7 +126,7 @@ fn ask(round: &mut Round, node: String) -> Told {
     };
     let (clock, slots) = (clock.map(|(_, clock)| clock), slots.map(|(_, slots)| slots));
     let flows = flows.map(|(_, flows)| flows);
-    Told { node, time_ns, links, clock, slots, flows, rates: Vec::new(), failure }
+    Told { node, time_ns, links, clock, slots, flows, failure, ..Told::default() }
 }
 
 /// What went by between two looks; nothing if the router was started anew in between, or has not told anything new.
@@ -119,9 +148,12 @@ fn rates(before: &Told, now: &Told) -> Vec<Rates> {
 }
 
 impl Told {
-    /// Whether its router answers, and all its peers are there.
+    /// Whether what it has of routers answers, all its peers are there, and so is the TCP router.
     fn is_well(&self) -> bool {
         use rohrpost::interfaces::LinkState;
-        self.links.as_ref().is_some_and(|links| links.peers.iter().all(|peer| peer.state == LinkState::Alive))
+        let all_alive = |links: &Links| links.peers.iter().all(|peer| peer.state == LinkState::Alive);
+        self.failure.is_none()
+            && self.links.as_ref().is_none_or(all_alive)
+            && self.beyond.as_ref().is_none_or(|link| link.state == BeyondState::Up)
     }
 }

@@ -1,6 +1,6 @@
 //! `rohrpost net`, for people.
 
-use super::Told;
+use super::{Told, beyond};
 use crate::cli::flows;
 use crate::cli::slots::kept;
 use crate::cli::table::{table, time};
@@ -27,6 +27,7 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
     let slots = all.iter().filter_map(|told| told.slots.as_ref());
     parts.extend([strangers(all), failures(all), waiting(all), losses(running, all), clocks(all), kept(slots)]);
     parts.push(measured(running, all));
+    parts.extend(beyond::text(running, all));
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
 }

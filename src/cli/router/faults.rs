@@ -9,13 +9,13 @@ use rohrpost_routers::stats::Cause;
 const _: () = assert!(BEGINNING_BYTES >= CallEnvelope::BYTES, "the answer needs the command's envelope");
 
 /// Writes them as modules write theirs.
-pub(super) struct Encoded {
+pub(in crate::cli) struct Encoded {
     /// Of this node's configuration.
     digest: u64,
 }
 
 impl Encoded {
-    pub(super) fn new(digest: u64) -> Self {
+    pub(in crate::cli) fn new(digest: u64) -> Self {
         Self { digest }
     }
 

@@ -1,7 +1,7 @@
 //! `rohrpost router`: carries packages between this node and the others of its system. Launch starts one on each node.
 
 mod clock;
-mod faults;
+pub(super) mod faults;
 mod flows;
 mod links;
 mod slots;

@@ -1,0 +1,242 @@
+//! The TCP router, section `[tcp]`: what neither a node nor its LAN can deliver goes through one server (seed 002, 3.2).
+//!
+//! With the section each node has a client of the server, a module that no `[[module]]` describes: `tcp.0` on the first node of the file,
+//! `tcp.1` on the second, and so on. The server itself, `tcp.255`, runs on the node that `server` names; if none does, another installation
+//! runs it.
+
+use crate::classes::{ClassTable, TCP};
+use crate::installation::Installation;
+use crate::module::{Lines, Module, Restart, RestartPolicy};
+use crate::network::{NODES_MAX, level};
+use crate::node::Node;
+use crate::reader::Section;
+use crate::scheduling::{Scheduling, SchedulingRule};
+use crate::tdma::Tdma;
+use rohrpost_mailbox::{Name, Priority, local};
+use std::net::{IpAddr, SocketAddr};
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The built-in module that is a node's client.
+pub const TCP_CLIENT: &str = "tcp-client";
+/// The built-in module that is the server.
+pub const TCP_ROUTER: &str = "tcp-router";
+
+const PORT: u16 = 21_119;
+const CLIENTS: i64 = 256;
+const CLIENTS_MAX: i64 = 4096;
+const QUOTA: u64 = 1 << 20;
+/// Two largest packages, so that the second does not push the first out.
+const QUOTAS: RangeInclusive<u64> = 128 << 10..=64 << 20;
+const BULK_BELOW: u8 = 16;
+/// Networks of computers beside each other are mostly no smaller.
+const LAN_BITS_V4: u32 = 24;
+const LAN_BITS_V6: u32 = 64;
+/// Above the clients of the nodes, of which there are at most 64.
+const SERVER_INSTANCE: u8 = u8::MAX;
+
+/// Where the TCP router is, and what it grants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tcp {
+    /// Where clients reach it.
+    pub address: SocketAddr,
+    /// The folder of certificates, from that of the file on; none: nothing is sealed.
+    pub certificates: Option<PathBuf>,
+    /// The node of this system that it runs on; none: another installation runs it.
+    pub server: Option<String>,
+    /// Clients that may take part at a time.
+    pub clients: u16,
+    /// Bytes of packages that wait for one connection.
+    pub quota_bytes: usize,
+    /// Classes below this id are not real time.
+    pub bulk_below: u8,
+}
+
+impl Tcp {
+    /// What `check` says of it, and each start of a client or the server.
+    pub const UNPROTECTED: &str = "security = \"none\": packages to and from the TCP router are neither sealed nor signed, and whoever reaches its port may take part; use a \
+         network that nobody else reaches";
+
+    /// In which queue of a connection a package waits, as in the routers of the LAN: 0 goes first.
+    pub fn level(&self, priority: Priority) -> u8 {
+        level(priority, self.bulk_below)
+    }
+
+    /// `tdma` are the time slots in which the nodes of the LAN send, if they do.
+    pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) -> Self {
+        let security = section.required("security", "security = \"tls\"");
+        let is_sealed = security.and_then(|item| item.choice(&[("none", false), ("tls", true)]));
+        let certificates = certificates(&section, is_sealed);
+        let address = section.required("address", "address = \"192.168.0.1\"").and_then(|item| {
+            let text = item.text("192.168.0.1")?;
+            let address = text.parse::<IpAddr>().ok().filter(|address| !address.is_unspecified() && !address.is_multicast());
+            if address.is_none() {
+                item.report(format!(
+                    "`address` \"{text}\" is not the IP address of one computer; write numbers, such as `address = \"192.168.0.1\"`: a robot \
+                     must not wait for a name server"
+                ));
+            }
+            if let Some((address, tdma)) = address.zip(tdma).filter(|(address, _)| is_on_lan(*address, nodes)) {
+                item.report(format!("`address` {address} {}", beside_slots(tdma)));
+            }
+            address
+        });
+        let port = section.get("port").and_then(|item| item.whole(1024..=65_535, PORT.into()));
+        let port = port.map_or(PORT, |port| port as u16);
+        let server = section.get("server").and_then(|item| {
+            let name = item.text("base")?;
+            let known: Vec<String> = nodes.iter().map(|node| format!("`{}`", node.name)).collect();
+            if !nodes.iter().any(|node| node.name == name) {
+                item.report(format!(
+                    "`server` is \"{name}\", and there is no such node; write one of {}, or drop `server` if another installation runs \
+                     the TCP router",
+                    known.join(", ")
+                ));
+            }
+            Some(name.to_owned())
+        });
+        let clients = section.get("clients").and_then(|item| item.whole(1..=CLIENTS_MAX, CLIENTS)).unwrap_or(CLIENTS);
+        let quota = section.get("quota").and_then(|item| item.size(QUOTAS, "1 MiB"));
+        let bulk = section.get("bulk-below").and_then(|item| item.whole(0..=255, BULK_BELOW.into()));
+        section.finish();
+        let address = SocketAddr::new(address.unwrap_or(IpAddr::from([127, 0, 0, 1])), port);
+        Self {
+            address,
+            certificates,
+            server,
+            clients: clients as u16,
+            quota_bytes: quota.unwrap_or(QUOTA) as usize,
+            bulk_below: bulk.map_or(BULK_BELOW, |bulk| bulk as u8),
+        }
+    }
+}
+
+/// The folder of certificates: there exactly when sessions are sealed.
+fn certificates(section: &Section<'_>, is_sealed: Option<bool>) -> Option<PathBuf> {
+    const EXAMPLE: &str = "certificates = \"certificates\"";
+    match (section.get("certificates"), is_sealed?) {
+        (Some(item), true) => item.text("certificates").map(PathBuf::from),
+        (None, true) => {
+            section.report(format!(
+                "`certificates` is missing; write for example `{EXAMPLE}`, the folder that `rohrpost certificates` fills"
+            ));
+            None
+        }
+        (Some(item), false) => {
+            item.report(
+                "`certificates` are of no use with `security = \"none\"`; write `security = \"tls\"`, or drop this",
+            );
+            None
+        }
+        (None, false) => None,
+    }
+}
+
+/// Whether an address lies among those of the nodes: in the smallest network that holds all of these, and is no larger than usual ones.
+fn is_on_lan(address: IpAddr, nodes: &[Node]) -> bool {
+    let bits = |address: IpAddr| match address {
+        IpAddr::V4(v4) => (u128::from(v4.to_bits()) << 96, LAN_BITS_V4),
+        IpAddr::V6(v6) => (v6.to_bits(), LAN_BITS_V6),
+    };
+    let same_kind = nodes.iter().filter_map(|node| node.address).filter(|node| node.is_ipv4() == address.is_ipv4());
+    let all: Vec<u128> = same_kind.map(|node| bits(node).0).collect();
+    let Some(first) = all.first() else { return false };
+    let (own, longest) = bits(address);
+    let shared = all.iter().map(|other| (first ^ other).leading_zeros()).min().unwrap_or(0);
+    (first ^ own).leading_zeros() >= shared.min(longest)
+}
+
+/// What is wrong with an address on a network with time slots, and what would be right.
+fn beside_slots(tdma: &Tdma) -> String {
+    let right = match &tdma.tunnel {
+        Some(tunnel) => format!(
+            "write that of the TCP router's node in the tunnel of [tdma], {} for the first node of the file, or one on another network",
+            tunnel.address(0)
+        ),
+        None => "give [tdma] a `tunnel` and write an address in it, or one on another network".into(),
+    };
+    format!("is on the network of the time slots, and what goes there outside of slots disturbs them; {right}")
+}
+
+/// Judges what `[tcp]` needs beside it: its class, which must not be real time, so that it never stands in the way of what is.
+pub(crate) fn judge(file: &Section<'_>, classes: &ClassTable, scheduling: SchedulingRule) {
+    let line = file.get("classes").map_or(file.line, |classes| classes.line);
+    match classes.id(TCP) {
+        None => file.reader.report(
+            line,
+            "[classes]: class `tcp` is missing, and with [tcp] each node has a client of the TCP router; \
+             add `tcp = { id = 64, text = \"Carries packages beyond the LAN\" }`",
+        ),
+        Some(class) if matches!(scheduling.of(class), Scheduling::Fifo { .. }) => file.reader.report(
+            line,
+            format!(
+                "[classes]: class `tcp` has id {}, which is real time, and what goes beyond the LAN must not keep the LAN waiting; \
+                 give it an id below {}",
+                class.0, scheduling.real_time_from
+            ),
+        ),
+        Some(_) => {}
+    }
+}
+
+/// The clients of all nodes and the server, which no `[[module]]` describes; their messages name the line of the node.
+pub(crate) fn modules(tcp: Option<&Tcp>, nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(Module, Lines)> {
+    let (Some(tcp), Some(class)) = (tcp, classes.id(TCP)) else { return Vec::new() };
+    let name = |instance| Name::new(system, class.0, instance, local::COMMANDS);
+    // As routers, never given up: without it the node is cut off from what is beyond its LAN.
+    let restart = Restart {
+        policy: RestartPolicy::Always,
+        backoff: Duration::from_millis(50),
+        at_most: 1000,
+        within: Duration::from_secs(1),
+    };
+    let server = nodes.iter().filter(|node| tcp.server.as_ref() == Some(&node.name));
+    let server = server.map(|node| Module::by_itself(name(SERVER_INSTANCE), node, TCP_ROUTER, restart));
+    let clients = nodes
+        .iter()
+        .take(NODES_MAX)
+        .zip(0..)
+        .map(|(node, index)| Module::by_itself(name(index), node, TCP_CLIENT, restart));
+    server.chain(clients).collect()
+}
+
+impl Installation {
+    /// The client of the TCP router on a node; none without `[tcp]`.
+    pub fn tcp_client_of(&self, node: &str) -> Option<Name> {
+        let class = self.classes.id(TCP).filter(|_| self.tcp.is_some())?;
+        self.node_index(node).map(|index| Name::new(self.system.id, class.0, index, local::COMMANDS))
+    }
+
+    /// The TCP router, if it runs on a node of this system.
+    pub fn tcp_router(&self) -> Option<Name> {
+        let class = self.classes.id(TCP).filter(|_| self.tcp.as_ref().is_some_and(|tcp| tcp.server.is_some()))?;
+        Some(Name::new(self.system.id, class.0, SERVER_INSTANCE, local::COMMANDS))
+    }
+
+    /// The names that a node hosts, each range with all mailboxes in it: its modules, their faces, and its tools. Sorted; none overlaps
+    /// another.
+    pub fn names_on(&self, node: &str) -> Vec<(Name, Name)> {
+        let tool = |instance: u8| Name::new(self.system.id, self.classes.tool().0, instance, 0);
+        let tools = self.node(node).map(|node| (tool(*node.tools.start()), tool(*node.tools.end())));
+        let modules = self.modules_on(node).flat_map(Module::names).map(|name| (name, name));
+        let whole = |(first, last): (Name, Name)| (first.with_local(0), last.with_local(u8::MAX));
+        let mut ranges: Vec<_> = modules.chain(tools).map(whole).collect();
+        ranges.sort_unstable();
+        ranges.dedup();
+        ranges
+    }
+
+    /// The names for which packages go to the TCP router if neither this node nor its LAN has them: all but those that the node hosts itself.
+    pub fn names_beyond(&self, node: &str) -> Vec<(Name, Name)> {
+        let (mut from, mut beyond) = (Name::new(1, 1, 0, 0).raw(), Vec::new());
+        for (first, last) in self.names_on(node) {
+            if from < first.raw() {
+                beyond.push((Name::from_raw(from), Name::from_raw(first.raw() - 1)));
+            }
+            from = last.raw().saturating_add(1);
+        }
+        beyond.push((Name::from_raw(from), Name::from_raw(u32::MAX)));
+        beyond
+    }
+}

@@ -1,0 +1,121 @@
+//! What comes from the server.
+
+use super::{Client, Event, Host, Package, REGISTER_AGAIN_NS, Registration, State, Told};
+use crate::broken::broken;
+use crate::session::counts::Cause;
+use crate::session::frame::{BadFrame, Carried, LENGTH_MAX, Message, Reason, Refusal, VERSION, Verdict, Welcome};
+use crate::session::reckoning::Reckoning;
+use crate::session::{AGE_MAX_NS, answer_to};
+
+impl Client {
+    /// Takes bytes of the server's stream, split anywhere.
+    pub fn received(&mut self, now_ns: u64, mut bytes: &[u8], host: &mut impl Host) {
+        self.heard_ns = now_ns;
+        let mut splitter = std::mem::take(&mut self.splitter);
+        while matches!(self.state, State::Greeting { .. } | State::Member) {
+            let message = match splitter.next(now_ns, LENGTH_MAX, &mut bytes) {
+                Ok(None) => break,
+                Ok(Some((head, rest))) => Message::parse(head, rest),
+                Err(bad) => Err(bad),
+            };
+            match message {
+                Ok(message) => self.handle(now_ns, &message, host),
+                Err(bad) => self.damaged(now_ns, bad, host),
+            }
+        }
+        self.splitter = splitter;
+    }
+
+    fn handle(&mut self, now_ns: u64, message: &Message<'_>, host: &mut impl Host) {
+        match (self.state, message) {
+            (_, Message::Refusal(refusal)) => self.refused(now_ns, refusal, host),
+            (State::Greeting { .. }, Message::Welcome(welcome)) => self.welcomed(now_ns, welcome, host),
+            (State::Member, Message::Registered(verdict)) => self.registered(now_ns, verdict, host),
+            (State::Member, Message::Package(carried)) => self.take(now_ns, carried, host),
+            (State::Member, Message::Answer(answer)) => {
+                self.reckoning.heard(now_ns, answer);
+            }
+            _ => self.damaged(now_ns, BadFrame::Damaged("a frame that is not for now"), host),
+        }
+    }
+
+    fn welcomed(&mut self, now_ns: u64, welcome: &Welcome, host: &mut impl Host) {
+        let (yours, ours) = (self.settings.common, welcome.common);
+        if yours != ours && !broken!(TakesOtherCommon) {
+            let text = "the TCP router";
+            let refusal = Refusal { version: VERSION, reason: Reason::Common, yours, ours, text };
+            return self.refused(now_ns, &refusal, host);
+        }
+        if welcome.life != self.server_life {
+            self.server_life = welcome.life;
+            self.reckoning = Reckoning::default();
+        }
+        self.reckoning.heard(now_ns, &welcome.time);
+        self.state = State::Member;
+        (self.joined_ns, self.asks, self.ask_ns) = (Some(now_ns), 0, now_ns);
+    }
+
+    fn registered(&mut self, now_ns: u64, verdict: &Verdict<'_>, host: &mut impl Host) {
+        if verdict.number != self.number || self.registration != Registration::Asked {
+            return;
+        }
+        if verdict.objection.is_none() {
+            self.registration = Registration::Holds;
+            self.told = Some(Told::Up);
+            return host.event(Event::Up);
+        }
+        self.registration = Registration::Due(now_ns + REGISTER_AGAIN_NS);
+        if self.told != Some(Told::Objected) {
+            self.told = Some(Told::Objected);
+            host.event(Event::Objected(verdict));
+        }
+    }
+
+    fn take(&mut self, now_ns: u64, carried: &Carried<'_>, host: &mut impl Host) {
+        self.inn.came(carried.head.priority);
+        let Some(session) = self.session(now_ns) else { return };
+        // As old as it may be at most: a command that came too late must not be run.
+        let oldest_ns = (session.ns + session.error_ns).saturating_sub(carried.published_ns);
+        let shift = i128::from(now_ns) - i128::from(session.ns);
+        let published_ns = u64::try_from(i128::from(carried.published_ns) + shift).unwrap_or(0).min(now_ns);
+        let delivered = if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) {
+            Err(Cause::Stale)
+        } else {
+            host.deliver(&Carried { published_ns, ..*carried }).map_err(Cause::from)
+        };
+        match delivered {
+            Ok(()) => self.inn.passed(carried.head.priority),
+            Err(cause) => {
+                self.inn.lost(carried.head.priority, cause);
+                if let Some((head, body)) = answer_to(&carried.head, carried.body, cause, None, host) {
+                    self.send(now_ns, &Package { head, body: &body, published_ns: now_ns, hops: 0 }, host);
+                }
+            }
+        }
+    }
+
+    fn refused(&mut self, now_ns: u64, refusal: &Refusal<'_>, host: &mut impl Host) {
+        let reason = refusal.reason;
+        if matches!(reason, Reason::Version | Reason::Common | Reason::System | Reason::Certificate) {
+            self.backoff.hopeless();
+        }
+        self.over(now_ns, Told::Refused(reason), Event::Refused(refusal), host);
+    }
+
+    fn damaged(&mut self, now_ns: u64, bad: BadFrame, host: &mut impl Host) {
+        self.over(now_ns, Told::Damaged, Event::Damaged(bad), host);
+    }
+
+    /// The connection is to be closed.
+    fn over(&mut self, now_ns: u64, told: Told, event: Event<'_>, host: &mut impl Host) {
+        if self.told != Some(told) {
+            host.event(event);
+        }
+        if self.is_up() {
+            self.down_ns = now_ns;
+            host.event(Event::Down);
+        }
+        self.told = Some(told);
+        self.state = State::Over;
+    }
+}

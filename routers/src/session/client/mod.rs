@@ -1,0 +1,455 @@
+//! A client: keeps up a connection to the server, registers what it hosts, and carries packages both ways.
+//!
+//! ```text
+//!  away ─ wait is over ─▶ connecting ─ connected ─▶ greeting ─ welcome ─▶ member ─ register ─▶ up
+//!   ▲                         └───── too long ─────────┴─ refusal ─┴─ silence, damage, end of the stream ┘
+//!   └──────────────────────────── waits longer each time ◀─────────────────────────────────────┘
+//! ```
+
+mod backoff;
+mod incoming;
+
+pub use backoff::BACKOFF_MAX_NS;
+
+use super::counts::{Cause, Counts};
+use super::frame::{Carried, Hello, Message, Range, Ranges, Reason, Refusal, Verdict};
+use super::outgoing::{Fates, Outgoing, Parcel, is_stale};
+use super::reckoning::{Bounded, Reckoning};
+use super::splitter::Splitter;
+use super::{ASK_EVERY_NS, Answers, GREETING_MAX_NS, LOOK_EVERY_NS, SILENT_AFTER_NS, STALLED_AFTER_NS, WAIT_MAX_NS};
+use super::{answer_to, without_hurry};
+use crate::broken::broken;
+use crate::report::NotDelivered;
+use backoff::Backoff;
+use rohrpost_mailbox::{Head, TimeRecord};
+
+/// A connection is made within so long, or not at all.
+const CONNECT_MAX_NS: u64 = 5_000_000_000;
+/// A connection that holds for so long is no failure.
+const LASTING_NS: u64 = 5_000_000_000;
+/// The first questions for the time follow each other closer: one of them is quick.
+const FIRST_ASKS: u32 = 5;
+const FIRST_ASK_EVERY_NS: u64 = 100_000_000;
+/// What the server objected to is registered again after so long: who had it may have gone.
+const REGISTER_AGAIN_NS: u64 = 500_000_000;
+/// A look that comes so late says that this client stood still itself.
+const STOOD_STILL_NS: u64 = 4 * LOOK_EVERY_NS;
+
+/// What a client knows before its first connection.
+#[derive(Clone, Debug)]
+pub struct ClientSettings {
+    /// For people.
+    pub name: String,
+    /// First byte of the names that it hosts.
+    pub system: u8,
+    /// What is sent to all systems reaches its own without the server.
+    pub reaches_own: bool,
+    /// Digest of what must be equal everywhere.
+    pub common: u64,
+    /// Digest of what must be equal inside a system.
+    pub system_digest: u64,
+    /// Tells this life from others; not 0. Also what its waits are drawn from.
+    pub life: u64,
+    /// Bytes of packages that wait.
+    pub quota_bytes: usize,
+    /// Level of each priority; 0 goes first.
+    pub levels: [u8; 256],
+}
+
+/// A package that is to go to the server.
+#[derive(Clone, Copy, Debug)]
+pub struct Package<'a> {
+    /// Its head.
+    pub head: Head,
+    /// Its body; as long as the head says.
+    pub body: &'a [u8],
+    /// When its sender published it, ns of the monotonic clock.
+    pub published_ns: u64,
+    /// How often it was handed on before: 0, but for who hands on what came from a server.
+    pub hops: u8,
+}
+
+/// What to do.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Output {
+    /// Connect; then [`Client::connected`] or [`Client::closed`].
+    Connect,
+    /// Write what [`Client::ready`] has, then say how much with [`Client::took`].
+    Write,
+    /// Close the connection, or give up connecting. It counts as closed.
+    Close,
+    /// Nothing before this time, unless something comes.
+    Wait {
+        /// Ns of the monotonic clock.
+        until_ns: u64,
+    },
+}
+
+/// What people want to know of, each once until it changes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Event<'a> {
+    /// The server takes and brings packages.
+    Up,
+    /// It does not any more.
+    Down,
+    /// The server lets it not take part; it goes on trying.
+    Refused(&'a Refusal<'a>),
+    /// It may not host what it says; it goes on trying.
+    Objected(&'a Verdict<'a>),
+    /// What came is nothing of ours.
+    Damaged(super::frame::BadFrame),
+}
+
+/// What a client asks of who runs it.
+pub trait Host: Answers {
+    /// Puts a package that came into its mailbox. Its `published_ns` is by the monotonic clock here, as far as that can be told.
+    ///
+    /// # Errors
+    /// [`NotDelivered`]
+    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered>;
+
+    /// Something happened.
+    fn event(&mut self, event: Event<'_>);
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum State {
+    Away {
+        until_ns: u64,
+    },
+    Connecting {
+        until_ns: u64,
+    },
+    Greeting {
+        until_ns: u64,
+    },
+    Member,
+    /// The connection is to be closed.
+    Over,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Registration {
+    /// It is to be said, at this time.
+    Due(u64),
+    /// It was said.
+    Asked,
+    Holds,
+}
+
+/// A client.
+#[derive(Debug)]
+pub struct Client {
+    settings: ClientSettings,
+    ranges: Vec<Range>,
+    state: State,
+    registration: Registration,
+    number: u32,
+    attempt: u64,
+    backoff: Backoff,
+    splitter: Splitter,
+    outgoing: Outgoing,
+    is_blocked: bool,
+    reckoning: Reckoning,
+    /// Whose clocks that is about.
+    server_life: u64,
+    out: Counts,
+    inn: Counts,
+    /// What people know: the last refusal, or that it is up.
+    told: Option<Told>,
+    /// When it was welcomed, if it was, ns.
+    joined_ns: Option<u64>,
+    /// Since when packages cannot leave, ns.
+    down_ns: u64,
+    heard_ns: u64,
+    moved_ns: u64,
+    ask_ns: u64,
+    asks: u32,
+    look_ns: u64,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Told {
+    Up,
+    Refused(Reason),
+    Objected,
+    Damaged,
+}
+
+impl Client {
+    /// Connects at once. `ranges` are the names that it hosts.
+    pub fn new(settings: ClientSettings, ranges: Vec<Range>, now_ns: u64) -> Self {
+        Self {
+            ranges,
+            state: State::Away { until_ns: now_ns },
+            registration: Registration::Due(0),
+            number: 0,
+            attempt: 0,
+            backoff: Backoff::new(settings.life),
+            splitter: Splitter::default(),
+            outgoing: Outgoing::new(settings.quota_bytes),
+            is_blocked: false,
+            reckoning: Reckoning::default(),
+            server_life: 0,
+            out: Counts::default(),
+            inn: Counts::default(),
+            told: None,
+            joined_ns: None,
+            down_ns: now_ns,
+            heard_ns: now_ns,
+            moved_ns: now_ns,
+            ask_ns: 0,
+            asks: 0,
+            look_ns: 0,
+            settings,
+        }
+    }
+
+    /// It hosts other names from now on.
+    pub fn host(&mut self, now_ns: u64, ranges: Vec<Range>) {
+        self.ranges = ranges;
+        self.registration = Registration::Due(now_ns);
+    }
+
+    /// Whether packages may leave.
+    pub fn is_up(&self) -> bool {
+        self.state == State::Member && self.registration == Registration::Holds
+    }
+
+    /// What went to the server, and what did not.
+    pub fn out(&self) -> &Counts {
+        &self.out
+    }
+
+    /// What came from it.
+    pub fn inn(&self) -> &Counts {
+        &self.inn
+    }
+
+    /// Connections that were made so far.
+    pub fn connections(&self) -> u64 {
+        self.attempt
+    }
+
+    /// Whether there is a connection.
+    pub fn is_connected(&self) -> bool {
+        matches!(self.state, State::Greeting { .. } | State::Member)
+    }
+
+    /// The shortest way there and back of late, ns.
+    pub fn round_trip_ns(&self) -> Option<u64> {
+        self.reckoning.round_trip_ns()
+    }
+
+    /// The server's session clock.
+    pub fn session(&self, now_ns: u64) -> Option<Bounded> {
+        self.reckoning.session(now_ns)
+    }
+
+    /// System time as the server has it, with what the way adds to its bound.
+    pub fn system_time(&self, now_ns: u64) -> Option<TimeRecord> {
+        self.reckoning.system(now_ns)
+    }
+
+    /// Bytes of memory that what waits takes up.
+    pub fn bytes(&self) -> usize {
+        self.outgoing.bytes() + self.splitter.bytes()
+    }
+
+    /// The connection is made.
+    pub fn connected(&mut self, now_ns: u64) {
+        self.attempt += 1;
+        self.state = State::Greeting { until_ns: now_ns + GREETING_MAX_NS };
+        self.splitter = Splitter::default();
+        self.outgoing.cut();
+        (self.heard_ns, self.moved_ns) = (now_ns, now_ns);
+        let ClientSettings { name, system, reaches_own, common, system_digest, life, .. } = &self.settings;
+        self.outgoing.say(&Message::Hello(Hello {
+            system: *system,
+            reaches_own: *reaches_own,
+            common: *common,
+            system_digest: *system_digest,
+            life: *life,
+            attempt: self.attempt,
+            asked_ns: now_ns,
+            name,
+        }));
+    }
+
+    /// The connection is closed or broken, or could not be made.
+    pub fn closed(&mut self, now_ns: u64, host: &mut impl Host) {
+        if self.is_up() {
+            self.down_ns = now_ns;
+            self.told = None;
+            host.event(Event::Down);
+        }
+        if self.joined_ns.take().is_some_and(|joined_ns| now_ns.saturating_sub(joined_ns) > LASTING_NS) {
+            self.backoff.lasted();
+        }
+        self.state = State::Away { until_ns: now_ns + self.backoff.next_ns() };
+        if !broken!(RegistersOnce) {
+            self.registration = Registration::Due(now_ns);
+        }
+        self.is_blocked = false;
+        self.outgoing.cut();
+    }
+
+    /// Bytes to be written.
+    pub fn ready(&self) -> &[u8] {
+        self.outgoing.ready()
+    }
+
+    /// The stream has taken so many of them. If those were not all, nothing more is written until [`Client::writable`].
+    pub fn took(&mut self, now_ns: u64, bytes: usize) {
+        self.outgoing.took(bytes);
+        self.is_blocked = !self.outgoing.ready().is_empty();
+        if bytes > 0 {
+            self.moved_ns = now_ns;
+        }
+    }
+
+    /// The stream takes bytes again.
+    pub fn writable(&mut self) {
+        self.is_blocked = false;
+    }
+
+    /// A package is to go to the server.
+    pub fn send(&mut self, now_ns: u64, package: &Package<'_>, host: &mut impl Host) {
+        let head = without_hurry(&package.head);
+        self.out.came(head.priority);
+        let is_long_down = !self.is_up() && now_ns.saturating_sub(self.down_ns) > WAIT_MAX_NS;
+        let lost = is_long_down.then_some(Cause::Offline);
+        let lost = lost.or_else(|| is_stale(now_ns, package.published_ns).then_some(Cause::Stale));
+        let shift_ns = self.shift_ns(now_ns).filter(|_| !self.is_blocked);
+        let level = self.settings.levels[usize::from(head.priority.0)];
+        self.with_ledger(now_ns, host, |outgoing, ledger| match lost {
+            Some(cause) => ledger.lost(&head, package.body, cause),
+            None => {
+                let Package { body, published_ns, hops, .. } = *package;
+                outgoing.accept(shift_ns, &Parcel { head: &head, body, published_ns, hops, level }, ledger);
+            }
+        });
+    }
+
+    /// What to do next.
+    pub fn poll(&mut self, now_ns: u64, host: &mut impl Host) -> Output {
+        if now_ns >= self.look_ns {
+            self.look(now_ns, host);
+        }
+        match self.state {
+            State::Away { until_ns } if now_ns >= until_ns => {
+                self.state = State::Connecting { until_ns: now_ns + CONNECT_MAX_NS };
+                return Output::Connect;
+            }
+            State::Away { until_ns } | State::Connecting { until_ns } if now_ns < until_ns => {
+                return Output::Wait { until_ns: until_ns.min(self.look_ns) };
+            }
+            State::Member | State::Greeting { .. } if !self.is_gone(now_ns) => {}
+            _ => {
+                self.closed(now_ns, host);
+                return Output::Close;
+            }
+        }
+        if self.is_blocked {
+            return Output::Wait { until_ns: self.look_ns };
+        }
+        self.refill(now_ns, host);
+        match self.outgoing.ready() {
+            [] => Output::Wait { until_ns: self.next_ns() },
+            _ => Output::Write,
+        }
+    }
+
+    /// From our clock to the server's session clock, as long as packages may leave: to the earliest that it may be there, so that no
+    /// package looks younger than it is.
+    fn shift_ns(&self, now_ns: u64) -> Option<i64> {
+        let session = self.session(now_ns).filter(|_| self.is_up())?;
+        let earliest_ns = session.ns.saturating_sub(session.error_ns);
+        Some((i128::from(earliest_ns) - i128::from(now_ns)).clamp(i64::MIN.into(), i64::MAX.into()) as i64)
+    }
+
+    fn is_gone(&self, now_ns: u64) -> bool {
+        let is_silent = now_ns.saturating_sub(self.heard_ns) > SILENT_AFTER_NS;
+        let is_stalled = now_ns.saturating_sub(self.moved_ns) > STALLED_AFTER_NS;
+        match self.state {
+            State::Greeting { until_ns } => now_ns >= until_ns,
+            _ => (is_silent && !broken!(WaitsForSilent)) || is_stalled,
+        }
+    }
+
+    fn look(&mut self, now_ns: u64, host: &mut impl Host) {
+        if self.look_ns > 0 && now_ns > self.look_ns + STOOD_STILL_NS {
+            self.heard_ns = now_ns;
+        }
+        self.look_ns = now_ns + LOOK_EVERY_NS;
+        if self.outgoing.ready().is_empty() {
+            self.moved_ns = now_ns;
+        }
+        let cause = if self.is_up() { Cause::Stale } else { Cause::Offline };
+        self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.look(now_ns, cause, ledger));
+    }
+
+    fn refill(&mut self, now_ns: u64, host: &mut impl Host) {
+        if self.state != State::Member || !self.outgoing.ready().is_empty() {
+            return;
+        }
+        if matches!(self.registration, Registration::Due(at_ns) if now_ns >= at_ns) {
+            self.number = self.number.wrapping_add(1);
+            self.registration = Registration::Asked;
+            let mut bytes = Vec::new();
+            self.outgoing.say(&Message::Register(Ranges::new(self.number, &self.ranges, &mut bytes)));
+        }
+        if now_ns >= self.ask_ns {
+            self.asks = self.asks.saturating_add(1);
+            self.ask_ns = now_ns + if self.asks < FIRST_ASKS { FIRST_ASK_EVERY_NS } else { ASK_EVERY_NS };
+            self.outgoing.say(&Message::Ask(now_ns));
+        }
+        if let Some(shift_ns) = self.shift_ns(now_ns) {
+            self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.refill(now_ns, shift_ns, ledger));
+        }
+    }
+
+    fn next_ns(&self) -> u64 {
+        let registers_ns = match self.registration {
+            Registration::Due(at_ns) => at_ns,
+            Registration::Asked | Registration::Holds => u64::MAX,
+        };
+        match self.state {
+            State::Member => self.look_ns.min(self.ask_ns).min(registers_ns),
+            _ => self.look_ns,
+        }
+    }
+
+    /// Does something with what leaves, and answers the commands of this end that are lost thereby.
+    fn with_ledger<H: Host>(
+        &mut self,
+        now_ns: u64,
+        host: &mut H,
+        work: impl FnOnce(&mut Outgoing, &mut Ledger<'_, H>),
+    ) {
+        let mut ledger = Ledger { counts: &self.out, host: &mut *host, answers: Vec::new() };
+        work(&mut self.outgoing, &mut ledger);
+        for (head, body) in ledger.answers {
+            // Who has gone, or takes no more answers, waits for its timeout.
+            let _ = host.deliver(&Carried { hops: 0, published_ns: now_ns, head, body: &body });
+        }
+    }
+}
+
+/// What becomes of packages that leave.
+struct Ledger<'a, H> {
+    counts: &'a Counts,
+    host: &'a mut H,
+    answers: Vec<(Head, Vec<u8>)>,
+}
+
+impl<H: Answers> Fates for Ledger<'_, H> {
+    fn passed(&mut self, head: &Head) {
+        self.counts.passed(head.priority);
+    }
+
+    fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
+        self.counts.lost(head.priority, cause);
+        self.answers.extend(answer_to(head, body, cause, None, self.host));
+    }
+}

@@ -1,0 +1,151 @@
+//! What one end of sessions counts: every package comes, and passes or is lost with a cause.
+
+use crate::report::NotDelivered;
+use crate::stats::{self, Count};
+use rohrpost_mailbox::Priority;
+
+/// Why a package was lost at one end of a session.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(usize)]
+pub enum Cause {
+    /// Nobody hosts its mailbox.
+    NoRoute,
+    /// Too much waited, and this was the least important and newest.
+    Full,
+    /// It was under way for too long.
+    Stale,
+    /// It waited for a client that has gone.
+    Gone,
+    /// It waited for the server, which is not reached.
+    Offline,
+    /// It was handed on too often: it goes round.
+    Hops,
+    /// Its sender's name is not hosted by who sent it.
+    Foreign,
+    /// Nobody has its mailbox open.
+    NoMailbox,
+    /// Its mailbox was full.
+    MailboxFull,
+    /// Its mailbox has smaller slots.
+    TooLarge,
+}
+
+impl Cause {
+    /// All, in their order.
+    pub const ALL: [Self; 10] = [
+        Self::NoRoute,
+        Self::Full,
+        Self::Stale,
+        Self::Gone,
+        Self::Offline,
+        Self::Hops,
+        Self::Foreign,
+        Self::NoMailbox,
+        Self::MailboxFull,
+        Self::TooLarge,
+    ];
+
+    /// A word for people and programs.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::NoRoute => "no-route",
+            Self::Full => "full",
+            Self::Stale => "stale",
+            Self::Gone => "gone",
+            Self::Offline => "offline",
+            Self::Hops => "hops",
+            Self::Foreign => "foreign",
+            Self::NoMailbox => "no-mailbox",
+            Self::MailboxFull => "mailbox-full",
+            Self::TooLarge => "too-large",
+        }
+    }
+
+    /// What the sender of a command is told, in the words of a router on the LAN. None: nothing, since who is told may not be who sent it.
+    pub const fn told(self) -> Option<stats::Cause> {
+        Some(match self {
+            Self::NoRoute | Self::Hops => stats::Cause::NoRoute,
+            Self::Full => stats::Cause::Quota,
+            Self::Stale => stats::Cause::Stale,
+            Self::Gone | Self::Offline => stats::Cause::Silent,
+            Self::Foreign => return None,
+            Self::NoMailbox => stats::Cause::NoMailbox,
+            Self::MailboxFull => stats::Cause::MailboxFull,
+            Self::TooLarge => stats::Cause::TooLarge,
+        })
+    }
+}
+
+impl From<NotDelivered> for Cause {
+    fn from(why: NotDelivered) -> Self {
+        match why {
+            NotDelivered::NoMailbox => Self::NoMailbox,
+            NotDelivered::MailboxFull => Self::MailboxFull,
+            NotDelivered::TooLarge => Self::TooLarge,
+        }
+    }
+}
+
+/// What passed, and what did not, by class.
+#[derive(Debug)]
+pub struct Counts {
+    classes: Box<[ClassCounts]>,
+}
+
+/// Of one class.
+#[derive(Default, Debug)]
+pub struct ClassCounts {
+    /// Packages that came; one to all systems once for each of them.
+    pub packages: Count,
+    /// Of these, handed to the next connection; at a client, delivered.
+    pub passed: Count,
+    lost: [Count; Cause::ALL.len()],
+}
+
+impl ClassCounts {
+    /// Packages lost for a cause.
+    pub fn lost(&self, cause: Cause) -> u64 {
+        self.lost[cause as usize].get()
+    }
+
+    /// Packages lost for any.
+    pub fn lost_in_all(&self) -> u64 {
+        self.lost.iter().map(Count::get).sum()
+    }
+}
+
+impl Default for Counts {
+    fn default() -> Self {
+        Self { classes: (0..=u8::MAX).map(|_| ClassCounts::default()).collect() }
+    }
+}
+
+impl Counts {
+    /// What a class did.
+    pub fn class(&self, priority: Priority) -> &ClassCounts {
+        &self.classes[usize::from(priority.0)]
+    }
+
+    /// All classes that did something, the most urgent first.
+    pub fn classes(&self) -> impl Iterator<Item = (Priority, &ClassCounts)> {
+        let all = self.classes.iter().enumerate().rev();
+        all.filter(|(_, class)| class.packages.get() > 0).map(|(index, class)| (Priority(index as u8), class))
+    }
+
+    /// Packages of all classes lost for a cause.
+    pub fn lost_for(&self, cause: Cause) -> u64 {
+        self.classes.iter().map(|class| class.lost(cause)).sum()
+    }
+
+    pub(super) fn came(&self, priority: Priority) {
+        self.class(priority).packages.add(1);
+    }
+
+    pub(super) fn passed(&self, priority: Priority) {
+        self.class(priority).passed.add(1);
+    }
+
+    pub(super) fn lost(&self, priority: Priority, cause: Cause) {
+        self.class(priority).lost[cause as usize].add(1);
+    }
+}

@@ -1,0 +1,223 @@
+//! Hello, welcome and refusal: what both ends say of themselves.
+
+use super::fields::Fields;
+use super::{BadFrame, MAGIC, TimeAnswer, VERSION};
+
+/// Bytes of a name that people read, at most.
+pub const NAME_BYTES_MAX: usize = 64;
+
+/// Who a client is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Hello<'a> {
+    /// First byte of the names that it may host.
+    pub system: u8,
+    /// What is sent to all systems reaches its own without the server.
+    pub reaches_own: bool,
+    /// Digest of what must be equal everywhere.
+    pub common: u64,
+    /// Digest of what must be equal inside a system.
+    pub system_digest: u64,
+    /// Tells this life of the client from others; not 0.
+    pub life: u64,
+    /// Counts the connections of this life, from 1: of two the later is the true one.
+    pub attempt: u64,
+    /// Its own time, ns: the first question for the time.
+    pub asked_ns: u64,
+    /// For people.
+    pub name: &'a str,
+}
+
+impl<'a> Hello<'a> {
+    pub(super) fn parse(fields: &mut Fields<'a>) -> Result<Self, BadFrame> {
+        if fields.array()? != MAGIC {
+            return Err(BadFrame::Foreign);
+        }
+        let (version, system, flags) = (fields.byte()?, fields.byte()?, fields.byte()?);
+        if version != VERSION {
+            return Err(BadFrame::Version(version));
+        }
+        fields.zeroes::<1>()?;
+        let hello = Self {
+            system,
+            reaches_own: flags == 1,
+            common: fields.long()?,
+            system_digest: fields.long()?,
+            life: fields.long()?,
+            attempt: fields.long()?,
+            asked_ns: fields.long()?,
+            name: fields.text(NAME_BYTES_MAX)?,
+        };
+        let is_one = system != 0 && system != rohrpost_mailbox::ALL_SYSTEMS;
+        if !is_one || flags > 1 || hello.life == 0 || hello.attempt == 0 {
+            return Err(BadFrame::Damaged("a hello of nobody"));
+        }
+        Ok(hello)
+    }
+
+    pub(super) fn write(&self, into: &mut Vec<u8>) {
+        into.extend(MAGIC);
+        into.extend([VERSION, self.system, u8::from(self.reaches_own), 0]);
+        for long in [self.common, self.system_digest, self.life, self.attempt, self.asked_ns] {
+            into.extend(long.to_le_bytes());
+        }
+        into.extend(self.name.as_bytes());
+    }
+}
+
+/// What the server says of itself.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Welcome {
+    /// Digest of what must be equal everywhere.
+    pub common: u64,
+    /// Tells this life of the server from others: times of two lives have nothing to do with each other.
+    pub life: u64,
+    /// To the question of the hello.
+    pub time: TimeAnswer,
+}
+
+impl Welcome {
+    pub(super) fn parse(fields: &mut Fields<'_>) -> Result<Self, BadFrame> {
+        if fields.array()? != MAGIC {
+            return Err(BadFrame::Foreign);
+        }
+        let version = fields.byte()?;
+        if version != VERSION {
+            return Err(BadFrame::Version(version));
+        }
+        fields.zeroes::<3>()?;
+        Ok(Self { common: fields.long()?, life: fields.long()?, time: TimeAnswer::parse(fields)? })
+    }
+
+    pub(super) fn write(&self, into: &mut Vec<u8>) {
+        into.extend(MAGIC);
+        into.extend([VERSION, 0, 0, 0]);
+        into.extend(self.common.to_le_bytes());
+        into.extend(self.life.to_le_bytes());
+        self.time.write(into);
+    }
+}
+
+/// Why a server takes a client not, or not any more.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(u8)]
+pub enum Reason {
+    /// Another version of the format.
+    Version = 1,
+    /// Another digest of what must be equal everywhere.
+    Common = 2,
+    /// Another digest of what must be equal inside a system.
+    System = 3,
+    /// It has as many clients as it takes.
+    Full = 4,
+    /// A later connection of the same client is there.
+    Replaced = 5,
+    /// It sent what is no frame, or no frame for then.
+    Damaged = 6,
+    /// Nothing came from it for too long, or too little.
+    Silent = 7,
+    /// It took nothing for too long.
+    Stalled = 8,
+    /// The server ends.
+    Ending = 9,
+    /// Its certificate is of another system.
+    Certificate = 10,
+}
+
+impl Reason {
+    const ALL: [Self; 10] = [
+        Self::Version,
+        Self::Common,
+        Self::System,
+        Self::Full,
+        Self::Replaced,
+        Self::Damaged,
+        Self::Silent,
+        Self::Stalled,
+        Self::Ending,
+        Self::Certificate,
+    ];
+
+    /// A word for people and programs.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Version => "version",
+            Self::Common => "common-digest",
+            Self::System => "system-digest",
+            Self::Full => "full",
+            Self::Replaced => "replaced",
+            Self::Damaged => "damaged",
+            Self::Silent => "silent",
+            Self::Stalled => "stalled",
+            Self::Ending => "ending",
+            Self::Certificate => "certificate",
+        }
+    }
+}
+
+/// "I take nothing from you, since …"
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Refusal<'a> {
+    /// Version of who refuses.
+    pub version: u8,
+    /// Why.
+    pub reason: Reason,
+    /// The client's digest of what differs, else 0.
+    pub yours: u64,
+    /// The one that it should be, else 0.
+    pub ours: u64,
+    /// Who has that digest; else what was wrong.
+    pub text: &'a str,
+}
+
+impl<'a> Refusal<'a> {
+    pub(super) fn parse(fields: &mut Fields<'a>) -> Result<Self, BadFrame> {
+        if fields.array()? != MAGIC {
+            return Err(BadFrame::Foreign);
+        }
+        let (version, reason) = (fields.byte()?, fields.byte()?);
+        let reason = Reason::ALL.into_iter().find(|known| *known as u8 == reason);
+        let reason = reason.ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
+        fields.zeroes::<2>()?;
+        Ok(Self { version, reason, yours: fields.long()?, ours: fields.long()?, text: fields.text(NAME_BYTES_MAX)? })
+    }
+
+    pub(super) fn write(&self, into: &mut Vec<u8>) {
+        into.extend(MAGIC);
+        into.extend([self.version, self.reason as u8, 0, 0]);
+        into.extend(self.yours.to_le_bytes());
+        into.extend(self.ours.to_le_bytes());
+        into.extend(self.text.as_bytes());
+    }
+}
+
+impl std::fmt::Display for Refusal<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { version, yours, ours, text, .. } = self;
+        match self.reason {
+            Reason::Version => write!(
+                f,
+                "the TCP router speaks session format {version}, this end {VERSION}; run the same version of Rohrpost at both ends \
+                 (`rohrpost version`)"
+            ),
+            Reason::Common => write!(
+                f,
+                "the common digest here is {yours:016x}, that of {text} {ours:016x}; give both configurations the same classes \
+                 (`rohrpost check`, on both)"
+            ),
+            Reason::System => write!(
+                f,
+                "the system's digest here is {yours:016x}, that of {text} {ours:016x}; start all of a system from the same file \
+                 (`rohrpost check`, on both)"
+            ),
+            Reason::Full => write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some"),
+            Reason::Replaced => write!(f, "a later connection of this client has taken its place"),
+            Reason::Damaged => write!(f, "the TCP router could not read what came: {text}"),
+            Reason::Silent => write!(f, "the TCP router heard nothing for too long"),
+            Reason::Stalled => write!(f, "nothing was read here for too long"),
+            Reason::Ending => write!(f, "the TCP router ends"),
+            Reason::Certificate => {
+                write!(f, "the certificate here does not fit: {text}; use that of this node (`rohrpost certificates`)")
+            }
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The frames of a session: what stands in the stream of bytes between a client and the server. The page `docs/src/wire.md` is exact.
+//!
+//! ```text
+//!  0        4      5      6   8
+//! ┌────────┬──────┬──────┬───┬────────────────────────────────────────────────────────────────────┐
+//! │ length │ kind │ hops │ 0 │ `length` bytes, as the kind says                                    │
+//! └────────┴──────┴──────┴───┴────────────────────────────────────────────────────────────────────┘
+//!  client: hello, then register, then package and ask       server: welcome or refusal, registered, package, answer
+//! ```
+//!
+//! All fields of ours are little-endian; the head of a package is in the order that its own options tell. Each frame is checked once,
+//! as a whole; then no accessor can fail.
+
+mod carried;
+mod fields;
+mod meeting;
+mod ranges;
+
+pub use carried::{Carried, TimeAnswer};
+pub use meeting::{Hello, NAME_BYTES_MAX, Reason, Refusal, Welcome};
+pub use ranges::{Objection, RANGES_MAX, Range, Ranges, Verdict};
+
+use fields::Fields;
+use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES as PACKAGE_HEAD_BYTES};
+
+/// Bytes before what depends on the kind.
+pub const HEAD_BYTES: usize = 8;
+/// The version of this format; the head, the first eight bytes of a hello, and a refusal mean the same in all of them.
+pub const VERSION: u8 = 1;
+/// Bytes behind a frame's head, at most: the largest package, and when it was published.
+pub const LENGTH_MAX: usize = PUBLISHED_BYTES + PACKAGE_HEAD_BYTES + BODY_BYTES_MAX;
+/// The same of who has not said hello.
+pub const GREETING_LENGTH_MAX: usize = 256;
+/// A package passes so many servers and programs that hand it on, at most.
+pub const HOPS_MAX: u8 = 8;
+
+pub(super) const PUBLISHED_BYTES: usize = 8;
+const MAGIC: [u8; 4] = *b"RpTc";
+
+/// What a frame is.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(u8)]
+pub enum Kind {
+    /// Client: who it is. The first frame of each connection.
+    Hello = 1,
+    /// Server: it may take part.
+    Welcome = 2,
+    /// Server: it may not, or not any more. The last frame.
+    Refusal = 3,
+    /// Client: the names that it hosts, all of them.
+    Register = 4,
+    /// Server: whether it does.
+    Registered = 5,
+    /// A package.
+    Package = 6,
+    /// Client: what time is it?
+    Ask = 7,
+    /// Server: the time.
+    Answer = 8,
+}
+
+impl Kind {
+    const ALL: [Self; 8] = [
+        Self::Hello,
+        Self::Welcome,
+        Self::Refusal,
+        Self::Register,
+        Self::Registered,
+        Self::Package,
+        Self::Ask,
+        Self::Answer,
+    ];
+}
+
+/// Why bytes are no frame of ours; nothing that follows them can be read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum BadFrame {
+    /// The stream does not begin as one of ours.
+    #[error("no session of Rohrpost; is this the port of its TCP router?")]
+    Foreign,
+    /// Another version of the format.
+    #[error("session format {theirs}, ours is {VERSION}; run the same version of Rohrpost at both ends", theirs = .0)]
+    Version(u8),
+    /// More than a frame of its kind may have.
+    #[error("a frame of {0} bytes is too long")]
+    TooLong(u32),
+    /// Wrong in itself.
+    #[error("damaged: {0}")]
+    Damaged(&'static str),
+}
+
+/// What each frame begins with.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct FrameHead {
+    /// What it is.
+    pub kind: Kind,
+    /// Of a package: how often it was handed on before.
+    pub hops: u8,
+    /// Bytes that follow.
+    pub length: usize,
+}
+
+impl FrameHead {
+    /// Reads a head.
+    ///
+    /// # Errors
+    /// [`BadFrame`]; also if more would follow than `length_max`.
+    pub fn parse(bytes: &[u8; HEAD_BYTES], length_max: usize) -> Result<Self, BadFrame> {
+        let mut fields = Fields::new(bytes);
+        let (length, kind, hops, rest) = (fields.word()?, fields.byte()?, fields.byte()?, fields.rest());
+        // First the kind: what is no session mostly begins with text, which makes an odd length.
+        let kind = Kind::ALL.into_iter().find(|known| *known as u8 == kind).ok_or(BadFrame::Damaged("unknown kind"))?;
+        if rest != [0; 2] || (hops != 0 && kind != Kind::Package) {
+            return Err(BadFrame::Damaged("a head with bits that mean nothing"));
+        }
+        match usize::try_from(length) {
+            Ok(length) if length <= length_max => Ok(Self { kind, hops, length }),
+            _ => Err(BadFrame::TooLong(length)),
+        }
+    }
+}
+
+/// A frame, read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Message<'a> {
+    /// Who a client is.
+    Hello(Hello<'a>),
+    /// It may take part.
+    Welcome(Welcome),
+    /// It may not.
+    Refusal(Refusal<'a>),
+    /// The names that it hosts.
+    Register(Ranges<'a>),
+    /// Whether it does.
+    Registered(Verdict<'a>),
+    /// A package.
+    Package(Carried<'a>),
+    /// A question for the time, with the asker's own, ns.
+    Ask(u64),
+    /// The answer.
+    Answer(TimeAnswer),
+}
+
+impl<'a> Message<'a> {
+    /// Checks all that a frame says.
+    ///
+    /// # Errors
+    /// [`BadFrame`]
+    pub fn parse(head: FrameHead, rest: &'a [u8]) -> Result<Self, BadFrame> {
+        let mut fields = Fields::new(rest);
+        let message = match head.kind {
+            Kind::Hello => Self::Hello(Hello::parse(&mut fields)?),
+            Kind::Welcome => Self::Welcome(Welcome::parse(&mut fields)?),
+            Kind::Refusal => Self::Refusal(Refusal::parse(&mut fields)?),
+            Kind::Register => Self::Register(Ranges::parse(&mut fields)?),
+            Kind::Registered => Self::Registered(Verdict::parse(&mut fields)?),
+            Kind::Package => Self::Package(Carried::parse(head.hops, &mut fields)?),
+            Kind::Ask => Self::Ask(fields.long()?),
+            Kind::Answer => Self::Answer(TimeAnswer::parse(&mut fields)?),
+        };
+        if !fields.rest().is_empty() {
+            return Err(BadFrame::Damaged("a frame with bytes behind its end"));
+        }
+        Ok(message)
+    }
+
+    /// Appends the frame.
+    pub fn write(&self, into: &mut Vec<u8>) {
+        match self {
+            Self::Hello(hello) => frame(into, Kind::Hello, 0, |into| hello.write(into)),
+            Self::Welcome(welcome) => frame(into, Kind::Welcome, 0, |into| welcome.write(into)),
+            Self::Refusal(refusal) => frame(into, Kind::Refusal, 0, |into| refusal.write(into)),
+            Self::Register(ranges) => frame(into, Kind::Register, 0, |into| ranges.write(into)),
+            Self::Registered(verdict) => frame(into, Kind::Registered, 0, |into| verdict.write(into)),
+            Self::Package(carried) => frame(into, Kind::Package, carried.hops, |into| carried.write(into)),
+            Self::Ask(asked_ns) => frame(into, Kind::Ask, 0, |into| into.extend(asked_ns.to_le_bytes())),
+            Self::Answer(answer) => frame(into, Kind::Answer, 0, |into| answer.write(into)),
+        }
+    }
+}
+
+fn frame(into: &mut Vec<u8>, kind: Kind, hops: u8, rest: impl FnOnce(&mut Vec<u8>)) {
+    let start = into.len();
+    into.extend([0, 0, 0, 0, kind as u8, hops, 0, 0]);
+    rest(into);
+    let length = (into.len() - start - HEAD_BYTES) as u32;
+    into[start..start + 4].copy_from_slice(&length.to_le_bytes());
+}
+
+#[cfg(test)]
+mod tests;

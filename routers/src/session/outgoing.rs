@@ -1,0 +1,178 @@
+//! What leaves by one connection: most important first, in bounded memory, so that a connection that stands still costs nobody else.
+//!
+//! ```text
+//!  package ─┬─ nothing waits ──────────────────────▶ ready: bytes for the stream, a batch at most, in their final order
+//!           └─ Queue: the least important gives way ──▲ most important first, whenever the stream has taken all
+//! ```
+
+use super::WAIT_MAX_NS;
+use super::counts::Cause;
+use super::frame::{Carried, HEAD_BYTES, Message};
+use crate::broken::broken;
+use crate::queue::{Queue, Waiting};
+use crate::settings::LEVELS;
+use rohrpost_mailbox::Head;
+
+/// Bytes that are made ready at a time: what is more important than they are waits for no more. One frame may exceed it.
+pub const BATCH_BYTES: usize = 16 * 1024;
+/// A queue that was empty for so many looks gives its memory back.
+const EMPTY_LOOKS: u8 = 50;
+
+/// A package that is to leave.
+#[derive(Clone, Copy)]
+pub(super) struct Parcel<'a> {
+    pub(super) head: &'a Head,
+    pub(super) body: &'a [u8],
+    /// By the clock of who sends, ns.
+    pub(super) published_ns: u64,
+    pub(super) hops: u8,
+    /// 0 goes first.
+    pub(super) level: u8,
+}
+
+/// Learns what becomes of packages.
+pub(super) trait Fates {
+    /// Handed to the stream.
+    fn passed(&mut self, head: &Head);
+    /// Lost; with it the beginning of its body.
+    fn lost(&mut self, head: &Head, body: &[u8], cause: Cause);
+}
+
+/// Of one connection, or of the one that comes next.
+#[derive(Debug)]
+pub(super) struct Outgoing {
+    ready: Vec<u8>,
+    /// Of `ready`, bytes that the stream has taken.
+    taken: usize,
+    queue: Option<Box<Queue>>,
+    quota_bytes: usize,
+    empty_looks: u8,
+}
+
+impl Outgoing {
+    pub(super) fn new(quota_bytes: usize) -> Self {
+        Self { ready: Vec::new(), taken: 0, queue: None, quota_bytes, empty_looks: 0 }
+    }
+
+    /// Bytes for the stream.
+    pub(super) fn ready(&self) -> &[u8] {
+        &self.ready[self.taken..]
+    }
+
+    /// The stream has taken so many.
+    pub(super) fn took(&mut self, bytes: usize) {
+        self.taken += bytes;
+        if self.taken >= self.ready.len() {
+            self.ready.clear();
+            self.taken = 0;
+            self.ready.shrink_to(BATCH_BYTES);
+        }
+    }
+
+    /// Whether packages wait.
+    pub(super) fn has_waiting(&self) -> bool {
+        self.queue.as_ref().is_some_and(|queue| !queue.is_empty())
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.ready.capacity() + self.queue.as_ref().map_or(0, |queue| queue.used_bytes() as usize)
+    }
+
+    /// The connection is over: what was made ready for it goes with it.
+    pub(super) fn cut(&mut self) {
+        if !broken!(SendsCutAgain) {
+            self.ready.clear();
+        }
+        self.taken = 0;
+    }
+
+    /// Appends a frame that is no package. The caller bounds how many.
+    pub(super) fn say(&mut self, message: &Message<'_>) {
+        message.write(&mut self.ready);
+    }
+
+    /// A package is to leave. `shift_ns` goes from our clock to the session's; none as long as nothing may leave.
+    pub(super) fn accept(&mut self, shift_ns: Option<i64>, parcel: &Parcel<'_>, fates: &mut impl Fates) {
+        if let Some(shift_ns) = shift_ns.filter(|_| !self.has_waiting() && self.ready().len() < BATCH_BYTES) {
+            return self.make_ready(shift_ns, parcel, fates);
+        }
+        let Parcel { head, body, published_ns, hops, level } = *parcel;
+        let waiting = Waiting { head: *head, published_ns, hops, level, ..Waiting::default() };
+        let quota_bytes = self.quota_bytes;
+        let queue = self.queue.get_or_insert_with(|| Box::new(Queue::new(1, 1, quota_bytes)));
+        if !queue.push(waiting, body, |gone, beginning| fates.lost(&gone.head, beginning, Cause::Full)) {
+            fates.lost(head, body, Cause::Full);
+        }
+    }
+
+    /// Fills the batch with what waits.
+    pub(super) fn refill(&mut self, now_ns: u64, shift_ns: i64, fates: &mut impl Fates) {
+        let Some(mut queue) = self.queue.take() else { return };
+        while self.ready().len() < BATCH_BYTES
+            && let Some(place) = queue.first()
+        {
+            let Waiting { head, published_ns, hops, .. } = *queue.at(place);
+            if is_stale(now_ns, published_ns) {
+                let (waiting, beginning) = queue.remove(place);
+                fates.lost(&waiting.head, beginning, Cause::Stale);
+                continue;
+            }
+            self.forget_taken();
+            let start = self.ready.len();
+            self.make_ready(shift_ns, &Parcel { head: &head, body: &[], published_ns, hops, level: 0 }, fates);
+            let body = self.ready.len();
+            self.ready.resize(body + usize::from(head.len), 0);
+            queue.read(place, &mut self.ready[body..]);
+            let length = (self.ready.len() - start - HEAD_BYTES) as u32;
+            self.ready[start..start + 4].copy_from_slice(&length.to_le_bytes());
+            queue.remove(place);
+        }
+        self.queue = Some(queue);
+    }
+
+    /// Gives up what waited too long. `cause`: why it did.
+    pub(super) fn look(&mut self, now_ns: u64, cause: Cause, fates: &mut impl Fates) {
+        let Some(queue) = &mut self.queue else { return };
+        for level in 0..LEVELS as u8 {
+            while let Some(place) =
+                queue.first_of(0, level).filter(|place| is_stale(now_ns, queue.at(*place).published_ns))
+            {
+                let (waiting, beginning) = queue.remove(place);
+                fates.lost(&waiting.head, beginning, cause);
+            }
+        }
+        self.empty_looks = if queue.is_empty() { self.empty_looks + 1 } else { 0 };
+        if self.empty_looks == EMPTY_LOOKS {
+            self.queue = None;
+            self.empty_looks = 0;
+        }
+    }
+
+    /// Gives up all that waits.
+    pub(super) fn give_up(&mut self, cause: Cause, fates: &mut impl Fates) {
+        let Some(mut queue) = self.queue.take() else { return };
+        while let Some(place) = queue.first() {
+            let (waiting, beginning) = queue.remove(place);
+            fates.lost(&waiting.head, beginning, cause);
+        }
+    }
+
+    fn forget_taken(&mut self) {
+        self.ready.drain(..self.taken);
+        self.taken = 0;
+    }
+
+    fn make_ready(&mut self, shift_ns: i64, parcel: &Parcel<'_>, fates: &mut impl Fates) {
+        self.forget_taken();
+        let Parcel { head, body, published_ns, hops, .. } = *parcel;
+        // 0 says that nobody knows.
+        let published_ns = published_ns.saturating_add_signed(shift_ns).max(1);
+        self.say(&Message::Package(Carried { hops, published_ns, head: *head, body }));
+        fates.passed(head);
+    }
+}
+
+pub(super) fn is_stale(now_ns: u64, published_ns: u64) -> bool {
+    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS
+}

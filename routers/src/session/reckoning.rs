@@ -1,0 +1,146 @@
+//! Time by questions and answers: how far the server's clocks are from ours, and how far off that is at most.
+//!
+//! ```text
+//!  server            came ──────── left
+//!                   ╱                  ╲              the two ways together took (heard - asked) - (left - came);
+//!  client      asked                    heard         nobody knows how they share it, so half of it is the bound
+//! ```
+//!
+//! A stream has no time of arrival: what waits in a buffer makes a way longer, never shorter. So the shortest exchange counts
+//! most, until its age makes it worse than a later one.
+
+use super::frame::TimeAnswer;
+use crate::broken::broken;
+use crate::time::RATE_MAX_PPB;
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, TimeSource};
+
+/// Exchanges that are kept.
+const KEPT: usize = 8;
+const BILLION: u128 = 1_000_000_000;
+
+/// A moment, and how far off it is at most.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Bounded {
+    /// Ns of the clock that was asked for.
+    pub ns: u64,
+    /// At most so far off, ns.
+    pub error_ns: u64,
+}
+
+/// What one client knows of the clocks of one life of the server.
+#[derive(Clone, Debug, Default)]
+pub struct Reckoning {
+    kept: [Option<Sample>; KEPT],
+    next: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    answer: TimeAnswer,
+    /// Our clock when it was read, ns.
+    heard_ns: u64,
+    /// Both ways together, ns.
+    ways_ns: u64,
+}
+
+impl Sample {
+    /// How far off the server's session clock may be by now, ns.
+    fn error_ns(&self, now_ns: u64) -> u64 {
+        let age_ns = now_ns.saturating_sub(self.heard_ns) + self.ways_ns;
+        let drift_ns = u128::from(age_ns) * u128::from(RATE_MAX_PPB.unsigned_abs()) / BILLION;
+        let ways_ns = if broken!(TrustsTheWay) { 0 } else { self.ways_ns.div_ceil(2) };
+        ways_ns + drift_ns as u64 + 1
+    }
+}
+
+impl Reckoning {
+    /// An answer was read. False: it answers nothing that was asked before.
+    pub fn heard(&mut self, now_ns: u64, answer: &TimeAnswer) -> bool {
+        let there_ns = answer.left_ns - answer.came_ns;
+        let Some(ways_ns) = now_ns.checked_sub(answer.asked_ns) else { return false };
+        // Clocks of different pace may make the way seem shorter than nothing.
+        let sample = Sample { answer: *answer, heard_ns: now_ns, ways_ns: ways_ns.saturating_sub(there_ns) };
+        self.kept[self.next] = Some(sample);
+        self.next = (self.next + 1) % KEPT;
+        true
+    }
+
+    /// The shortest way there and back of those that are kept, ns.
+    pub fn round_trip_ns(&self) -> Option<u64> {
+        self.kept.iter().flatten().map(|sample| sample.ways_ns).min()
+    }
+
+    /// The server's session clock.
+    pub fn session(&self, now_ns: u64) -> Option<Bounded> {
+        let best = self.kept.iter().flatten().min_by_key(|sample| sample.error_ns(now_ns))?;
+        let heard_ns = best.answer.left_ns.saturating_add(best.ways_ns / 2);
+        let ns = heard_ns.saturating_add(now_ns.saturating_sub(best.heard_ns));
+        Some(Bounded { ns, error_ns: best.error_ns(now_ns) })
+    }
+
+    /// System time as the server has it, as of the best exchange: of the latest epoch. None if it does not know it.
+    pub fn system(&self, now_ns: u64) -> Option<TimeRecord> {
+        let known = || self.kept.iter().flatten().filter(|sample| sample.answer.error_ns < ERROR_UNKNOWN_NS);
+        let epoch = known().map(|sample| sample.answer.epoch).max()?;
+        let whole_error_ns = |sample: &Sample| sample.error_ns(now_ns).saturating_add(sample.answer.error_ns);
+        let best = known().filter(|sample| sample.answer.epoch == epoch).min_by_key(|sample| whole_error_ns(sample))?;
+        Some(TimeRecord {
+            epoch,
+            source: TimeSource::Master,
+            monotonic_ns: best.heard_ns,
+            system_ns: best.answer.system_ns.saturating_add(best.ways_ns / 2),
+            pace_ppb: BILLION as u64,
+            error_ns: best.error_ns(best.heard_ns).saturating_add(best.answer.error_ns).min(ERROR_UNKNOWN_NS),
+            drift_ns_s: RATE_MAX_PPB.unsigned_abs(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The server's clock is 5 s ahead and its system time 1000 s; both ways take `there` and `back`.
+    fn exchange(asked_ns: u64, there: u64, back: u64) -> (u64, TimeAnswer) {
+        let (came_ns, left_ns) = (asked_ns + there + 5_000_000_000, asked_ns + there + 5_000_000_100);
+        let system_ns = left_ns + 995_000_000_000;
+        let answer = TimeAnswer { asked_ns, came_ns, left_ns, system_ns, error_ns: 10, epoch: 3 };
+        (asked_ns + there + 100 + back, answer)
+    }
+
+    #[test]
+    fn the_true_time_lies_within_the_bound_however_unequal_the_ways_are() {
+        for (there, back) in [(1000, 1000), (0, 1_000_000), (1_000_000, 0), (3, 70_000)] {
+            let mut reckoning = Reckoning::default();
+            let (heard_ns, answer) = exchange(10_000, there, back);
+            assert!(reckoning.heard(heard_ns, &answer));
+            let now_ns = heard_ns + 2_000_000_000;
+            let session = reckoning.session(now_ns).unwrap();
+            assert!(session.ns.abs_diff(now_ns + 5_000_000_000) <= session.error_ns, "{there}, {back}: {session:?}");
+            let system = reckoning.system(now_ns).unwrap().at(now_ns);
+            let off_ns = system.ns.abs_diff(now_ns + 1_000_000_000_000);
+            assert!(u128::from(off_ns) <= system.error.as_nanos(), "{there}, {back}: {system:?}");
+            assert_eq!(system.epoch, 3);
+        }
+    }
+
+    #[test]
+    fn the_shortest_exchange_counts_until_it_is_old() {
+        let mut reckoning = Reckoning::default();
+        for (asked_ns, way) in [(0, 500_000), (1_000_000, 10_000), (2_000_000, 400_000)] {
+            let (heard_ns, answer) = exchange(asked_ns, way, way);
+            reckoning.heard(heard_ns, &answer);
+        }
+        assert!(reckoning.session(3_000_000).unwrap().error_ns < 12_000, "that of 10 µs each way");
+        let (heard_ns, answer) = exchange(20_000_000_000, 400_000, 400_000);
+        reckoning.heard(heard_ns, &answer);
+        let error_ns = reckoning.session(heard_ns).unwrap().error_ns;
+        assert!((400_000..402_000).contains(&error_ns), "clocks drift 5 ms in 20 s: {error_ns}");
+    }
+
+    #[test]
+    fn an_answer_to_a_question_of_the_future_is_none() {
+        let (_, answer) = exchange(10_000, 5, 5);
+        assert!(!Reckoning::default().heard(9_999, &answer));
+    }
+}

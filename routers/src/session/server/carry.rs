@@ -1,0 +1,165 @@
+//! Packages: from the client that sends to the one that hosts the name.
+
+use super::member::{Asked, Member};
+use super::{Host, Server};
+use crate::broken::broken;
+use crate::session::counts::{Cause, Counts};
+use crate::session::frame::{Carried, HOPS_MAX, Message, Refusal, TimeAnswer, VERSION, Verdict, Welcome};
+use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
+use crate::session::{Answers, ClientIndex, answer_to, in_system, without_hurry};
+use rohrpost_mailbox::{ALL_SYSTEMS, ERROR_UNKNOWN_NS, Head, Name, TimeRecord};
+
+/// What becomes of packages for one client: counted, and the answers that are due.
+pub(super) struct Ledger<'a, H> {
+    counts: &'a Counts,
+    host: &'a mut H,
+    /// For whom they were.
+    holder: &'a str,
+    answers: Vec<(Head, Vec<u8>)>,
+}
+
+impl<H: Answers> Fates for Ledger<'_, H> {
+    fn passed(&mut self, head: &Head) {
+        self.counts.passed(head.priority);
+    }
+
+    fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
+        self.counts.lost(head.priority, cause);
+        self.answers.extend(answer_to(head, body, cause, Some(self.holder), self.host));
+    }
+}
+
+impl Server {
+    /// Hands a package of a client on.
+    pub(super) fn carry(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+        let head = without_hurry(&carried.head);
+        // Who does not know when, or says in the future, has published it now.
+        let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
+        let hops = if broken!(KeepsHops) { carried.hops } else { carried.hops.saturating_add(1) };
+        let carried = Carried { head, published_ns, hops, ..*carried };
+        let is_own = self.table.client_of(head.from) == Some(from) || head.from == Name::NONE;
+        let objection = if !is_own && !broken!(TakesForeignNames) {
+            Some(Cause::Foreign)
+        } else if carried.hops > HOPS_MAX {
+            Some(Cause::Hops)
+        } else {
+            is_stale(now_ns, published_ns).then_some(Cause::Stale)
+        };
+        match objection {
+            Some(cause) => self.lose(now_ns, &carried, cause, host),
+            None if head.to.system() == ALL_SYSTEMS => self.carry_to_all(now_ns, from, &carried, host),
+            None => self.carry_to_one(now_ns, from, &carried, host),
+        }
+    }
+
+    fn carry_to_one(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+        // What a client cannot deliver itself does not come back to it.
+        let to = self.table.client_of(carried.head.to).filter(|to| *to != from || broken!(HandsBack));
+        match to {
+            Some(to) => {
+                self.counts.came(carried.head.priority);
+                self.hand_over(now_ns, to, carried, host);
+            }
+            None => self.lose(now_ns, carried, Cause::NoRoute, host),
+        }
+    }
+
+    /// Each system gets it once, by the client that hosts the name there. Who reaches the other nodes of its own system does that itself.
+    fn carry_to_all(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+        let Some((own, reaches_own)) = self.member(from).map(|member| (member.system, member.reaches_own)) else {
+            return;
+        };
+        let systems: Vec<u8> = self.table.systems().to_vec();
+        let mut copies = 0;
+        for system in systems.into_iter().filter(|system| *system != own || !reaches_own || broken!(ToOwnTwice)) {
+            let to = in_system(carried.head.to, system);
+            let Some(client) = self.table.client_of(to).filter(|client| *client != from) else { continue };
+            copies += 1;
+            self.counts.came(carried.head.priority);
+            let copy = Carried { head: Head { to, ..carried.head }, ..*carried };
+            self.hand_over(now_ns, client, &copy, host);
+        }
+        if copies == 0 {
+            self.lose(now_ns, carried, Cause::NoRoute, host);
+        }
+    }
+
+    /// A package that came is lost before it waits for anybody.
+    fn lose(&mut self, now_ns: u64, carried: &Carried<'_>, cause: Cause, host: &mut impl Host) {
+        self.counts.came(carried.head.priority);
+        self.counts.lost(carried.head.priority, cause);
+        let answer = answer_to(&carried.head, carried.body, cause, None, host);
+        self.say_all(now_ns, answer.into_iter().collect(), host);
+    }
+
+    fn hand_over(&mut self, now_ns: u64, to: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+        let level = self.settings.levels[usize::from(carried.head.priority.0)];
+        // Behind a stream that stands still all waits in the queue, where the most important goes first.
+        let shift_ns = self.member(to).filter(|member| !member.is_blocked).map(|_| 0);
+        self.with_ledger(now_ns, to, host, |outgoing, ledger| {
+            let Carried { hops, published_ns, ref head, body } = *carried;
+            outgoing.accept(shift_ns, &Parcel { head, body, published_ns, hops, level }, ledger);
+        });
+        self.is_due(to);
+    }
+
+    /// Makes ready what is to be written next.
+    pub(super) fn refill(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
+        let (time, life, common) = (self.time, self.settings.life, self.settings.common);
+        let Some(member) = self.member_mut(client) else { return };
+        if let Some(asked) = member.asked.take() {
+            let time = time_answer(now_ns, &asked, time);
+            let welcome = Message::Welcome(Welcome { common, life, time });
+            member.outgoing.say(&if asked.by_hello { welcome } else { Message::Answer(time) });
+        }
+        if let Some(judged) = member.judged.take() {
+            member.outgoing.say(&Message::Registered(Verdict { holder: &judged.holder, ..judged.verdict }));
+        }
+        if let Some(refused) = member.refused.take() {
+            let ((yours, ours), text) = (refused.digests, refused.text.as_str());
+            let refusal = Refusal { version: VERSION, reason: refused.reason, yours, ours, text };
+            member.outgoing.say(&Message::Refusal(refusal));
+        }
+        self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.refill(now_ns, 0, ledger));
+    }
+
+    /// Does something with what leaves by a client's connection, and answers the commands that are lost thereby.
+    pub(super) fn with_ledger<H: Host>(
+        &mut self,
+        now_ns: u64,
+        client: ClientIndex,
+        host: &mut H,
+        work: impl FnOnce(&mut Outgoing, &mut Ledger<'_, H>),
+    ) {
+        let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return };
+        let Member { outgoing, name, .. } = &mut **member;
+        let mut ledger = Ledger { counts: &self.counts, host: &mut *host, holder: name, answers: Vec::new() };
+        work(outgoing, &mut ledger);
+        let answers = ledger.answers;
+        self.say_all(now_ns, answers, host);
+    }
+
+    /// Sends answers on their way. Answers are not answered; what gives way to one is less important, so this ends.
+    fn say_all(&mut self, now_ns: u64, answers: Vec<(Head, Vec<u8>)>, host: &mut impl Host) {
+        for (head, body) in answers {
+            let carried = Carried { hops: 0, published_ns: now_ns, head, body: &body };
+            match self.table.client_of(head.to) {
+                Some(to) => {
+                    self.counts.came(head.priority);
+                    self.hand_over(now_ns, to, &carried, host);
+                }
+                None => self.lose(now_ns, &carried, Cause::NoRoute, host),
+            }
+        }
+    }
+}
+
+fn time_answer(now_ns: u64, asked: &Asked, time: Option<TimeRecord>) -> TimeAnswer {
+    let Asked { asked_ns, came_ns, .. } = *asked;
+    let unknown = TimeAnswer { asked_ns, came_ns, left_ns: now_ns, system_ns: 0, error_ns: ERROR_UNKNOWN_NS, epoch: 0 };
+    time.map_or(unknown, |record| {
+        let system = record.at(now_ns);
+        let error_ns = u64::try_from(system.error.as_nanos()).unwrap_or(ERROR_UNKNOWN_NS).min(ERROR_UNKNOWN_NS);
+        TimeAnswer { system_ns: system.ns, error_ns, epoch: system.epoch, ..unknown }
+    })
+}

@@ -1,0 +1,162 @@
+//! What comes from clients, and who may take part.
+
+use super::member::{Asked, Judged, Refused, State};
+use super::{Event, Host, Server};
+use crate::broken::broken;
+use crate::session::frame::{
+    BadFrame, GREETING_LENGTH_MAX, Hello, LENGTH_MAX, Message, NAME_BYTES_MAX, Ranges, Reason,
+};
+use crate::session::frame::{Range, Verdict};
+use crate::session::{ClientIndex, LOOK_EVERY_NS};
+use rohrpost_mailbox::Name;
+
+/// Who is refused has so long to read why.
+const LEAVE_WITHIN_NS: u64 = 5 * LOOK_EVERY_NS;
+
+/// What differs, and who has what it should be.
+struct Difference {
+    reason: Reason,
+    digests: (u64, u64),
+    holder: String,
+}
+
+impl Server {
+    /// Takes bytes of a client's stream, split anywhere.
+    pub fn received(&mut self, now_ns: u64, client: ClientIndex, mut bytes: &[u8], host: &mut impl Host) {
+        let Some(member) = self.member_mut(client) else { return };
+        member.heard_ns = now_ns;
+        let mut splitter = std::mem::take(&mut member.splitter);
+        loop {
+            let length_max = match self.member(client).map(|member| member.state) {
+                Some(State::Greeting) => GREETING_LENGTH_MAX,
+                Some(State::Member) => LENGTH_MAX,
+                // What it still says nobody reads.
+                Some(State::Leaving { .. }) | None => return,
+            };
+            let message = match splitter.next(now_ns, length_max, &mut bytes) {
+                Ok(None) => break,
+                Ok(Some((head, rest))) => Message::parse(head, rest),
+                Err(bad) => Err(bad),
+            };
+            match message {
+                Ok(message) => self.handle(now_ns, client, &message, host),
+                Err(bad) => self.refuse_bad(now_ns, client, bad, host),
+            }
+        }
+        if let Some(member) = self.member_mut(client) {
+            member.splitter = splitter;
+        }
+    }
+
+    fn handle(&mut self, now_ns: u64, client: ClientIndex, message: &Message<'_>, host: &mut impl Host) {
+        let Some(member) = self.member_mut(client) else { return };
+        match (member.state, message) {
+            (State::Greeting, Message::Hello(hello)) => self.greet(now_ns, client, hello, host),
+            (State::Member, Message::Register(ranges)) => self.register(client, *ranges, host),
+            (State::Member, Message::Package(carried)) => self.carry(now_ns, client, carried, host),
+            (State::Member, Message::Ask(asked_ns)) => {
+                // Of several questions the last is answered: that bounds what waits.
+                let by_hello = member.asked.is_some_and(|asked| asked.by_hello);
+                member.asked = Some(Asked { asked_ns: *asked_ns, came_ns: now_ns, by_hello });
+                self.is_due(client);
+            }
+            _ => self.refuse_bad(now_ns, client, BadFrame::Damaged("a frame that is not for now"), host),
+        }
+    }
+
+    fn greet(&mut self, now_ns: u64, client: ClientIndex, hello: &Hello<'_>, host: &mut impl Host) {
+        if let Some(member) = self.member_mut(client) {
+            match member.certified {
+                None => hello.name.clone_into(&mut member.name),
+                Some(system) if system != hello.system => {
+                    let text = format!("its certificate is of system {system}, its hello of {}", hello.system);
+                    return self.refuse(now_ns, client, Reason::Certificate, (0, 0), &text, host);
+                }
+                Some(_) => {}
+            }
+        }
+        if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
+            return self.refuse(now_ns, client, reason, digests, &holder, host);
+        }
+        let same = self.present().find(|(_, member)| member.is_member() && member.life == hello.life);
+        if let Some((older, attempt)) = same.map(|(index, member)| (index, member.attempt)) {
+            if attempt >= hello.attempt {
+                return self.refuse(now_ns, client, Reason::Replaced, (0, 0), "", host);
+            }
+            self.refuse(now_ns, older, Reason::Replaced, (0, 0), "", host);
+        }
+        if self.present().filter(|(_, member)| member.is_member()).count() >= self.settings.clients_max.into() {
+            return self.refuse(now_ns, client, Reason::Full, (0, 0), "", host);
+        }
+        if let Some(member) = self.member_mut(client) {
+            member.joins(now_ns, hello);
+            host.event(Event::Joined { name: &member.name });
+        }
+        self.is_due(client);
+    }
+
+    fn difference(&self, hello: &Hello<'_>) -> Option<Difference> {
+        let settings = &self.settings;
+        if hello.common != settings.common && !broken!(TakesOtherCommon) {
+            let digests = (hello.common, settings.common);
+            return Some(Difference { reason: Reason::Common, digests, holder: settings.name.clone() });
+        }
+        let own = settings.system.filter(|(system, _)| *system == hello.system);
+        let own = own.map(|(_, digest)| (settings.name.as_str(), digest));
+        let first = || self.present().find(|(_, member)| member.is_member() && member.system == hello.system);
+        let held = own.or_else(|| first().map(|(_, member)| (member.name.as_str(), member.system_digest)));
+        let (holder, digest) = held.filter(|(_, digest)| *digest != hello.system_digest)?;
+        (!broken!(TakesOtherSystems)).then(|| Difference {
+            reason: Reason::System,
+            digests: (hello.system_digest, digest),
+            holder: holder.to_owned(),
+        })
+    }
+
+    fn register(&mut self, client: ClientIndex, ranges: Ranges<'_>, host: &mut impl Host) {
+        let Some(system) = self.member(client).map(|member| member.system) else { return };
+        let nothing = Range { first: Name::NONE, last: Name::NONE };
+        let mut verdict = Verdict { number: ranges.number, objection: None, range: nothing, holder: "" };
+        let mut holder = String::new();
+        if let Err(conflict) = self.table.register(client, system, ranges) {
+            verdict = Verdict { objection: Some(conflict.objection), range: conflict.range, ..verdict };
+            let held_by = conflict.holder.and_then(|holder| self.member(holder));
+            holder = held_by.map(|member| member.name.clone()).unwrap_or_default();
+        }
+        if let Some(member) = self.member_mut(client) {
+            if verdict.objection.is_some() {
+                host.event(Event::Objected { name: &member.name, verdict: &Verdict { holder: &holder, ..verdict } });
+            }
+            member.judged = Some(Judged { verdict, holder });
+        }
+        self.is_due(client);
+    }
+
+    fn refuse_bad(&mut self, now_ns: u64, client: ClientIndex, bad: BadFrame, host: &mut impl Host) {
+        let reason = if matches!(bad, BadFrame::Version(_)) { Reason::Version } else { Reason::Damaged };
+        self.refuse(now_ns, client, reason, (0, 0), &bad.to_string(), host);
+    }
+
+    /// Tells a client why it may not take part; then it is closed. What it hosted it hosts no more from now on.
+    pub(super) fn refuse(
+        &mut self,
+        now_ns: u64,
+        client: ClientIndex,
+        reason: Reason,
+        digests: (u64, u64),
+        text: &str,
+        host: &mut impl Host,
+    ) {
+        let Some(member) = self.member(client) else { return };
+        match member.state {
+            State::Leaving { .. } => return,
+            State::Greeting => host.event(Event::Refused { name: &member.name, reason, digests, text }),
+            State::Member => self.leave(now_ns, client, Some(reason), host),
+        }
+        let Some(member) = self.member_mut(client) else { return };
+        member.state = State::Leaving { until_ns: now_ns + LEAVE_WITHIN_NS };
+        let text = text[..text.floor_char_boundary(NAME_BYTES_MAX)].to_owned();
+        member.refused = Some(Refused { reason, digests, text });
+        self.is_due(client);
+    }
+}

@@ -1,0 +1,64 @@
+//! What time alone brings about: who is silent, stands still or takes too long; and what waited in vain.
+
+use super::member::{Member, State};
+use super::{Event, Host, Server};
+use crate::broken::broken;
+use crate::session::counts::Cause;
+use crate::session::frame::Reason;
+use crate::session::{ClientIndex, FRAME_MAX_NS, GREETING_MAX_NS, LOOK_EVERY_NS, SILENT_AFTER_NS, STALLED_AFTER_NS};
+
+/// A look that comes so late says that the server stood still itself: that nothing was heard says nothing then.
+const STOOD_STILL_NS: u64 = 4 * LOOK_EVERY_NS;
+
+impl Server {
+    pub(super) fn look(&mut self, now_ns: u64, host: &mut impl Host) {
+        let stood_still = self.looked_ns > 0 && now_ns > self.looked_ns + LOOK_EVERY_NS + STOOD_STILL_NS;
+        self.looked_ns = now_ns;
+        for index in 0..self.members.len() as u16 {
+            let client = ClientIndex(index);
+            let Some(member) = self.member_mut(client) else { continue };
+            if stood_still {
+                member.heard_ns = now_ns;
+            }
+            if member.outgoing.ready().is_empty() {
+                member.moved_ns = now_ns;
+            }
+            if member.is_over(now_ns) {
+                self.is_due(client);
+            } else if let Some((reason, text)) = objection(now_ns, member) {
+                self.refuse(now_ns, client, reason, (0, 0), text, host);
+            } else {
+                self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.look(now_ns, Cause::Stale, ledger));
+            }
+        }
+    }
+
+    /// A member is none any more: nobody else waits for it from now on.
+    pub(super) fn leave(&mut self, now_ns: u64, client: ClientIndex, why: Option<Reason>, host: &mut impl Host) {
+        let Some(member) = self.member(client).filter(|member| member.is_member()) else { return };
+        host.event(Event::Left { name: &member.name, why });
+        if !broken!(KeepsNames) {
+            self.table.remove(client);
+        }
+        if !broken!(ForgetsGone) {
+            self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));
+        }
+    }
+}
+
+/// Why a client may not go on.
+fn objection(now_ns: u64, member: &Member) -> Option<(Reason, &'static str)> {
+    let since = |past_ns: u64| now_ns.saturating_sub(past_ns);
+    match member.state {
+        State::Leaving { .. } => None,
+        State::Greeting if broken!(GreetsForEver) => None,
+        State::Greeting => (since(member.began_ns) > GREETING_MAX_NS).then_some((Reason::Silent, "no hello")),
+        State::Member if since(member.heard_ns) > SILENT_AFTER_NS && !broken!(WaitsForSilent) => {
+            Some((Reason::Silent, ""))
+        }
+        State::Member if member.splitter.waits_since().is_some_and(|began_ns| since(began_ns) > FRAME_MAX_NS) => {
+            Some((Reason::Silent, "a frame did not end"))
+        }
+        State::Member => (since(member.moved_ns) > STALLED_AFTER_NS).then_some((Reason::Stalled, "")),
+    }
+}

@@ -1,0 +1,132 @@
+//! One connection, as the server knows it.
+
+use crate::session::frame::{Hello, Reason, Verdict};
+use crate::session::outgoing::Outgoing;
+use crate::session::splitter::Splitter;
+
+/// How far a connection has come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum State {
+    /// It has not said hello.
+    Greeting,
+    /// It takes part.
+    Member,
+    /// It is told why it may not any more, and then closed.
+    Leaving {
+        /// When it is closed whether it has read that or not, ns.
+        until_ns: u64,
+    },
+}
+
+/// A question for the time that waits for its answer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    pub(super) asked_ns: u64,
+    pub(super) came_ns: u64,
+    /// It came with the hello: the answer is the welcome.
+    pub(super) by_hello: bool,
+}
+
+/// A verdict that waits for its way out.
+#[derive(Debug)]
+pub(super) struct Judged {
+    /// But for the holder.
+    pub(super) verdict: Verdict<'static>,
+    pub(super) holder: String,
+}
+
+/// A refusal that waits for its way out.
+#[derive(Debug)]
+pub(super) struct Refused {
+    pub(super) reason: Reason,
+    pub(super) digests: (u64, u64),
+    pub(super) text: String,
+}
+
+#[derive(Debug)]
+pub(super) struct Member {
+    pub(super) state: State,
+    /// Its name for people; until the hello, where it comes from.
+    pub(super) name: String,
+    pub(super) system: u8,
+    /// The system that it has proven to be of; none: it need not.
+    pub(super) certified: Option<u8>,
+    pub(super) system_digest: u64,
+    pub(super) reaches_own: bool,
+    pub(super) life: u64,
+    pub(super) attempt: u64,
+    pub(super) splitter: Splitter,
+    pub(super) outgoing: Outgoing,
+    pub(super) asked: Option<Asked>,
+    pub(super) judged: Option<Judged>,
+    pub(super) refused: Option<Refused>,
+    /// When the connection began, ns.
+    pub(super) began_ns: u64,
+    /// When something came last, ns.
+    pub(super) heard_ns: u64,
+    /// When the stream last took something, or there was nothing to take, ns.
+    pub(super) moved_ns: u64,
+    /// The stream takes nothing for now.
+    pub(super) is_blocked: bool,
+    /// It stands in the list of those for which something is to be done.
+    pub(super) is_due: bool,
+}
+
+impl Member {
+    pub(super) fn new(now_ns: u64, peer: &str, quota_bytes: usize) -> Self {
+        Self {
+            state: State::Greeting,
+            name: peer.to_owned(),
+            system: 0,
+            certified: None,
+            system_digest: 0,
+            reaches_own: false,
+            life: 0,
+            attempt: 0,
+            splitter: Splitter::default(),
+            outgoing: Outgoing::new(quota_bytes),
+            asked: None,
+            judged: None,
+            refused: None,
+            began_ns: now_ns,
+            heard_ns: now_ns,
+            moved_ns: now_ns,
+            is_blocked: false,
+            is_due: false,
+        }
+    }
+
+    /// It said hello, and may take part.
+    pub(super) fn joins(&mut self, now_ns: u64, hello: &Hello<'_>) {
+        self.state = State::Member;
+        if self.certified.is_none() {
+            hello.name.clone_into(&mut self.name);
+        }
+        self.system = hello.system;
+        self.system_digest = hello.system_digest;
+        self.reaches_own = hello.reaches_own;
+        self.life = hello.life;
+        self.attempt = hello.attempt;
+        self.asked = Some(Asked { asked_ns: hello.asked_ns, came_ns: now_ns, by_hello: true });
+    }
+
+    /// Whether it had its time to read why it must leave.
+    pub(super) fn is_over(&self, now_ns: u64) -> bool {
+        matches!(self.state, State::Leaving { until_ns } if now_ns >= until_ns)
+    }
+
+    pub(super) fn is_member(&self) -> bool {
+        self.state == State::Member
+    }
+
+    /// Whether there is more to be written than what is ready.
+    pub(super) fn has_more(&self) -> bool {
+        let is_leaving = matches!(self.state, State::Leaving { .. });
+        let says = self.asked.is_some() || self.judged.is_some() || self.refused.is_some();
+        is_leaving || says || self.outgoing.has_waiting()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of::<Self>() + self.name.capacity() + self.splitter.bytes() + self.outgoing.bytes()
+    }
+}

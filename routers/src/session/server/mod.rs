@@ -1,0 +1,314 @@
+//! The server: takes what clients send, and gives it to the client that hosts the name.
+//!
+//! ```text
+//!  accept ─▶ greeting ─ hello ─▶ member ─ register ─▶ Table        received ─▶ intake ─▶ carry ─▶ Outgoing of another
+//!               │ too long, wrong      │ silent, stalled, replaced                                   │
+//!               └──── refusal ────▶ leaving ─▶ closed                poll ─▶ Write, Close, Wait ◀────┘
+//! ```
+
+mod carry;
+mod intake;
+mod look;
+mod member;
+
+pub use member::State;
+
+use super::ClientIndex;
+use super::counts::Counts;
+use super::frame::{Reason, Verdict};
+use super::table::Table;
+use super::{Answers, LOOK_EVERY_NS};
+use member::Member;
+use rohrpost_mailbox::TimeRecord;
+use std::collections::VecDeque;
+
+/// What the server knows before the first client.
+#[derive(Clone, Debug)]
+pub struct ServerSettings {
+    /// For people: what refusals call it.
+    pub name: String,
+    /// Digest of what must be equal everywhere.
+    pub common: u64,
+    /// Its own system, and the digest of what must be equal inside it. Of other systems the first client says it.
+    pub system: Option<(u8, u64)>,
+    /// Tells this life from others; not 0.
+    pub life: u64,
+    /// Clients that may take part at a time.
+    pub clients_max: u16,
+    /// Connections that have not said hello yet; of more the oldest gives way.
+    pub greetings_max: u16,
+    /// Bytes of packages that wait for one client.
+    pub quota_bytes: usize,
+    /// Level of each priority; 0 goes first.
+    pub levels: [u8; 256],
+}
+
+/// A connection, for people.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Its place.
+    pub index: ClientIndex,
+    /// Its name; until its hello, where it comes from.
+    pub name: &'a str,
+    /// First byte of the names that it may host; 0 until its hello.
+    pub system: u8,
+    /// Whether it takes part.
+    pub is_member: bool,
+    /// When the connection was made, ns.
+    pub began_ns: u64,
+    /// When something came last, ns.
+    pub heard_ns: u64,
+    /// Bytes of memory that it takes up; what all share is not counted.
+    pub bytes: usize,
+}
+
+/// What to do.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Output {
+    /// Write what [`Server::ready`] has, then say how much with [`Server::took`].
+    Write(ClientIndex),
+    /// Close the connection; the index is free.
+    Close(ClientIndex),
+    /// Nothing before this time, unless something comes.
+    Wait {
+        /// Ns of the monotonic clock.
+        until_ns: u64,
+    },
+}
+
+/// What people want to know of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Event<'a> {
+    /// A client takes part.
+    Joined {
+        /// Its name.
+        name: &'a str,
+    },
+    /// It does not any more. None: it closed the connection, or that broke.
+    Left {
+        /// Its name.
+        name: &'a str,
+        /// Why.
+        why: Option<Reason>,
+    },
+    /// One was not let in.
+    Refused {
+        /// Its name, as far as it is known.
+        name: &'a str,
+        /// Why.
+        reason: Reason,
+        /// What differs: its, and what it should be.
+        digests: (u64, u64),
+        /// Who has that, or what was wrong.
+        text: &'a str,
+    },
+    /// A client may not host what it says.
+    Objected {
+        /// Its name.
+        name: &'a str,
+        /// What it was told.
+        verdict: &'a Verdict<'a>,
+    },
+}
+
+/// What the server asks of who runs it.
+pub trait Host: Answers {
+    /// Something happened.
+    fn event(&mut self, event: Event<'_>);
+}
+
+/// The server.
+#[derive(Debug)]
+pub struct Server {
+    settings: ServerSettings,
+    members: Vec<Option<Box<Member>>>,
+    table: Table,
+    counts: Counts,
+    /// Clients for which something is to be done.
+    due: VecDeque<ClientIndex>,
+    time: Option<TimeRecord>,
+    look_ns: u64,
+    looked_ns: u64,
+}
+
+impl Server {
+    /// Without clients.
+    pub fn new(settings: ServerSettings) -> Self {
+        Self {
+            settings,
+            members: Vec::new(),
+            table: Table::default(),
+            counts: Counts::default(),
+            due: VecDeque::new(),
+            time: None,
+            look_ns: 0,
+            looked_ns: 0,
+        }
+    }
+
+    /// What it counts.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Who hosts what.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// System time, as answers tell it from now on.
+    pub fn set_time(&mut self, time: Option<TimeRecord>) {
+        self.time = time;
+    }
+
+    /// Name and state of each client.
+    pub fn clients(&self) -> impl Iterator<Item = (ClientIndex, &str, State)> {
+        self.present().map(|(index, member)| (index, member.name.as_str(), member.state))
+    }
+
+    /// All connections.
+    pub fn views(&self) -> impl Iterator<Item = View<'_>> {
+        self.present().map(|(index, member)| View {
+            index,
+            name: &member.name,
+            system: member.system,
+            is_member: member.is_member(),
+            began_ns: member.began_ns,
+            heard_ns: member.heard_ns,
+            bytes: member.bytes(),
+        })
+    }
+
+    /// Bytes of memory that a client takes up; what all share is not counted.
+    pub fn bytes_of(&self, client: ClientIndex) -> usize {
+        self.member(client).map_or(0, |member| member.bytes())
+    }
+
+    /// A connection was made. `peer` is for people. None: so many are there that it must be closed.
+    pub fn accept(&mut self, now_ns: u64, peer: &str, host: &mut impl Host) -> Option<ClientIndex> {
+        let is_greeting = |member: &&Member| member.state == State::Greeting;
+        let greetings = self.present().map(|(_, member)| member).filter(is_greeting).count();
+        if greetings >= self.settings.greetings_max.into() {
+            let oldest =
+                self.present().filter(|(_, member)| is_greeting(member)).min_by_key(|(_, member)| member.began_ns);
+            let oldest = oldest.map(|(index, _)| index)?;
+            self.refuse(now_ns, oldest, Reason::Silent, (0, 0), "others wait to be let in", host);
+        }
+        let index = match self.members.iter().position(Option::is_none) {
+            Some(free) => free,
+            None if self.members.len() < self.places_max() => {
+                self.members.push(None);
+                self.members.len() - 1
+            }
+            None => return None,
+        };
+        self.members[index] = Some(Box::new(Member::new(now_ns, peer, self.settings.quota_bytes)));
+        Some(ClientIndex(index as u16))
+    }
+
+    /// A client has proven, before its hello, of which system it is, and what people call it: it may say no other in its hello.
+    pub fn certify(&mut self, client: ClientIndex, system: u8, name: &str) {
+        if let Some(member) = self.member_mut(client) {
+            name.clone_into(&mut member.name);
+            member.certified = Some(system);
+        }
+    }
+
+    /// Bytes to be written to a client.
+    pub fn ready(&self, client: ClientIndex) -> &[u8] {
+        self.member(client).map_or(&[], |member| member.outgoing.ready())
+    }
+
+    /// The stream has taken so many of them. If those were not all, nothing more is written until [`Server::writable`].
+    pub fn took(&mut self, now_ns: u64, client: ClientIndex, bytes: usize) {
+        let Some(member) = self.member_mut(client) else { return };
+        member.outgoing.took(bytes);
+        if bytes > 0 {
+            member.moved_ns = now_ns;
+        }
+        member.is_blocked = !member.outgoing.ready().is_empty();
+        if !member.is_blocked && member.has_more() {
+            self.is_due(client);
+        }
+    }
+
+    /// The stream takes bytes again.
+    pub fn writable(&mut self, client: ClientIndex) {
+        if let Some(member) = self.member_mut(client) {
+            member.is_blocked = false;
+            self.is_due(client);
+        }
+    }
+
+    /// The connection is closed, or broken. The index is free.
+    pub fn closed(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
+        self.leave(now_ns, client, None, host);
+        self.free(client);
+    }
+
+    /// All clients are told that the server ends.
+    pub fn end(&mut self, now_ns: u64, host: &mut impl Host) {
+        let all: Vec<_> = self.present().map(|(index, _)| index).collect();
+        for client in all {
+            self.refuse(now_ns, client, Reason::Ending, (0, 0), "", host);
+        }
+    }
+
+    /// What to do next.
+    pub fn poll(&mut self, now_ns: u64, host: &mut impl Host) -> Output {
+        if now_ns >= self.look_ns {
+            self.look_ns = now_ns + LOOK_EVERY_NS;
+            self.look(now_ns, host);
+        }
+        while let Some(client) = self.due.pop_front() {
+            let Some(member) = self.member_mut(client) else { continue };
+            member.is_due = false;
+            let is_over = member.is_over(now_ns);
+            if member.is_blocked && !is_over {
+                continue;
+            }
+            self.refill(now_ns, client, host);
+            match self.member(client) {
+                Some(member) if !member.outgoing.ready().is_empty() && !is_over => return Output::Write(client),
+                Some(member) if matches!(member.state, State::Leaving { .. }) => {
+                    self.free(client);
+                    return Output::Close(client);
+                }
+                _ => {}
+            }
+        }
+        Output::Wait { until_ns: self.look_ns }
+    }
+
+    fn places_max(&self) -> usize {
+        usize::from(self.settings.clients_max) + usize::from(self.settings.greetings_max)
+    }
+
+    fn present(&self) -> impl Iterator<Item = (ClientIndex, &Member)> {
+        let all = self.members.iter().enumerate();
+        all.filter_map(|(index, member)| member.as_deref().map(|member| (ClientIndex(index as u16), member)))
+    }
+
+    fn member(&self, client: ClientIndex) -> Option<&Member> {
+        self.members.get(usize::from(client.0))?.as_deref()
+    }
+
+    fn member_mut(&mut self, client: ClientIndex) -> Option<&mut Member> {
+        self.members.get_mut(usize::from(client.0))?.as_deref_mut()
+    }
+
+    fn is_due(&mut self, client: ClientIndex) {
+        if let Some(member) = self.member_mut(client).filter(|member| !member.is_due) {
+            member.is_due = true;
+            self.due.push_back(client);
+        }
+    }
+
+    /// The place is free; whoever comes into it is another.
+    fn free(&mut self, client: ClientIndex) {
+        if let Some(place) = self.members.get_mut(usize::from(client.0)) {
+            *place = None;
+            self.due.retain(|due| *due != client);
+        }
+    }
+}

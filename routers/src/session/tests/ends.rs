@@ -1,0 +1,446 @@
+//! Both ends by hand: what a table shows better than chance.
+
+use super::plan::{COMMON, QUOTA, client_settings, module, ranges, server_settings};
+use crate::report::NotDelivered;
+use crate::session::client::{self, Client, Package};
+use crate::session::frame::{Carried, FrameHead, HEAD_BYTES, HOPS_MAX, Hello, LENGTH_MAX, Message, Range, Ranges};
+use crate::session::server::{self, Server, State};
+use crate::session::{Answers, Cause, ClientIndex, GREETING_MAX_NS, SILENT_AFTER_NS};
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
+
+const MS: u64 = 1_000_000;
+const S: u64 = 1000 * MS;
+
+pub(super) const CHECKS: &[fn()] = &[
+    check_digests,
+    check_a_name_is_hosted_once,
+    check_the_narrowest_range,
+    check_hops,
+    check_slow_greetings,
+    check_silence,
+    check_to_all,
+    check_age,
+    check_pieces,
+];
+
+/// Notes all that is told.
+#[derive(Default)]
+struct Notes {
+    events: Vec<String>,
+    delivered: Vec<(Head, u8)>,
+    lost: Vec<Cause>,
+}
+
+impl Answers for Notes {
+    fn answer(&mut self, _: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
+        self.lost.push(why);
+        answer.extend(why.word().bytes());
+        true
+    }
+}
+
+impl client::Host for Notes {
+    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
+        self.delivered.push((carried.head, carried.hops));
+        Ok(())
+    }
+
+    fn event(&mut self, event: client::Event<'_>) {
+        self.events.push(match event {
+            client::Event::Refused(refusal) => refusal.to_string(),
+            client::Event::Objected(verdict) => verdict.to_string(),
+            other => format!("{other:?}"),
+        });
+    }
+}
+
+impl server::Host for Notes {
+    fn event(&mut self, event: server::Event<'_>) {
+        self.events.push(format!("{event:?}"));
+    }
+}
+
+/// A server, and clients that are joined to it without delay.
+struct Ground {
+    now_ns: u64,
+    server: Server,
+    said: Notes,
+    ends: Vec<(Client, Option<ClientIndex>, Notes)>,
+}
+
+impl Ground {
+    fn new(clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>) -> Self {
+        let now_ns = 100 * S;
+        let server = Server::new(server_settings(5));
+        let end = |(settings, ranges)| (Client::new(settings, ranges, now_ns), None, Notes::default());
+        let mut ground = Self { now_ns, server, said: Notes::default(), ends: clients.into_iter().map(end).collect() };
+        ground.settle();
+        ground
+    }
+
+    fn clients(count: usize) -> Self {
+        Self::new((0..count).map(|client| (client_settings(client, 100 + client as u64), ranges(client))))
+    }
+
+    /// Until nobody has anything to do.
+    fn settle(&mut self) {
+        for _ in 0..20 {
+            for (client, place, notes) in &mut self.ends {
+                loop {
+                    match client.poll(self.now_ns, notes) {
+                        client::Output::Connect => {
+                            *place = self.server.accept(self.now_ns, "somewhere", &mut self.said);
+                            client.connected(self.now_ns);
+                        }
+                        client::Output::Write => {
+                            let bytes = client.ready().to_vec();
+                            client.took(self.now_ns, bytes.len());
+                            if let Some(place) = *place {
+                                self.server.received(self.now_ns, place, &bytes, &mut self.said);
+                            }
+                        }
+                        client::Output::Close => *place = None,
+                        client::Output::Wait { .. } => break,
+                    }
+                }
+            }
+            self.serve();
+        }
+    }
+
+    fn serve(&mut self) {
+        loop {
+            match self.server.poll(self.now_ns, &mut self.said) {
+                server::Output::Write(index) => {
+                    let bytes = self.server.ready(index).to_vec();
+                    self.server.took(self.now_ns, index, bytes.len());
+                    let end = self.ends.iter_mut().find(|(_, place, _)| *place == Some(index));
+                    if let Some((client, _, notes)) = end {
+                        client.received(self.now_ns, &bytes, notes);
+                    }
+                }
+                server::Output::Close(index) => {
+                    let end = self.ends.iter_mut().find(|(_, place, _)| *place == Some(index));
+                    if let Some((client, place, notes)) = end {
+                        *place = None;
+                        client.closed(self.now_ns, notes);
+                    }
+                }
+                server::Output::Wait { .. } => return,
+            }
+        }
+    }
+
+    fn send(&mut self, from: usize, to: Name, hops: u8) {
+        let head = Head {
+            to,
+            from: module(from).with_local(1),
+            len: 8,
+            kind: Type::command(16),
+            priority: Priority(60),
+            ..Head::default()
+        };
+        let package = Package { head, body: &[0; 8], published_ns: self.now_ns, hops };
+        let (client, _, notes) = &mut self.ends[from];
+        client.send(self.now_ns, &package, notes);
+        self.settle();
+    }
+
+    fn delivered(&self, client: usize) -> Vec<Name> {
+        self.ends[client].2.delivered.iter().filter(|(head, _)| head.kind.0 > 0).map(|(head, _)| head.to).collect()
+    }
+}
+
+fn check_digests() {
+    let settings = client_settings(0, 9);
+    let wrong = client::ClientSettings { common: 0xabc, ..settings.clone() };
+    let ground = Ground::new([(wrong, ranges(0))]);
+    let words = &ground.ends[0].2.events;
+    assert!(words.len() == 1 && words[0].contains("0abc, that of the server 0000000000000007"), "{words:?}");
+    assert!(ground.said.events[0].contains("Refused"), "{:?}", ground.said.events);
+    // The server's own system, and one of which the first client says the digest.
+    for (client, holder) in [(0, "the server"), (4, "client 1")] {
+        let first = client_settings(1, 8);
+        let wrong = client::ClientSettings { system_digest: 0xdef, ..client_settings(client, 9) };
+        let ground = Ground::new([(first, ranges(1)), (wrong, ranges(client))]);
+        let words = &ground.ends[1].2.events;
+        assert!(words.len() == 1 && words[0].contains(&format!("0def, that of {holder} ")), "{words:?}");
+        assert!(ground.ends[0].0.is_up() && !ground.ends[1].0.is_up());
+    }
+}
+
+#[test]
+fn who_has_another_digest_takes_no_part_and_is_told_both() {
+    check_digests();
+}
+
+fn check_a_name_is_hosted_once() {
+    let mut ground = Ground::new([(client_settings(0, 8), ranges(0)), (client_settings(3, 9), ranges(0))]);
+    let words = ground.ends[1].2.events.clone();
+    assert!(words.len() == 1 && words[0].contains("is hosted by client 0; end it"), "{words:?}");
+    assert!(ground.ends[0].0.is_up() && !ground.ends[1].0.is_up());
+    // When its holder has gone, the names are free.
+    let place = ground.ends[0].1.take().unwrap();
+    ground.server.closed(ground.now_ns, place, &mut ground.said);
+    ground.now_ns += S;
+    ground.settle();
+    assert!(ground.ends[1].0.is_up(), "{:?}", ground.ends[1].2.events);
+}
+
+#[test]
+fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
+    check_a_name_is_hosted_once();
+}
+
+fn check_the_narrowest_range() {
+    let mut ground = Ground::clients(4);
+    let (narrow, wide) = (Name::new(1, 105, 0, 0), Name::new(1, 105, 1, 0));
+    ground.send(1, narrow, 0);
+    ground.send(1, wide, 0);
+    assert_eq!((ground.delivered(0), ground.delivered(3)), (vec![wide], vec![narrow]));
+    // What its host cannot deliver itself does not come back to it.
+    ground.send(0, wide, 0);
+    assert_eq!(ground.delivered(0), [wide]);
+    assert_eq!(ground.said.lost, [Cause::NoRoute]);
+    let (answer, _) = ground.ends[0].2.delivered.last().unwrap();
+    assert_eq!((answer.from, answer.to, answer.kind), (wide, module(0).with_local(1), Type::reply(16)));
+}
+
+#[test]
+fn packages_go_to_who_hosts_the_narrowest_range_and_never_back() {
+    check_the_narrowest_range();
+}
+
+fn check_hops() {
+    let mut ground = Ground::clients(3);
+    ground.send(0, module(1), 3);
+    assert_eq!(ground.ends[1].2.delivered[0].1, 4, "one further");
+    ground.send(0, module(1), HOPS_MAX);
+    assert_eq!(ground.delivered(1).len(), 1);
+    assert_eq!(ground.said.lost, [Cause::Hops]);
+}
+
+#[test]
+fn a_package_that_goes_round_is_stopped() {
+    check_hops();
+}
+
+fn check_slow_greetings() {
+    let mut ground = Ground::clients(1);
+    let slow = ground.server.accept(ground.now_ns, "slow", &mut ground.said).unwrap();
+    // Bytes come all the time, and never a whole hello.
+    let mut waited_ns = 0;
+    while ground.server.clients().any(|(index, _, _)| index == slow) {
+        ground.server.received(
+            ground.now_ns,
+            slow,
+            &[[200, 0, 0, 0, 1, 0, 0, 0, 9][(waited_ns / (100 * MS)).min(8) as usize]],
+            &mut ground.said,
+        );
+        ground.now_ns += 100 * MS;
+        waited_ns += 100 * MS;
+        ground.settle();
+        assert!(waited_ns < GREETING_MAX_NS + 2 * S, "still there");
+    }
+    // Many of them do not keep others out: the oldest gives way.
+    for _ in 0..20 {
+        let _ = ground.server.accept(ground.now_ns, "slow", &mut ground.said);
+    }
+    ground.settle();
+    let greeting = ground.server.clients().filter(|(_, _, state)| *state == State::Greeting).count();
+    assert!(greeting <= 4 && ground.ends[0].0.is_up(), "{greeting}");
+}
+
+#[test]
+fn who_is_slow_to_say_hello_is_closed_and_keeps_nobody_out() {
+    check_slow_greetings();
+}
+
+fn check_silence() {
+    let mut ground = Ground::clients(2);
+    ground.ends[1].1 = None;
+    for _ in 0..SILENT_AFTER_NS / (100 * MS) + 5 {
+        ground.now_ns += 100 * MS;
+        ground.settle();
+    }
+    let names: Vec<_> = ground.server.clients().map(|(_, name, _)| name.to_owned()).collect();
+    assert!(!names.contains(&"client 1".to_owned()) || ground.ends[1].1.is_some(), "{names:?}");
+    assert!(ground.said.events.iter().any(|event| event.contains("Silent")), "{:?}", ground.said.events);
+    assert!(ground.ends[0].0.is_up(), "the other is as it was");
+}
+
+#[test]
+fn who_is_silent_is_gone() {
+    check_silence();
+}
+
+fn check_to_all() {
+    // Clients 0 and 3 are of system 1; 0 reaches its own system, 3 does not.
+    let all = Name::new(ALL_SYSTEMS, 40, 0, 0);
+    let at = |system| Name::new(system, 40, 0, 0);
+    let mut ground = Ground::clients(6);
+    ground.send(0, all, 0);
+    let got = |ground: &Ground| (0..6).map(|client| ground.delivered(client)).collect::<Vec<_>>();
+    assert_eq!(got(&ground), [vec![], vec![at(2)], vec![at(3)], vec![], vec![], vec![]]);
+    ground.send(3, all, 0);
+    assert_eq!(got(&ground), [vec![at(1)], vec![at(2); 2], vec![at(3); 2], vec![], vec![], vec![]]);
+    // Nobody waits for an answer to it.
+    ground.send(0, Name::new(ALL_SYSTEMS, 41, 0, 0), 0);
+    assert_eq!(ground.said.lost, []);
+    assert_eq!(ground.server.counts().lost_for(Cause::NoRoute), 1);
+}
+
+#[test]
+fn what_goes_to_all_systems_comes_once_to_each() {
+    check_to_all();
+}
+
+fn check_age() {
+    let mut ground = Ground::clients(2);
+    let head =
+        Head { to: module(1), from: module(0).with_local(1), len: 8, kind: Type::command(16), ..Head::default() };
+    let (client, place, notes) = &mut ground.ends[0];
+    client.send(ground.now_ns, &Package { head, body: &[0; 8], published_ns: ground.now_ns, hops: 0 }, notes);
+    let bytes = client.ready().to_vec();
+    client.took(ground.now_ns, bytes.len());
+    // The stream holds it for a second, to the server and once more from there.
+    ground.now_ns += S;
+    ground.server.received(ground.now_ns, place.unwrap(), &bytes, &mut ground.said);
+    let server::Output::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) else { panic!("it leaves") };
+    let bytes = ground.server.ready(index).to_vec();
+    ground.server.took(ground.now_ns, index, bytes.len());
+    ground.now_ns += S;
+    let (client, _, notes) = &mut ground.ends[1];
+    client.received(ground.now_ns, &bytes, notes);
+    assert_eq!(
+        (notes.delivered.len(), &notes.lost[..]),
+        (0, &[Cause::Stale][..]),
+        "a command two seconds old is not run"
+    );
+}
+
+#[test]
+fn what_the_streams_held_for_too_long_is_not_delivered() {
+    check_age();
+}
+
+fn check_pieces() {
+    let mut ground = Ground::clients(2);
+    let head = Head { to: module(1), from: module(0), len: 3, ..Head::default() };
+    let mut bytes = Vec::new();
+    for _ in 0..3 {
+        Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[1, 2, 3] }).write(&mut bytes);
+    }
+    let place = ground.ends[0].1.unwrap();
+    bytes.iter().for_each(|byte| ground.server.received(ground.now_ns, place, &[*byte], &mut ground.said));
+    ground.settle();
+    assert_eq!(ground.ends[1].2.delivered.len(), 3);
+}
+
+#[test]
+fn frames_that_come_byte_by_byte_are_whole() {
+    check_pieces();
+}
+
+#[test]
+fn what_a_stranger_says_takes_no_memory_and_is_told_to_him() {
+    for (bytes, words) in [
+        (b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n".to_vec(), "unknown kind"),
+        (vec![0xff, 0xff, 0xff, 0xff, 1, 0, 0, 0], "4294967295 bytes is too long"),
+        (vec![8, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], "not for now"),
+    ] {
+        let mut ground = Ground::new([]);
+        let place = ground.server.accept(ground.now_ns, "stranger", &mut ground.said).unwrap();
+        ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
+        assert!(ground.said.events[0].contains(words), "{:?}", ground.said.events);
+        assert!(ground.server.bytes_of(place) < 4096);
+        let server::Output::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) else {
+            panic!("{words}")
+        };
+        let (head, rest) = ground.server.ready(index).split_first_chunk::<HEAD_BYTES>().unwrap();
+        let head = FrameHead::parse(head, LENGTH_MAX).unwrap();
+        assert!(matches!(Message::parse(head, rest), Ok(Message::Refusal(refusal)) if refusal.text.contains(words)));
+        let bytes = ground.server.ready(index).len();
+        ground.server.took(ground.now_ns, index, bytes);
+        assert_eq!(ground.server.poll(ground.now_ns, &mut ground.said), server::Output::Close(place));
+    }
+}
+
+#[test]
+fn an_idle_client_takes_up_little() {
+    let mut ground = Ground::clients(2);
+    for _ in 0..100 {
+        ground.send(0, module(1), 0);
+        ground.now_ns += 100 * MS;
+    }
+    for (index, _, _) in ground.server.clients() {
+        assert!(ground.server.bytes_of(index) < 32 * 1024, "{}", ground.server.bytes_of(index));
+    }
+}
+
+#[test]
+fn what_waits_is_bounded_and_the_least_important_gives_way() {
+    let mut ground = Ground::clients(2);
+    let from = ground.ends[0].1.unwrap();
+    let reader = ground.ends[1].1.unwrap();
+    // The reader's stream takes nothing any more.
+    let send = |ground: &mut Ground, priority: u8, count: usize| {
+        for _ in 0..count {
+            let priority = Priority(priority);
+            let head =
+                Head { to: module(1), from: module(0), len: 1000, kind: Type::data(1), priority, ..Head::default() };
+            let mut bytes = Vec::new();
+            Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut bytes);
+            ground.server.received(ground.now_ns, from, &bytes, &mut ground.said);
+            while let server::Output::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) {
+                let taken = if index == reader { 0 } else { ground.server.ready(index).len() };
+                ground.server.took(ground.now_ns, index, taken);
+            }
+        }
+    };
+    send(&mut ground, 40, 500);
+    let full = |ground: &Ground, class: u8| ground.server.counts().class(Priority(class)).lost(Cause::Full);
+    assert!(full(&ground, 40) > 300);
+    let before = full(&ground, 40);
+    send(&mut ground, 200, 20);
+    assert_eq!((full(&ground, 200), full(&ground, 40)), (0, before + 20), "one gives way for each");
+    assert!(ground.server.bytes_of(reader) < QUOTA + 32 * 1024);
+}
+
+#[test]
+fn names_of_others_are_sent_by_nobody() {
+    let mut ground = Ground::clients(2);
+    let mut bytes = Vec::new();
+    let head = Head { to: module(1), from: module(1), ..Head::default() };
+    Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
+    let place = ground.ends[0].1.unwrap();
+    ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
+    ground.settle();
+    assert_eq!(ground.delivered(1), []);
+    assert_eq!(ground.server.counts().lost_for(Cause::Foreign), 1);
+}
+
+#[test]
+fn a_later_connection_of_the_same_life_takes_the_place_of_the_earlier() {
+    let mut ground = Ground::clients(2);
+    let old = ground.ends[0].1.unwrap();
+    let place = ground.server.accept(ground.now_ns, "again", &mut ground.said).unwrap();
+    let hello = Hello {
+        system: 1,
+        reaches_own: true,
+        common: COMMON,
+        system_digest: 11,
+        life: 100,
+        attempt: 2,
+        asked_ns: 1,
+        name: "client 0",
+    };
+    let mut bytes = Vec::new();
+    Message::Hello(hello).write(&mut bytes);
+    let mut laid_out = Vec::new();
+    Message::Register(Ranges::new(1, &ranges(0), &mut laid_out)).write(&mut bytes);
+    ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
+    assert_eq!(ground.server.table().client_of(module(0)), Some(place));
+    let state = ground.server.clients().find(|(index, _, _)| *index == old).map(|(_, _, state)| state);
+    assert!(matches!(state, Some(State::Leaving { .. })), "{state:?}");
+}

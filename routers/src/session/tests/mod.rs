@@ -1,0 +1,151 @@
+//! Sessions in simulated networks, and the same with a mistake switched on: `ROHRPOST_SIM_SEEDS=1000` for more of them.
+
+mod book;
+mod ends;
+mod pipe;
+mod plan;
+mod world;
+
+use crate::broken::{Broken, with};
+use crate::session::client::BACKOFF_MAX_NS;
+use ends::CHECKS;
+use plan::{Plan, module};
+use rohrpost_mailbox::{Head, Priority, Type};
+use std::collections::BTreeMap;
+use world::{MS, S, World};
+
+/// After the last fault all clients are registered again within so long: silence is noticed, a greeting given up, and the longest
+/// wait is over.
+const WELL_NS: u64 = 10 * S;
+const SEEDS: u64 = 30;
+/// What must have been seen in each ten networks.
+const SEEN_IN_TEN: [(&str, u64); 17] = [
+    ("delivered", 5000),
+    ("to all", 300),
+    ("answered", 300),
+    ("no-route", 100),
+    ("full", 10),
+    ("stale", 3),
+    ("gone", 1),
+    ("offline", 10),
+    ("no-mailbox", 10),
+    ("up", 100),
+    ("down", 50),
+    ("silent", 3),
+    ("objected", 1),
+    ("server restarted", 5),
+    ("client restarted", 5),
+    ("line faults", 50),
+    ("posted", 20_000),
+];
+
+/// One seed: all goes wrong for a while, then all must be well.
+fn run(plan: Plan) -> World {
+    let seed = plan.seed;
+    let mut world = World::new(plan);
+    world.run(15 * S);
+    (world.may_fail, world.may_post) = (false, false);
+    world.run(WELL_NS);
+    if world.book.problems.is_empty() {
+        for index in 0..world.nodes.len() {
+            if !world.nodes[index].client.is_up() {
+                world.book.broken(format!("client {index} is not up again"));
+            }
+        }
+        all_are_reached(&mut world);
+        world.check_server(true);
+        world.check_clients();
+    }
+    world.book.problems.iter_mut().for_each(|problem| *problem = format!("seed {seed}, {problem}"));
+    world
+}
+
+/// Each sends something to each other, and all of it comes, but what a mailbox does not take.
+fn all_are_reached(world: &mut World) {
+    let before = world.book.packages.len();
+    let clients = world.nodes.len();
+    for (from, to) in (0..clients).flat_map(|from| (0..clients).map(move |to| (from, to))).filter(|(a, b)| a != b) {
+        let (priority, kind) = (Priority(60), Type::command(16));
+        let head =
+            Head { to: module(to), from: module(from).with_local(1), len: 40, kind, priority, ..Head::default() };
+        world.send(from, head, false);
+    }
+    world.run(3 * S);
+    let lost =
+        world.book.packages[before..].iter().filter(|package| package.delivered.is_empty() && !package.said_lost);
+    let lost: Vec<String> = lost.map(|package| format!("{:?} never came", package.head)).collect();
+    lost.into_iter().for_each(|text| world.book.broken(text));
+}
+
+fn seeds() -> u64 {
+    std::env::var("ROHRPOST_SIM_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(SEEDS)
+}
+
+#[test]
+fn sessions_keep_their_promises_whatever_goes_wrong() {
+    let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
+    for seed in 0..seeds() {
+        let world = run(Plan::rough(seed));
+        assert_eq!(world.book.problems, [""; 0]);
+        world.book.seen.iter().for_each(|(what, count)| *seen.entry(what).or_default() += count);
+    }
+    eprintln!("{} networks: {seen:#?}", seeds());
+    for (what, least) in SEEN_IN_TEN {
+        assert!(seen.get(what).copied() >= Some(least * seeds() / 10), "too few of `{what}` to prove much: {seen:#?}");
+    }
+}
+
+#[test]
+fn a_client_that_stands_still_changes_nothing_for_the_others() {
+    for seed in 0..4 {
+        let stalled = 1;
+        // How old packages among the others are when they come, ns.
+        let ages = |is_stalled: bool| {
+            let mut world = World::new(Plan { stalled: is_stalled.then_some(stalled), ..Plan::calm(seed) });
+            world.run(8 * S);
+            assert_eq!(world.book.problems, [""; 0]);
+            let others = world.book.log.iter().filter(|(_, from, to)| *from != stalled && *to != stalled);
+            let mut ages: Vec<u64> = others.map(|(age_ns, _, _)| *age_ns).collect();
+            ages.sort_unstable();
+            ages
+        };
+        let (alone, beside) = (ages(false), ages(true));
+        let last = |ages: &[u64]| ages[ages.len() * 99 / 100];
+        assert!(alone.len() > 500 && beside.len() * 100 > alone.len() * 93, "{} and {}", alone.len(), beside.len());
+        assert!(last(&beside) * 10 < last(&alone) * 12, "seed {seed}: {} and {} ns", last(&alone), last(&beside));
+    }
+}
+
+#[test]
+fn who_finds_no_server_tries_ever_less_often() {
+    check_backoff();
+}
+
+fn check_backoff() {
+    let mut world = World::new(Plan { clients: 3, ..Plan::calm(1) });
+    world.end_server();
+    world.run(20 * S);
+    for node in &world.nodes {
+        let least = 20 * S / BACKOFF_MAX_NS;
+        assert!((least..4 * least).contains(&node.attempts), "{} attempts", node.attempts);
+    }
+}
+
+/// Each mistake fails a check, or breaks a promise in some network.
+#[test]
+fn every_mistake_is_noticed() {
+    let mut missed = Vec::new();
+    for broken in Broken::SESSION {
+        let fails = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
+        let by_check = CHECKS.iter().chain(&[check_backoff as fn()]).any(fails);
+        let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).book.problems.is_empty());
+        let by_network = (!by_check).then(|| (0..SEEDS).find(breaks)).flatten();
+        eprintln!("{broken:?}: check {by_check}, network {by_network:?}");
+        if !by_check && by_network.is_none() {
+            missed.push(broken);
+        }
+    }
+    assert_eq!(missed, []);
+}
+
+const _: () = assert!(WELL_NS > 2 * BACKOFF_MAX_NS && MS < S);

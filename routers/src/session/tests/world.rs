@@ -1,0 +1,451 @@
+//! A server, its clients and the lines between them, in virtual time from a seed.
+
+use super::book::{Book, Known, Teller};
+use super::pipe::Pipe;
+use super::plan::{Clock, Plan, client_settings, module, ranges, server_settings, shared, system_of};
+use crate::session::client::{self, Client, Package};
+use crate::session::server::{self, Server};
+use crate::session::{ClientIndex, LOOK_EVERY_NS, without_hurry};
+use crate::sim::chance::Chance;
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, TimeRecord, TimeSource, Type};
+
+pub(super) const MS: u64 = 1_000_000;
+pub(super) const S: u64 = 1000 * MS;
+/// True system time, ns ahead of the world's.
+const SYSTEM_NS: u64 = 1_700_000_000 * S;
+/// What an end may take up: packages that wait and their places, a batch, a frame on each side, and the rest.
+const BYTES_MAX: usize = super::plan::QUOTA + 16 * 1024 + 2 * 2 * 66_000 + 8192;
+
+pub(super) struct Connection {
+    client: usize,
+    /// Its place at the server, as long as that has it open.
+    index: Option<ClientIndex>,
+    is_client_open: bool,
+    up: Pipe,
+    down: Pipe,
+    was_up_full: bool,
+    was_down_full: bool,
+}
+
+pub(super) struct Node {
+    pub(super) client: Client,
+    clock: Clock,
+    frozen_until_ns: u64,
+    wake_ns: u64,
+    life: u64,
+    pub(super) attempts: u64,
+    chance: Chance,
+}
+
+pub(super) struct World {
+    pub(super) plan: Plan,
+    pub(super) now_ns: u64,
+    pub(super) book: Book,
+    pub(super) server: Server,
+    pub(super) server_clock: Clock,
+    server_life: u64,
+    /// Nobody can connect until then.
+    server_down_until_ns: u64,
+    server_wake_ns: u64,
+    pub(super) nodes: Vec<Node>,
+    connections: Vec<Connection>,
+    faults: Chance,
+    posts: Chance,
+    host: Chance,
+    pub(super) may_fail: bool,
+    pub(super) may_post: bool,
+}
+
+impl World {
+    pub(super) fn new(plan: Plan) -> Self {
+        let mut chance = Chance::new(plan.seed);
+        let node = |index: usize, chance: &mut Chance| {
+            let (clock, life) = (Clock::new(chance), chance.bits() | 1);
+            let client = Client::new(client_settings(index, life), ranges(index), clock.at(0));
+            Node { client, clock, frozen_until_ns: 0, wake_ns: 0, life, attempts: 0, chance: chance.fork() }
+        };
+        let nodes: Vec<Node> = (0..plan.clients).map(|index| node(index, &mut chance)).collect();
+        let known = |index| Known {
+            system: system_of(index),
+            ranges: ranges(index),
+            reaches_own: client_settings(index, 1).reaches_own,
+            up_ns: None,
+            refusals: Vec::new(),
+        };
+        let book = Book::new((0..plan.clients).map(known).collect());
+        let (may_fail, server_life) = (!plan.calm, chance.bits() | 1);
+        Self {
+            now_ns: 0,
+            book,
+            server: Server::new(server_settings(server_life)),
+            server_clock: Clock::new(&mut chance),
+            server_life,
+            server_down_until_ns: 0,
+            server_wake_ns: 0,
+            nodes,
+            connections: Vec::new(),
+            faults: chance.fork(),
+            posts: chance.fork(),
+            host: chance.fork(),
+            may_fail,
+            may_post: true,
+            plan,
+        }
+    }
+
+    pub(super) fn run(&mut self, for_ns: u64) {
+        let end_ns = self.now_ns + for_ns;
+        while self.now_ns < end_ns && self.book.problems.is_empty() {
+            self.now_ns += MS;
+            self.book.now_ns = self.now_ns;
+            self.fail();
+            self.post();
+            self.carry();
+            self.poll_server();
+            (0..self.nodes.len()).for_each(|index| self.poll_client(index));
+            self.connections.retain(|connection| connection.index.is_some() || connection.is_client_open);
+            if self.now_ns.is_multiple_of(50 * MS) {
+                self.look();
+            }
+        }
+    }
+
+    /// What must hold at any moment.
+    fn look(&mut self) {
+        let (server_ns, system_ns) = (self.server_clock.at(self.now_ns), SYSTEM_NS + self.now_ns);
+        let record = TimeRecord {
+            epoch: 1,
+            source: TimeSource::Master,
+            monotonic_ns: server_ns,
+            system_ns,
+            pace_ppb: 1_000_000_000,
+            error_ns: 100,
+            drift_ns_s: 200_000,
+        };
+        self.server.set_time(Some(record));
+        for (index, node) in self.nodes.iter().enumerate() {
+            let now_ns = node.clock.at(self.now_ns);
+            let session = node.client.session(now_ns).filter(|_| node.client.is_up() && self.is_reached(index));
+            if let Some(session) = session.filter(|session| session.ns.abs_diff(server_ns) > session.error_ns) {
+                self.book.problems.push(format!("client {index}: session clock {session:?}, in truth {server_ns}"));
+            }
+            if let Some(time) = node.client.system_time(now_ns).map(|record| record.at(now_ns)) {
+                let off_ns = time.ns.abs_diff(system_ns);
+                if u128::from(off_ns) > time.error.as_nanos() {
+                    self.book.problems.push(format!("client {index}: system time {time:?} is {off_ns} ns off"));
+                }
+            }
+            if node.client.bytes() > BYTES_MAX {
+                self.book.problems.push(format!("client {index} takes up {} bytes", node.client.bytes()));
+            }
+        }
+        for (index, _, _) in self.server.clients() {
+            let bytes = self.server.bytes_of(index);
+            if bytes > BYTES_MAX {
+                self.book.problems.push(format!("the server has {bytes} bytes for {index:?}"));
+            }
+        }
+    }
+
+    /// Whether the server that a client knows is the one that lives.
+    fn is_reached(&self, client: usize) -> bool {
+        let is_whole = |connection: &Connection| connection.is_client_open && connection.index.is_some();
+        self.connections.iter().any(|connection| connection.client == client && is_whole(connection))
+    }
+
+    fn post(&mut self) {
+        let share = (self.plan.per_s * 1000).min(1_000_000) as u32;
+        let times = if self.posts.per_million(5000) { 40 } else { 1 };
+        for _ in 0..times {
+            if self.may_post && self.posts.per_million(share) {
+                self.post_one();
+            }
+        }
+    }
+
+    fn post_one(&mut self) {
+        let posts = &mut self.posts;
+        let from = posts.below(self.nodes.len() as u64) as usize;
+        let is_forged = posts.percent(2);
+        let sender = if is_forged { (from + 1) % self.nodes.len() } else { from };
+        let other = posts.below(self.nodes.len() as u64) as usize;
+        let to = match posts.below(100) {
+            0..70 if other != from => module(other),
+            70..80 => Name::new(ALL_SYSTEMS, shared(1).class().0, 0, 0),
+            80..85 => Name::new(1, 105, 0, 0),
+            85..90 => Name::new(1, 103, 0, 7),
+            90..95 => shared(system_of(other)),
+            _ => Name::new(2, 250, 9, 0),
+        };
+        let len = if posts.percent(95) { posts.between(8, 200) } else { posts.between(8, 65_000) } as u16;
+        let priority = Priority(posts.pick(&[10, 60, 60, 150, 250]));
+        let kind = if posts.percent(40) { Type::command(16) } else { Type::data(1) };
+        let head = Head { to, from: module(sender).with_local(1), len, kind, priority, ..Head::default() };
+        self.send(from, head, is_forged);
+    }
+
+    pub(super) fn send(&mut self, from: usize, head: Head, is_forged: bool) -> usize {
+        let (number, body) = self.book.post(from, without_hurry(&head), is_forged);
+        self.book.saw("posted");
+        let node = &mut self.nodes[from];
+        let now_ns = node.clock.at(self.now_ns);
+        let mut teller = Teller { book: &mut self.book, client: from, chance: &mut node.chance };
+        node.client.send(now_ns, &Package { head, body: &body, published_ns: now_ns, hops: 0 }, &mut teller);
+        node.wake_ns = 0;
+        number
+    }
+
+    /// Moves bytes from both ends of each connection to the other.
+    fn carry(&mut self) {
+        for at in 0..self.connections.len() {
+            self.carry_up(at);
+            self.carry_down(at);
+        }
+    }
+
+    fn carry_up(&mut self, at: usize) {
+        let connection = &mut self.connections[at];
+        let now_ns = self.server_clock.at(self.now_ns);
+        let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
+        while let Some(index) = connection.index {
+            let Some(bytes) = connection.up.read(self.now_ns) else { break };
+            self.server.received(now_ns, index, &bytes, &mut teller);
+            self.server_wake_ns = 0;
+        }
+        if let Some(index) = connection.index {
+            if connection.up.is_at_end() {
+                self.server.closed(now_ns, index, &mut teller);
+                connection.index = None;
+                connection.down.is_closed = true;
+            } else if connection.was_down_full && connection.down.has_room() {
+                connection.was_down_full = false;
+                self.server.writable(index);
+                self.server_wake_ns = 0;
+            }
+        }
+    }
+
+    fn carry_down(&mut self, at: usize) {
+        let connection = &mut self.connections[at];
+        let (index, node) = (connection.client, &mut self.nodes[connection.client]);
+        if !connection.is_client_open || self.now_ns < node.frozen_until_ns {
+            return;
+        }
+        let now_ns = node.clock.at(self.now_ns);
+        let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
+        while let Some(bytes) = connection.down.read(self.now_ns) {
+            node.client.received(now_ns, &bytes, &mut teller);
+            node.wake_ns = 0;
+        }
+        if connection.down.is_at_end() {
+            node.client.closed(now_ns, &mut teller);
+            node.wake_ns = 0;
+            connection.is_client_open = false;
+            connection.up.is_closed = true;
+        } else if connection.was_up_full && connection.up.has_room() {
+            connection.was_up_full = false;
+            node.client.writable();
+            node.wake_ns = 0;
+        }
+    }
+
+    fn poll_server(&mut self) {
+        let now_ns = self.server_clock.at(self.now_ns);
+        if now_ns < self.server_wake_ns || self.now_ns < self.server_down_until_ns {
+            return;
+        }
+        loop {
+            let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
+            let (server, connections) = (&mut self.server, &mut self.connections);
+            let find = |index| move |connection: &&mut Connection| connection.index == Some(index);
+            match server.poll(now_ns, &mut teller) {
+                server::Output::Write(index) => {
+                    let Some(connection) = connections.iter_mut().find(find(index)) else { break };
+                    let count = connection.down.write(self.now_ns, server.ready(index));
+                    connection.was_down_full = count < server.ready(index).len();
+                    server.took(now_ns, index, count);
+                }
+                server::Output::Close(index) => {
+                    let Some(connection) = connections.iter_mut().find(find(index)) else { break };
+                    connection.index = None;
+                    connection.down.is_closed = true;
+                }
+                server::Output::Wait { until_ns } => {
+                    assert!(until_ns > now_ns && until_ns <= now_ns + LOOK_EVERY_NS);
+                    self.server_wake_ns = until_ns;
+                    break;
+                }
+            }
+        }
+    }
+
+    fn poll_client(&mut self, index: usize) {
+        let now_ns = self.nodes[index].clock.at(self.now_ns);
+        if now_ns < self.nodes[index].wake_ns || self.now_ns < self.nodes[index].frozen_until_ns {
+            return;
+        }
+        loop {
+            let node = &mut self.nodes[index];
+            let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
+            let open = |connection: &&mut Connection| connection.client == index && connection.is_client_open;
+            match node.client.poll(now_ns, &mut teller) {
+                client::Output::Connect => self.connect(index),
+                client::Output::Write => {
+                    let Some(connection) = self.connections.iter_mut().find(open) else { break };
+                    let count = connection.up.write(self.now_ns, node.client.ready());
+                    connection.was_up_full = count < node.client.ready().len();
+                    node.client.took(now_ns, count);
+                }
+                client::Output::Close => {
+                    if let Some(connection) = self.connections.iter_mut().find(open) {
+                        connection.is_client_open = false;
+                        connection.up.is_closed = true;
+                    }
+                }
+                client::Output::Wait { until_ns } => {
+                    assert!(until_ns > now_ns, "client {index} waits for the past");
+                    node.wake_ns = until_ns;
+                    break;
+                }
+            }
+        }
+    }
+
+    fn connect(&mut self, index: usize) {
+        let node = &mut self.nodes[index];
+        node.attempts += 1;
+        let now_ns = node.clock.at(self.now_ns);
+        let is_there = self.now_ns >= self.server_down_until_ns;
+        let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
+        let name = format!("address {index}");
+        let place = self.server_clock.at(self.now_ns);
+        let Some(place) = is_there.then(|| self.server.accept(place, &name, &mut teller)).flatten() else {
+            let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
+            return node.client.closed(now_ns, &mut teller);
+        };
+        let line = self.plan.lines[index];
+        let (up, down) = (node.chance.fork(), node.chance.fork());
+        let (mut up, mut down) = (Pipe::new(up, line, self.plan.calm), Pipe::new(down, line, self.plan.calm));
+        if self.plan.stalled == Some(index) && self.now_ns >= S {
+            down.stalled_until_ns = u64::MAX;
+        }
+        if self.may_fail && self.faults.percent(4) {
+            (up.is_dead, down.is_dead) = (true, true);
+        }
+        node.client.connected(now_ns);
+        self.connections.push(Connection {
+            client: index,
+            index: Some(place),
+            is_client_open: true,
+            up,
+            down,
+            was_up_full: false,
+            was_down_full: false,
+        });
+    }
+
+    fn fail(&mut self) {
+        if self.plan.stalled.is_some() && self.now_ns == S {
+            let stalled = self.plan.stalled;
+            for connection in self.connections.iter_mut().filter(|connection| Some(connection.client) == stalled) {
+                connection.down.stalled_until_ns = u64::MAX;
+            }
+        }
+        if !self.may_fail || !self.faults.per_million(2500) {
+            return;
+        }
+        let client = self.faults.below(self.nodes.len() as u64) as usize;
+        let until_ns = self.now_ns + self.faults.between(100, 4000) * MS;
+        match self.faults.below(12) {
+            0 => self.restart_server(),
+            1 => self.restart_client(client),
+            2 => self.nodes[client].frozen_until_ns = until_ns,
+            what => {
+                let mut connections = self.connections.iter_mut();
+                let Some(connection) = connections.find(|one| one.client == client && one.is_client_open) else {
+                    return;
+                };
+                self.book.seen.entry("line faults").and_modify(|count| *count += 1).or_insert(1);
+                match what {
+                    3 | 4 => connection.down.stalled_until_ns = until_ns,
+                    5 => connection.up.stalled_until_ns = until_ns,
+                    6 => connection.down.is_dead = true,
+                    7 => connection.up.is_dead = true,
+                    8 => (connection.up.is_dead, connection.down.is_dead) = (true, true),
+                    // Both are told, after what is under way; or nothing of that comes.
+                    9 => (connection.up.is_closed, connection.down.is_closed) = (true, true),
+                    _ => self.break_connection(client),
+                }
+            }
+        }
+    }
+
+    /// Both ends are told at once, and what is under way is lost.
+    fn break_connection(&mut self, client: usize) {
+        for connection in self.connections.iter_mut().filter(|connection| connection.client == client) {
+            let line = self.plan.lines[client];
+            (connection.up, connection.down) =
+                (Pipe::new(self.faults.fork(), line, false), Pipe::new(self.faults.fork(), line, false));
+            (connection.up.is_closed, connection.down.is_closed) = (true, true);
+        }
+    }
+
+    /// The server is gone, and does not come again.
+    pub(super) fn end_server(&mut self) {
+        self.server_down_until_ns = u64::MAX;
+    }
+
+    fn restart_server(&mut self) {
+        self.book.saw("server restarted");
+        self.check_server(false);
+        self.server_life += 2;
+        self.server = Server::new(server_settings(self.server_life));
+        self.server_wake_ns = 0;
+        self.server_down_until_ns = self.now_ns + self.faults.between(0, 1500) * MS;
+        let is_told = self.faults.percent(70);
+        for connection in &mut self.connections {
+            connection.index = None;
+            connection.down.is_closed = is_told;
+            connection.down.is_dead |= !is_told;
+        }
+    }
+
+    fn restart_client(&mut self, index: usize) {
+        self.book.saw("client restarted");
+        let node = &mut self.nodes[index];
+        node.life += 2;
+        let now_ns = node.clock.at(self.now_ns);
+        node.client = Client::new(client_settings(index, node.life), ranges(index), now_ns);
+        node.wake_ns = 0;
+        self.book.clients[index].up_ns = None;
+        let is_told = self.faults.percent(50);
+        for connection in self.connections.iter_mut().filter(|one| one.client == index) {
+            connection.is_client_open = false;
+            connection.up.is_closed = is_told;
+            connection.up.is_dead |= !is_told;
+            connection.down.is_dead = true;
+        }
+    }
+
+    /// Every package that came has passed, or was lost with a cause; or still waits, if `waits_none` is false.
+    pub(super) fn check_server(&mut self, waits_none: bool) {
+        let problems = check_counts("the server", self.server.counts(), waits_none);
+        self.book.problems.extend(problems);
+    }
+
+    pub(super) fn check_clients(&mut self) {
+        for (index, node) in self.nodes.iter().enumerate() {
+            self.book.problems.extend(check_counts(&format!("client {index}, out"), node.client.out(), true));
+            self.book.problems.extend(check_counts(&format!("client {index}, in"), node.client.inn(), true));
+        }
+    }
+}
+
+fn check_counts(who: &str, counts: &crate::session::Counts, waits_none: bool) -> Vec<String> {
+    let wrong = counts.classes().filter_map(|(priority, class)| {
+        let (came, went) = (class.packages.get(), class.passed.get() + class.lost_in_all());
+        let holds = if waits_none { came == went } else { came >= went };
+        (!holds).then(|| format!("{who}: of class {} came {came}, and {went} are accounted for", priority.0))
+    });
+    wrong.collect()
+}

@@ -1,0 +1,404 @@
+//! A node's client at work: one thread, which sleeps on the node's mailbox for what is beyond and on its socket at once.
+//!
+//! ```text
+//!  modules ─▶ tcp.I.3 ─▶ session::Client ─▶ socket ═▶
+//!             bell ─┐        │      ▲  ┌─ socket ◀═
+//!                   └ sleep ─┘      └──┘  deliver ─▶ mailboxes
+//! ```
+
+use super::desk::Desk;
+use super::seal::ClientSeal;
+use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
+use super::stream::{Moved, Stream};
+use crate::report::NotDelivered;
+use crate::session::client::{Client, ClientSettings, Event, Host, Output, Package};
+use crate::session::frame::{Carried, Range};
+use crate::session::{Answers, Cause, in_system};
+use crate::shell::Faults;
+use crate::shell::transit;
+use crate::shell::ways::{Reach, Ways};
+use rohrpost_mailbox::{
+    ALL_SYSTEMS, CreateError, Head, Interest, Name, Node, NodeError, Participant, Receiver, SendError, Watch, Watches,
+    monotonic_ns,
+};
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Packages taken from the mailbox before the socket has its turn.
+const BURST: usize = 64;
+/// Read before the mailbox has its turn.
+const PIECE_BYTES: usize = 64 * 1024;
+
+/// Why a client does not run.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// The node's memory.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// Its mailbox.
+    #[error(transparent)]
+    Mailbox(#[from] CreateError),
+    /// What it sleeps with.
+    #[error("a pipe that wakes the client of the TCP router: {0}")]
+    Watches(io::Error),
+    /// The system has no thread for it.
+    #[error("a thread of the client of the TCP router: {0}; is the limit of processes reached (ulimit -u)?")]
+    Thread(io::Error),
+}
+
+/// What it is made of.
+pub struct ClientParts<'a> {
+    /// The node that it serves.
+    pub node: &'a Arc<Node>,
+    /// Its name, `tcp.I`.
+    pub name: Name,
+    /// Where the server is.
+    pub server: SocketAddr,
+    /// What it knows.
+    pub settings: ClientSettings,
+    /// The names that its node hosts.
+    pub hosts: Vec<(Name, Name)>,
+    /// The names for which packages go to the server if neither the node nor its LAN has them.
+    pub beyond: Vec<(Name, Name)>,
+    /// How commands are answered that cannot be carried.
+    pub faults: Arc<dyn Faults>,
+    /// Its certificates; none: nothing is sealed.
+    pub seal: Option<ClientSeal>,
+}
+
+/// A client at work; dropped, it ends. What waits in its mailbox stays there.
+pub struct ClientShell {
+    shared: Arc<Shared>,
+    /// Of its thread, whose bell wakes it.
+    participant: Arc<Participant>,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    ends: AtomicBool,
+    seen: Seen<Link>,
+}
+
+impl ClientShell {
+    /// Makes the mailbox, tells the node what is beyond, and starts the thread.
+    ///
+    /// # Errors
+    /// [`ClientError`]
+    pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
+        let ClientParts { node, name, server, settings, hosts, beyond, faults, seal } = parts;
+        let participant = Participant::join(node, Name::NONE)?;
+        let via = transit::name(name);
+        let mailbox = participant.receiver(via, transit::shape())?;
+        let watches = Watches::new(&participant).map_err(ClientError::Watches)?;
+        node.set_routes_beyond(via, &beyond)?;
+        let (shared, system) = (Arc::new(Shared::default()), settings.system);
+        let ranges = hosts.into_iter().map(|(first, last)| Range { first, last }).collect();
+        let work = Work {
+            shared: shared.clone(),
+            server,
+            client: Client::new(settings, ranges, monotonic_ns()),
+            voice: Voice {
+                server,
+                ways: Ways::new(&participant, Reach::Here),
+                desk: Desk::new(faults, format!("beyond the TCP router at {server}")),
+                why: String::new(),
+                by_server: false,
+            },
+            system,
+            seal,
+            mailbox,
+            watches,
+            connection: None,
+            piece: vec![0; PIECE_BYTES].into(),
+        };
+        let thread = std::thread::Builder::new().name("tcp-client".into()).spawn(move || work.run());
+        Ok(Self { shared, participant, thread: Some(thread.map_err(ClientError::Thread)?) })
+    }
+
+    /// How it was a moment ago.
+    pub fn link(&self) -> Link {
+        self.shared.seen.get()
+    }
+
+    /// Whether its thread still runs.
+    pub fn is_well(&self) -> bool {
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
+    }
+}
+
+impl Drop for ClientShell {
+    fn drop(&mut self) {
+        self.shared.ends.store(true, Ordering::Release);
+        self.participant.ring();
+        if let Some(thread) = self.thread.take() {
+            // One that panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Delivers, answers, and says what happens.
+struct Voice {
+    server: SocketAddr,
+    ways: Ways,
+    desk: Desk,
+    /// Why it takes no part, as it was last told; empty if it does.
+    why: String,
+    /// The server has said that, or what it said is why.
+    by_server: bool,
+}
+
+impl Voice {
+    /// Says once why the server is not there.
+    fn unreached(&mut self, why: &str) {
+        let why = format!(
+            "the TCP router at {} is not reached: {why}; does it run, and is it reached from here?",
+            self.server
+        );
+        // What it said itself is better than that its connection then ended.
+        if !self.by_server && self.why != why {
+            self.says(why, false);
+        }
+    }
+
+    fn says(&mut self, why: String, by_server: bool) {
+        tracing::warn!("{why}");
+        (self.why, self.by_server) = (why, by_server);
+    }
+}
+
+impl Answers for Voice {
+    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
+        self.desk.answer(call, why, holder, answer)
+    }
+}
+
+impl Host for Voice {
+    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
+        self.ways.send(&carried.head, carried.body).map_err(|error| {
+            if let SendError::TooLarge { max, .. } = error {
+                self.desk.takes_bytes = Some(max);
+            }
+            error.into()
+        })
+    }
+
+    fn event(&mut self, event: Event<'_>) {
+        let server = self.server;
+        match event {
+            Event::Up => {
+                self.why.clear();
+                tracing::info!("takes part at the TCP router at {server}");
+            }
+            Event::Down => {
+                self.says(format!("takes part at the TCP router at {server} no more; it tries again"), false)
+            }
+            Event::Refused(refusal) => {
+                self.says(format!("may not take part at the TCP router at {server}: {refusal}"), true);
+            }
+            Event::Objected(verdict) => {
+                self.says(format!("may not host its names at the TCP router at {server}: {verdict}"), true);
+            }
+            Event::Damaged(bad) => {
+                self.says(format!("cannot read what came from the TCP router at {server}: {bad}"), true);
+            }
+        }
+    }
+}
+
+struct Connection {
+    stream: Stream,
+    watch: Watch,
+    /// It is not made yet.
+    is_begun: bool,
+    awaits_room: bool,
+}
+
+/// What the thread has.
+struct Work {
+    shared: Arc<Shared>,
+    server: SocketAddr,
+    client: Client,
+    voice: Voice,
+    /// First byte of the names of its node.
+    system: u8,
+    seal: Option<ClientSeal>,
+    mailbox: Receiver,
+    watches: Watches,
+    connection: Option<Connection>,
+    piece: Box<[u8]>,
+}
+
+impl Work {
+    /// Until the node ends.
+    fn run(mut self) {
+        let mut say_ns = 0;
+        while !self.shared.ends.load(Ordering::Acquire) {
+            let more = self.take();
+            let now_ns = monotonic_ns();
+            if now_ns >= say_ns {
+                say_ns = now_ns + SAY_EVERY_NS;
+                self.say(now_ns);
+            }
+            match self.client.poll(now_ns, &mut self.voice) {
+                Output::Connect => self.connect(now_ns),
+                Output::Write => self.write(),
+                Output::Close => self.forget(),
+                Output::Wait { .. } if more => self.watches.look(),
+                Output::Wait { until_ns } => self.sleep(until_ns.min(say_ns)),
+            }
+            while let Some(ready) = self.watches.next_ready() {
+                if ready.writable {
+                    self.writable();
+                }
+                if ready.readable {
+                    self.read();
+                }
+            }
+        }
+    }
+
+    /// Takes what waits in the mailbox, most important first; whether there may be more.
+    fn take(&mut self) -> bool {
+        for _ in 0..BURST {
+            let Some(waiting) = self.mailbox.try_receive() else { return false };
+            let (head, published_ns, body) = (*waiting.head(), waiting.published_ns(), waiting.body());
+            if head.to.system() == ALL_SYSTEMS {
+                // Its own system is one of them. What is not on this node another client brings there.
+                let _ = self.voice.ways.send(&Head { to: in_system(head.to, self.system), ..head }, body);
+            }
+            self.client.send(monotonic_ns(), &Package { head, body, published_ns, hops: 0 }, &mut self.voice);
+        }
+        true
+    }
+
+    fn sleep(&mut self, until_ns: u64) {
+        let deadline = Instant::now() + Duration::from_nanos(until_ns.saturating_sub(monotonic_ns()));
+        let shared = &self.shared;
+        self.watches.wait_any(&mut [&mut self.mailbox], Some(deadline), || shared.ends.load(Ordering::Acquire));
+    }
+
+    fn connect(&mut self, now_ns: u64) {
+        let sealed = self.seal.as_ref().map(ClientSeal::begin).transpose();
+        let begun = sealed.and_then(|sealed| Stream::connect(self.server, sealed));
+        let begun = begun.and_then(|stream| Ok((self.watches.add(&stream, Interest::Write)?, stream)));
+        match begun {
+            Ok((watch, stream)) => {
+                self.connection = Some(Connection { stream, watch, is_begun: true, awaits_room: true });
+            }
+            Err(error) => {
+                self.voice.unreached(&error.to_string());
+                self.client.closed(now_ns, &mut self.voice);
+            }
+        }
+    }
+
+    fn writable(&mut self) {
+        let Some(connection) = &mut self.connection else { return };
+        if !connection.is_begun {
+            if self.flush() {
+                self.await_room(false);
+                self.client.writable();
+            }
+            return;
+        }
+        match connection.stream.connected() {
+            Ok(()) => {
+                connection.is_begun = false;
+                self.client.connected(monotonic_ns());
+                self.await_room(false);
+            }
+            Err(error) => self.broke(Some(&error)),
+        }
+    }
+
+    fn read(&mut self) {
+        let Some(connection) = self.connection.as_mut().filter(|connection| !connection.is_begun) else { return };
+        match connection.stream.read(&mut self.piece) {
+            Moved::Bytes(bytes) => self.client.received(monotonic_ns(), &self.piece[..bytes], &mut self.voice),
+            Moved::Nothing => drop(self.flush()),
+            Moved::Over(error) => self.broke(error.as_ref()),
+        }
+    }
+
+    /// Hands on what the connection took; whether all of it has left.
+    fn flush(&mut self) -> bool {
+        let Some(connection) = &mut self.connection else { return false };
+        match connection.stream.flush() {
+            Ok(()) if connection.stream.has_unsent() => self.await_room(true),
+            Ok(()) => return true,
+            Err(error) => self.broke(Some(&error)),
+        }
+        false
+    }
+
+    fn write(&mut self) {
+        let Some(connection) = &mut self.connection else { return };
+        let ready = self.client.ready();
+        let moved = connection.stream.write(ready);
+        let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len()) && !connection.stream.has_unsent();
+        match moved {
+            Moved::Bytes(bytes) => self.client.took(monotonic_ns(), bytes),
+            Moved::Nothing => self.client.took(monotonic_ns(), 0),
+            Moved::Over(error) => return self.broke(error.as_ref()),
+        }
+        if !all {
+            self.await_room(true);
+        }
+    }
+
+    /// Whether it wakes up when the socket takes bytes again.
+    fn await_room(&mut self, awaits: bool) {
+        let Some(connection) = &mut self.connection else { return };
+        if connection.awaits_room == awaits {
+            return;
+        }
+        connection.awaits_room = awaits;
+        self.watches.remove(connection.watch);
+        let interest = if awaits { Interest::Both } else { Interest::Read };
+        match self.watches.add(&connection.stream, interest) {
+            Ok(watch) => connection.watch = watch,
+            Err(error) => self.broke(Some(&error)),
+        }
+    }
+
+    fn broke(&mut self, error: Option<&io::Error>) {
+        self.forget();
+        let was_up = self.client.is_up();
+        self.client.closed(monotonic_ns(), &mut self.voice);
+        if !was_up {
+            self.voice.unreached(&error.map_or_else(|| "it closed the connection".into(), ToString::to_string));
+        }
+    }
+
+    fn forget(&mut self) {
+        if let Some(connection) = self.connection.take() {
+            self.watches.remove(connection.watch);
+        }
+    }
+
+    fn say(&self, now_ns: u64) {
+        let client = &self.client;
+        let state = match (client.is_up(), client.is_connected()) {
+            (true, _) => LinkState::Up,
+            (false, true) => LinkState::Joining,
+            (false, false) => LinkState::Away,
+        };
+        let time = client.system_time(now_ns).map(|record| record.at(now_ns).error);
+        self.shared.seen.say(Link {
+            state,
+            why: self.voice.why.clone(),
+            connections: client.connections(),
+            round_trip_ns: client.round_trip_ns(),
+            time_error_ns: time.map(|error| u64::try_from(error.as_nanos()).unwrap_or(u64::MAX)),
+            waiting_bytes: client.bytes() as u64,
+            out: Class::all(client.out()),
+            inn: Class::all(client.inn()),
+        });
+    }
+}

@@ -1,0 +1,275 @@
+//! TLS 1.3 under a session, with certificates on both sides: who reads the wire learns nothing, and who takes part has a certificate of the
+//! installation. A certificate says by its DNS name whose it is:
+//!
+//! ```text
+//!  tcp-router.rohrpost          the TCP router
+//!  base.system-1.rohrpost       node `base` of system 1: it may host names of that system, and of no other
+//! ```
+
+use rustls::client::WebPkiServerVerifier;
+use rustls::crypto::ring;
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
+use rustls::server::WebPkiClientVerifier;
+use rustls::{
+    AlertDescription, CertificateError, ClientConfig, Connection, Error, RootCertStore, ServerConfig, version,
+};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Whose certificates these are.
+const REALM: &str = "rohrpost";
+const ROUTER: &str = "tcp-router";
+const SYSTEM: &str = "system-";
+/// The authority that has signed all of an installation.
+pub const AUTHORITY: &str = "ca";
+/// Plain and sealed bytes that a connection keeps until the socket takes them.
+const KEPT_BYTES: usize = 32 * 1024;
+
+/// Who shows a certificate.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Holder {
+    /// The TCP router.
+    Router,
+    /// A node of a system.
+    Node {
+        /// Its name.
+        node: String,
+        /// First byte of the names that it may host.
+        system: u8,
+    },
+}
+
+impl Holder {
+    /// The name in its certificate.
+    pub fn dns_name(&self) -> String {
+        match self {
+            Self::Router => format!("{ROUTER}.{REALM}"),
+            Self::Node { node, system } => format!("{node}.{SYSTEM}{system}.{REALM}"),
+        }
+    }
+
+    /// What its files begin with.
+    pub fn file_name(&self) -> String {
+        match self {
+            Self::Router => ROUTER.into(),
+            Self::Node { node, system } => format!("{node}.{SYSTEM}{system}"),
+        }
+    }
+
+    fn of(dns_name: &str) -> Option<Self> {
+        let (node, system) = dns_name.strip_suffix(REALM)?.strip_suffix('.')?.split_once('.')?;
+        Some(Self::Node { node: node.into(), system: system.strip_prefix(SYSTEM)?.parse().ok()? })
+    }
+}
+
+/// Why certificates cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SealError {
+    /// A file is not there, or holds something else.
+    #[error("{0}: {1}; `rohrpost certificates` makes it")]
+    File(PathBuf, String),
+    /// They do not belong together.
+    #[error("the certificates in {0} do not fit together: {1}; `rohrpost certificates` makes new ones")]
+    Unfit(PathBuf, String),
+}
+
+/// What a client begins its connections with.
+#[derive(Clone, Debug)]
+pub struct ClientSeal(Arc<ClientConfig>);
+
+/// What the server begins its connections with.
+#[derive(Clone, Debug)]
+pub struct ServerSeal(Arc<ServerConfig>);
+
+/// What lies in the folder for one holder.
+struct Files {
+    folder: PathBuf,
+    roots: Arc<RootCertStore>,
+    chain: Vec<CertificateDer<'static>>,
+    key: PrivateKeyDer<'static>,
+}
+
+impl Files {
+    fn load(folder: &Path, holder: &Holder) -> Result<Self, SealError> {
+        let path = |name: &str, end: &str| folder.join(format!("{name}.{end}"));
+        let (authority, own, key) =
+            (path(AUTHORITY, "pem"), path(&holder.file_name(), "pem"), path(&holder.file_name(), "key"));
+        let certificate = |path: &Path| {
+            CertificateDer::from_pem_file(path).map_err(|error| SealError::File(path.into(), error.to_string()))
+        };
+        let mut roots = RootCertStore::empty();
+        let trusted = roots.add(certificate(&authority)?);
+        trusted.map_err(|error| SealError::File(authority.clone(), error.to_string()))?;
+        let secret =
+            PrivateKeyDer::from_pem_file(&key).map_err(|error| SealError::File(key.clone(), error.to_string()))?;
+        Ok(Self { folder: folder.into(), roots: Arc::new(roots), chain: vec![certificate(&own)?], key: secret })
+    }
+}
+
+impl ClientSeal {
+    /// Reads the certificates of a node.
+    ///
+    /// # Errors
+    /// [`SealError`]
+    pub fn load(folder: &Path, holder: &Holder) -> Result<Self, SealError> {
+        let Files { folder, roots, chain, key } = Files::load(folder, holder)?;
+        let unfit = |error: &dyn std::fmt::Display| SealError::Unfit(folder.clone(), error.to_string());
+        let provider = Arc::new(ring::default_provider());
+        let verifier = WebPkiServerVerifier::builder_with_provider(roots, provider.clone()).build();
+        let config = ClientConfig::builder_with_provider(provider)
+            .with_protocol_versions(&[&version::TLS13])
+            .map_err(|error| unfit(&error))?
+            .with_webpki_verifier(verifier.map_err(|error| unfit(&error))?)
+            .with_client_auth_cert(chain, key);
+        Ok(Self(Arc::new(config.map_err(|error| unfit(&error))?)))
+    }
+
+    pub(super) fn begin(&self) -> io::Result<Sealed> {
+        let name = ServerName::try_from(Holder::Router.dns_name()).map_err(io::Error::other)?;
+        let connection = rustls::ClientConnection::new(self.0.clone(), name).map_err(io::Error::other)?;
+        Ok(Sealed::new(connection.into()))
+    }
+}
+
+impl ServerSeal {
+    /// Reads the certificates of the TCP router.
+    ///
+    /// # Errors
+    /// [`SealError`]
+    pub fn load(folder: &Path) -> Result<Self, SealError> {
+        let Files { folder, roots, chain, key } = Files::load(folder, &Holder::Router)?;
+        let unfit = |error: &dyn std::fmt::Display| SealError::Unfit(folder.clone(), error.to_string());
+        let provider = Arc::new(ring::default_provider());
+        let verifier = WebPkiClientVerifier::builder_with_provider(roots, provider.clone()).build();
+        let config = ServerConfig::builder_with_provider(provider)
+            .with_protocol_versions(&[&version::TLS13])
+            .map_err(|error| unfit(&error))?
+            .with_client_cert_verifier(verifier.map_err(|error| unfit(&error))?)
+            .with_single_cert(chain, key);
+        Ok(Self(Arc::new(config.map_err(|error| unfit(&error))?)))
+    }
+
+    pub(super) fn begin(&self) -> io::Result<Sealed> {
+        let connection = rustls::ServerConnection::new(self.0.clone()).map_err(io::Error::other)?;
+        Ok(Sealed::new(connection.into()))
+    }
+}
+
+/// One sealed connection, without its socket.
+#[derive(Debug)]
+pub(super) struct Sealed(Box<Connection>);
+
+impl Sealed {
+    fn new(mut connection: Connection) -> Self {
+        connection.set_buffer_limit(Some(KEPT_BYTES));
+        Self(Box::new(connection))
+    }
+
+    /// Whether bytes wait for the socket.
+    pub(super) fn has_unsent(&self) -> bool {
+        self.0.wants_write()
+    }
+
+    /// Hands on what waits, until the socket takes no more.
+    pub(super) fn flush(&mut self, socket: &mut impl io::Write) -> io::Result<()> {
+        while self.0.wants_write() {
+            match self.0.write_tls(socket) {
+                Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes bytes to be sealed; how many.
+    pub(super) fn write(&mut self, bytes: &[u8], socket: &mut impl io::Write) -> io::Result<usize> {
+        let taken = io::Write::write(&mut self.0.writer(), bytes)?;
+        self.flush(socket)?;
+        if taken == 0 { Err(io::ErrorKind::WouldBlock.into()) } else { Ok(taken) }
+    }
+
+    /// Opens what the socket has.
+    pub(super) fn read(&mut self, into: &mut [u8], socket: &mut (impl io::Read + io::Write)) -> io::Result<usize> {
+        loop {
+            match io::Read::read(&mut self.0.reader(), into) {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                done => return done,
+            }
+            if self.0.read_tls(socket)? == 0 {
+                return Ok(0);
+            }
+            let opened = self.0.process_new_packets();
+            // What speaks against the other end is told to it, too.
+            let flushed = self.flush(socket);
+            opened.map_err(|error| io::Error::other(words(&error)))?;
+            flushed?;
+        }
+    }
+
+    /// Who the other end is, by its certificate, as soon as that was shown and holds.
+    pub(super) fn holder(&self) -> Option<Holder> {
+        let shown = self.0.peer_certificates().filter(|_| !self.0.is_handshaking())?;
+        let certificate = webpki::EndEntityCert::try_from(shown.first()?).ok()?;
+        certificate.valid_dns_names().find_map(Holder::of)
+    }
+}
+
+/// Why there is no sealed connection, and what would be right.
+fn words(error: &Error) -> String {
+    const NEW: &str = "make new ones with `rohrpost certificates`";
+    const FOREIGN: &str =
+        "another authority has signed it than `ca.pem` here: use the certificates of one installation at both ends";
+    match error {
+        Error::InvalidCertificate(CertificateError::Expired | CertificateError::ExpiredContext { .. }) => {
+            format!("its certificate has expired; {NEW}")
+        }
+        Error::InvalidCertificate(CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. }) => {
+            "its certificate is not valid yet; is the date right at both ends?".into()
+        }
+        Error::InvalidCertificate(CertificateError::UnknownIssuer | CertificateError::BadSignature) => {
+            format!("its certificate is foreign: {FOREIGN}")
+        }
+        Error::InvalidCertificate(
+            CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. },
+        ) => {
+            format!("its certificate is not that of a TCP router; {NEW}")
+        }
+        Error::InvalidCertificate(other) => format!("its certificate does not hold: {other:?}; {NEW}"),
+        Error::NoCertificatesPresented => format!("it shows no certificate; {NEW}"),
+        Error::PeerIncompatible(_) => "it speaks an older TLS than 1.3; run a newer version there".into(),
+        Error::AlertReceived(alert) => match alert {
+            AlertDescription::CertificateExpired => format!("it refuses this end's certificate as expired; {NEW}"),
+            AlertDescription::UnknownCA | AlertDescription::DecryptError => {
+                format!("it refuses this end's certificate as foreign: {FOREIGN}")
+            }
+            AlertDescription::CertificateRequired => format!("it demands a certificate; {NEW}"),
+            AlertDescription::ProtocolVersion => "it refuses this end's version of TLS; both need 1.3".into(),
+            AlertDescription::BadCertificate | AlertDescription::CertificateUnknown => {
+                format!("it refuses this end's certificate; {NEW}")
+            }
+            other => format!("it ended TLS with {other:?}"),
+        },
+        Error::InvalidMessage(_) => "it does not speak TLS; write the same `security` in [tcp] at both ends".into(),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_certificate_says_whose_it_is() {
+        let base = Holder::Node { node: "base".into(), system: 7 };
+        assert_eq!(base.dns_name(), "base.system-7.rohrpost");
+        assert_eq!(Holder::of(&base.dns_name()), Some(base));
+        for name in
+            ["tcp-router.rohrpost", "base.system-7.example", "base.system-x.rohrpost", "base.system-256.rohrpost", ""]
+        {
+            assert_eq!(Holder::of(name), None, "{name}");
+        }
+    }
+}

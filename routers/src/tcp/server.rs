@@ -1,0 +1,464 @@
+//! The TCP router at work: one thread, which sleeps on all sockets at once.
+//!
+//! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the client's own queue.
+
+use super::desk::Desk;
+use super::seal::{Holder, ServerSeal};
+use super::seen::{Class, Member, Members, SAY_EVERY_NS, Seen};
+use super::stream::{Moved, Stream};
+use crate::session::frame::Reason;
+use crate::session::server::{Event, Host, Output, Server, ServerSettings};
+use crate::session::{Answers, Cause, ClientIndex};
+use crate::shell::Faults;
+use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
+use nix::sys::eventfd::{EfdFlags, EventFd};
+use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
+use socket2::{Domain, Protocol, Socket, Type};
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+/// Read from one client before the others have their turn.
+const PIECE_BYTES: usize = 64 * 1024;
+/// Connections accepted before the clients have their turn.
+const ACCEPTS: usize = 64;
+/// Connections that the kernel keeps until they are accepted.
+const BACKLOG: i32 = 1024;
+const EVENTS: usize = 256;
+/// What is no client's place.
+const LISTENER: u64 = u64::MAX;
+const BELL: u64 = u64::MAX - 1;
+/// Connections that cannot be sealed are closed after so long, and there are so many of them at most.
+const PARTING_NS: u64 = 1_000_000_000;
+const PARTING_MAX: usize = 64;
+/// When accepting fails, since there is no descriptor left, it is tried again after so long.
+const ACCEPT_AGAIN_NS: u64 = 100_000_000;
+
+/// Why the TCP router does not run.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// Somebody is there.
+    #[error(
+        "{0} is in use: does the TCP router run already, or another program? Stop it, or choose another `port` in [tcp]"
+    )]
+    InUse(SocketAddr),
+    /// It is another computer's address.
+    #[error(
+        "{0} is no address of this computer: let `server` of [tcp] name the node that has it, or correct `address` (`ip addr` shows which \
+         there are)"
+    )]
+    NotHere(SocketAddr),
+    /// The system says no for another reason.
+    #[error("{1} for {0}: {2}")]
+    Io(SocketAddr, &'static str, io::Error),
+    /// The system has no thread for it.
+    #[error("a thread of the TCP router: {0}; is the limit of processes reached (ulimit -u)?")]
+    Thread(io::Error),
+}
+
+/// What it is made of.
+pub struct ServerParts<'a> {
+    /// Where it listens.
+    pub address: SocketAddr,
+    /// What it knows.
+    pub settings: ServerSettings,
+    /// How commands are answered that cannot be handed on.
+    pub faults: Arc<dyn Faults>,
+    /// Its certificates; none: nothing is sealed, and nobody shows who he is.
+    pub seal: Option<ServerSeal>,
+    /// The node whose system time it tells.
+    pub node: &'a Arc<Node>,
+}
+
+/// The TCP router at work; dropped, it tells its clients and ends.
+pub struct ServerShell {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    ends: AtomicBool,
+    bell: EventFd,
+    seen: Seen<Members>,
+}
+
+impl ServerShell {
+    /// Listens, and starts the thread.
+    ///
+    /// # Errors
+    /// [`ServerError`]
+    pub fn start(parts: ServerParts<'_>) -> Result<Self, ServerError> {
+        let ServerParts { address, settings, faults, seal, node } = parts;
+        let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
+        let listener = listen(address)?;
+        let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|errno| io("epoll")(errno.into()))?;
+        let bell = EventFd::from_flags(EfdFlags::EFD_CLOEXEC | EfdFlags::EFD_NONBLOCK)
+            .map_err(|errno| io("an eventfd")(errno.into()))?;
+        let watch = |epoll: &Epoll| {
+            epoll.add(&listener, EpollEvent::new(EpollFlags::EPOLLIN, LISTENER))?;
+            epoll.add(&bell, EpollEvent::new(EpollFlags::EPOLLIN, BELL))
+        };
+        watch(&epoll).map_err(|errno| io("epoll")(errno.into()))?;
+        let shared = Arc::new(Shared { ends: AtomicBool::new(false), bell, seen: Seen::default() });
+        let desk = Desk::new(faults, format!("beyond the TCP router at {address}"));
+        let work = Work {
+            shared: shared.clone(),
+            server: Server::new(settings),
+            host: Voice { desk, left: 0, refused: 0, refusal: String::new() },
+            seal,
+            parting: Vec::new(),
+            listener,
+            accept_ns: None,
+            epoll,
+            connections: Vec::new(),
+            clock: SystemClock::open(node),
+            piece: vec![0; PIECE_BYTES].into(),
+        };
+        let thread = std::thread::Builder::new().name("tcp-router".into()).spawn(move || work.run());
+        Ok(Self { shared, thread: Some(thread.map_err(ServerError::Thread)?) })
+    }
+
+    /// How it was a moment ago.
+    pub fn members(&self) -> Members {
+        self.shared.seen.get()
+    }
+
+    /// Whether its thread still runs.
+    pub fn is_well(&self) -> bool {
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
+    }
+}
+
+impl Drop for ServerShell {
+    fn drop(&mut self) {
+        self.shared.ends.store(true, Ordering::Release);
+        // A bell that is full has been rung.
+        let _ = self.shared.bell.write(1);
+        if let Some(thread) = self.thread.take() {
+            // One that panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn listen(address: SocketAddr) -> Result<TcpListener, ServerError> {
+    let listen = || {
+        let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
+        // One that died a moment ago has left connections that end slowly.
+        socket.set_reuse_address(true)?;
+        socket.set_nonblocking(true)?;
+        socket.bind(&address.into())?;
+        socket.listen(BACKLOG)?;
+        Ok(TcpListener::from(socket))
+    };
+    listen().map_err(|error: io::Error| match error.kind() {
+        io::ErrorKind::AddrInUse => ServerError::InUse(address),
+        io::ErrorKind::AddrNotAvailable => ServerError::NotHere(address),
+        _ => ServerError::Io(address, "a socket", error),
+    })
+}
+
+/// Says what happens, and answers for who is not reached.
+struct Voice {
+    desk: Desk,
+    left: u64,
+    refused: u64,
+    /// The last of them, in words.
+    refusal: String,
+}
+
+impl Voice {
+    fn refuses(&mut self, refusal: String) {
+        tracing::warn!("{refusal}");
+        self.refused += 1;
+        self.refusal = refusal;
+    }
+}
+
+impl Answers for Voice {
+    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
+        self.desk.answer(call, why, holder, answer)
+    }
+}
+
+impl Host for Voice {
+    fn event(&mut self, event: Event<'_>) {
+        match event {
+            Event::Joined { name } => tracing::info!("{name} takes part"),
+            Event::Left { name, why: None } => {
+                self.left += 1;
+                tracing::info!("{name} takes part no more: its connection is closed");
+            }
+            Event::Left { name, why: Some(Reason::Ending) } => {
+                self.left += 1;
+                tracing::debug!("{name} is told that the TCP router ends");
+            }
+            Event::Left { name, why: Some(why) } => {
+                self.left += 1;
+                tracing::warn!("{name} takes part no more: {}", why.word());
+            }
+            Event::Refused { reason: Reason::Ending, .. } => {}
+            Event::Refused { name, reason, digests: (theirs, ours), text } => self.refuses(match reason {
+                Reason::Common | Reason::System => format!(
+                    "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
+                     (`rohrpost check`, on both)",
+                    reason.word()
+                ),
+                _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),
+                _ => format!("{name} may not take part: {}: {text}", reason.word()),
+            }),
+            Event::Objected { name, verdict } => tracing::warn!("{name} may not host what it says: {verdict}"),
+        }
+    }
+}
+
+struct Connection {
+    stream: Stream,
+    peer: String,
+    /// It has shown a certificate, if it must.
+    is_known: bool,
+    /// It is looked whether it takes bytes again.
+    awaits_room: bool,
+}
+
+/// What the thread has.
+struct Work {
+    shared: Arc<Shared>,
+    server: Server,
+    host: Voice,
+    seal: Option<ServerSeal>,
+    /// Connections without a seal that holds, until the other end has read why, or this time has come, ns.
+    parting: Vec<(u64, Stream)>,
+    listener: TcpListener,
+    /// There is no descriptor left: nothing is accepted before, ns.
+    accept_ns: Option<u64>,
+    epoll: Epoll,
+    /// By client.
+    connections: Vec<Option<Connection>>,
+    clock: SystemClock,
+    piece: Box<[u8]>,
+}
+
+impl Work {
+    /// Until the router ends.
+    fn run(mut self) {
+        let mut events = [EpollEvent::empty(); EVENTS];
+        let (mut ending, mut say_ns) = (false, 0);
+        loop {
+            let now_ns = monotonic_ns();
+            if now_ns >= say_ns {
+                say_ns = now_ns + SAY_EVERY_NS;
+                self.parting.retain(|(until_ns, _)| now_ns < *until_ns);
+                self.server.set_time(self.clock.record());
+                self.say(now_ns);
+            }
+            if self.accept_ns.take_if(|at_ns| now_ns >= *at_ns).is_some() {
+                self.listen_for(EpollFlags::EPOLLIN);
+            }
+            if !ending && self.shared.ends.load(Ordering::Acquire) {
+                ending = true;
+                self.server.end(now_ns, &mut self.host);
+            }
+            match self.server.poll(now_ns, &mut self.host) {
+                Output::Write(client) => self.write(client),
+                Output::Close(client) => self.close(client),
+                Output::Wait { .. } if ending && self.connections.iter().all(Option::is_none) => return,
+                Output::Wait { until_ns } => self.sleep(&mut events, until_ns.min(say_ns)),
+            }
+        }
+    }
+
+    fn sleep(&mut self, events: &mut [EpollEvent], until_ns: u64) {
+        let wait_ns = until_ns.saturating_sub(monotonic_ns());
+        let timeout = EpollTimeout::try_from(wait_ns.div_ceil(1_000_000)).unwrap_or(EpollTimeout::ZERO);
+        // Interrupted by a signal, it looks again.
+        let count = self.epoll.wait(events, timeout).unwrap_or(0);
+        for event in &events[..count] {
+            match event.data() {
+                LISTENER => self.accept(),
+                BELL => drop(self.shared.bell.read()),
+                index => self.happened(ClientIndex(index as u16), event.events()),
+            }
+        }
+    }
+
+    /// Something happened to a client's socket; if the place has another client by now, there is nothing to read.
+    fn happened(&mut self, client: ClientIndex, flags: EpollFlags) {
+        if flags.contains(EpollFlags::EPOLLOUT) && self.flush(client) {
+            self.await_room(client, false);
+            self.server.writable(client);
+        }
+        if flags.intersects(EpollFlags::EPOLLIN | EpollFlags::EPOLLHUP | EpollFlags::EPOLLERR) {
+            self.read(client);
+        }
+    }
+
+    fn read(&mut self, client: ClientIndex) {
+        let Some(connection) = connection(&mut self.connections, client) else { return };
+        let moved = connection.stream.read(&mut self.piece);
+        let is_new = !connection.is_known;
+        match moved {
+            Moved::Over(Some(error)) if is_new && error.kind() == io::ErrorKind::Other => self.unsealed(client, &error),
+            Moved::Over(_) => self.broke(client),
+            Moved::Nothing => drop(self.flush(client)),
+            Moved::Bytes(_) if is_new && !self.is_known(client) => {
+                let error =
+                    io::Error::other("its certificate names no node; make new ones with `rohrpost certificates`");
+                self.unsealed(client, &error);
+            }
+            Moved::Bytes(bytes) => {
+                self.server.received(monotonic_ns(), client, &self.piece[..bytes], &mut self.host);
+            }
+        }
+    }
+
+    /// Learns who a client is from its certificate; false: that says it not.
+    fn is_known(&mut self, client: ClientIndex) -> bool {
+        let Some(connection) = connection(&mut self.connections, client) else { return false };
+        if connection.stream.is_sealed() {
+            let Some(Holder::Node { node, system }) = connection.stream.holder() else { return false };
+            self.server.certify(client, system, &format!("node {node} of system {system}"));
+        }
+        connection.is_known = true;
+        true
+    }
+
+    /// A connection cannot be sealed. The other end reads why, if this one waits a moment before it closes.
+    fn unsealed(&mut self, client: ClientIndex, error: &io::Error) {
+        let now_ns = monotonic_ns();
+        let Some(Connection { stream, peer, .. }) =
+            self.connections.get_mut(usize::from(client.0)).and_then(Option::take)
+        else {
+            return;
+        };
+        self.host.refuses(format!("{peer} may not take part: {error}"));
+        stream.end();
+        // Closed when the place is needed, or the time is over; until then nothing is asked of it.
+        if self.epoll.delete(&stream).is_ok() && self.parting.len() < PARTING_MAX {
+            self.parting.push((now_ns + PARTING_NS, stream));
+        }
+        self.server.closed(now_ns, client, &mut self.host);
+    }
+
+    /// Hands on what a connection took; whether all of it has left.
+    fn flush(&mut self, client: ClientIndex) -> bool {
+        let Some(connection) = connection(&mut self.connections, client) else { return false };
+        match connection.stream.flush() {
+            Ok(()) if connection.stream.has_unsent() => self.await_room(client, true),
+            Ok(()) => return true,
+            Err(_) => self.broke(client),
+        }
+        false
+    }
+
+    fn write(&mut self, client: ClientIndex) {
+        let Some(connection) = connection(&mut self.connections, client) else { return };
+        let ready = self.server.ready(client);
+        let moved = connection.stream.write(ready);
+        let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len()) && !connection.stream.has_unsent();
+        match moved {
+            Moved::Bytes(bytes) => self.server.took(monotonic_ns(), client, bytes),
+            Moved::Nothing => self.server.took(monotonic_ns(), client, 0),
+            Moved::Over(_) => return self.broke(client),
+        }
+        if !all {
+            self.await_room(client, true);
+        }
+    }
+
+    /// Whether epoll tells when a socket takes bytes again.
+    fn await_room(&mut self, client: ClientIndex, awaits: bool) {
+        let Some(connection) = connection(&mut self.connections, client) else { return };
+        if connection.awaits_room != awaits {
+            connection.awaits_room = awaits;
+            let flags = if awaits { EpollFlags::EPOLLIN | EpollFlags::EPOLLOUT } else { EpollFlags::EPOLLIN };
+            let mut event = EpollEvent::new(flags, client.0.into());
+            if self.epoll.modify(&connection.stream, &mut event).is_err() {
+                self.broke(client);
+            }
+        }
+    }
+
+    fn accept(&mut self) {
+        let now_ns = monotonic_ns();
+        for _ in 0..ACCEPTS {
+            match self.listener.accept() {
+                Ok((socket, peer)) => {
+                    let sealed = self.seal.as_ref().map(ServerSeal::begin).transpose();
+                    if let Ok(stream) = sealed.and_then(|sealed| Stream::new(socket, sealed)) {
+                        self.take_in(now_ns, stream, peer);
+                    }
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
+                Err(error) => {
+                    tracing::warn!("cannot accept a connection: {error}; raise the limit of open files (ulimit -n)");
+                    self.accept_ns = Some(now_ns + ACCEPT_AGAIN_NS);
+                    return self.listen_for(EpollFlags::empty());
+                }
+            }
+        }
+    }
+
+    /// Whether epoll tells of connections to be accepted.
+    fn listen_for(&self, flags: EpollFlags) {
+        if let Err(error) = self.epoll.modify(&self.listener, &mut EpollEvent::new(flags, LISTENER)) {
+            tracing::error!("epoll: {error}");
+        }
+    }
+
+    fn take_in(&mut self, now_ns: u64, stream: Stream, peer: SocketAddr) {
+        let peer = peer.to_string();
+        // Where there is no place, it is closed by being dropped.
+        let Some(client) = self.server.accept(now_ns, &peer, &mut self.host) else { return };
+        let event = EpollEvent::new(EpollFlags::EPOLLIN, client.0.into());
+        if self.epoll.add(&stream, event).is_err() {
+            return self.server.closed(now_ns, client, &mut self.host);
+        }
+        let index = usize::from(client.0);
+        if self.connections.len() <= index {
+            self.connections.resize_with(index + 1, || None);
+        }
+        self.connections[index] = Some(Connection { is_known: !stream.is_sealed(), stream, peer, awaits_room: false });
+    }
+
+    fn broke(&mut self, client: ClientIndex) {
+        self.close(client);
+        self.server.closed(monotonic_ns(), client, &mut self.host);
+    }
+
+    /// Closed, a socket is in no epoll any more.
+    fn close(&mut self, client: ClientIndex) {
+        if let Some(place) = self.connections.get_mut(usize::from(client.0)) {
+            *place = None;
+        }
+    }
+
+    fn say(&self, now_ns: u64) {
+        let member = |client: crate::session::server::View<'_>| Member {
+            name: client.name.to_owned(),
+            peer: self
+                .connections
+                .get(usize::from(client.index.0))
+                .and_then(Option::as_ref)
+                .map_or_else(String::new, |c| c.peer.clone()),
+            system: client.system,
+            is_member: client.is_member,
+            ranges: self.server.table().ranges_of(client.index).count() as u64,
+            age_ns: now_ns.saturating_sub(client.began_ns),
+            heard_ns: now_ns.saturating_sub(client.heard_ns),
+            bytes: client.bytes as u64,
+        };
+        let classes = Class::all(self.server.counts());
+        let Voice { left, refused, ref refusal, .. } = self.host;
+        let refusal = refusal.clone();
+        let members = self.server.views().map(member).collect();
+        self.shared.seen.say(Members { members, left, refused, refusal, classes });
+    }
+}
+
+fn connection(connections: &mut [Option<Connection>], client: ClientIndex) -> Option<&mut Connection> {
+    connections.get_mut(usize::from(client.0))?.as_mut()
+}

@@ -1,0 +1,141 @@
+//! A TCP router and systems of one node each, in this process.
+
+use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type, local, monotonic_ns};
+use rohrpost_routers::session::client::ClientSettings;
+use rohrpost_routers::session::server::ServerSettings;
+use rohrpost_routers::shell::{Faults, Undelivered};
+use rohrpost_routers::tcp::{
+    ClientParts, ClientSeal, ClientShell, LinkState, ServerError, ServerParts, ServerSeal, ServerShell,
+};
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What takes longer does not come any more, however busy the computer is.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const COMMON: u64 = 0xc0;
+
+pub(crate) fn wait<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(began.elapsed() < PATIENCE, "waited in vain: {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Says the cause's word.
+pub(crate) struct Words;
+
+impl Faults for Words {
+    fn write(&self, _: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool {
+        answer.extend_from_slice(why.cause.word().as_bytes());
+        true
+    }
+}
+
+/// A port that nobody had a moment ago.
+pub(crate) fn address() -> SocketAddr {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
+}
+
+pub(crate) fn node() -> (tempfile::TempDir, Arc<Node>) {
+    let folder = tempfile::tempdir().unwrap();
+    let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+    (folder, node)
+}
+
+pub(crate) fn start(address: SocketAddr, node: &Arc<Node>, life: u64) -> Result<ServerShell, ServerError> {
+    start_sealed(address, node, life, None)
+}
+
+pub(crate) fn start_sealed(
+    address: SocketAddr,
+    node: &Arc<Node>,
+    life: u64,
+    seal: Option<ServerSeal>,
+) -> Result<ServerShell, ServerError> {
+    let settings = ServerSettings {
+        name: "the TCP router".into(),
+        common: COMMON,
+        system: None,
+        life,
+        clients_max: 16,
+        greetings_max: 16,
+        quota_bytes: 256 << 10,
+        levels: [0; 256],
+    };
+    ServerShell::start(ServerParts { address, settings, faults: Arc::new(Words), seal, node })
+}
+
+/// A system of one node, with a module that hears and speaks.
+pub(crate) struct System {
+    id: u8,
+    pub(crate) client: ClientShell,
+    pub(crate) participant: Arc<Participant>,
+    heard: Receiver,
+    pub(crate) replies: Receiver,
+    _folder: tempfile::TempDir,
+}
+
+pub(crate) fn module(system: u8) -> Name {
+    Name::new(system, 100, 0, 0)
+}
+
+impl System {
+    pub(crate) fn new(id: u8, name: &str, server: SocketAddr) -> Self {
+        Self::sealed(id, name, server, None)
+    }
+
+    pub(crate) fn sealed(id: u8, name: &str, server: SocketAddr, seal: Option<ClientSeal>) -> Self {
+        let (folder, node) = node();
+        let settings = ClientSettings {
+            name: name.into(),
+            system: id,
+            reaches_own: false,
+            common: COMMON,
+            system_digest: id.into(),
+            life: monotonic_ns(),
+            quota_bytes: 256 << 10,
+            levels: [0; 256],
+        };
+        let own = (module(id).with_local(0), module(id).with_local(255));
+        let [before, after] = [own.0.raw() - 1, own.1.raw() + 1].map(Name::from_raw);
+        let beyond = vec![(Name::new(1, 1, 0, 0), before), (after, Name::from_raw(u32::MAX))];
+        let (tcp, faults) = (Name::new(id, 64, 0, 0), Arc::new(Words));
+        let parts = ClientParts { node: &node, name: tcp, server, settings, hosts: vec![own], beyond, faults, seal };
+        let client = ClientShell::start(parts).unwrap();
+        let participant = Participant::join(&node, module(id)).unwrap();
+        let shape = Shape { slots: 64, body_bytes_max: 1024, ..Shape::default() };
+        let heard = participant.receiver(module(id), shape).unwrap();
+        let replies = participant.receiver(module(id).with_local(local::REPLIES), shape).unwrap();
+        Self { id, client, participant, heard, replies, _folder: folder }
+    }
+
+    pub(crate) fn wait_up(&self) {
+        wait("it takes part", || (self.client.link().state == LinkState::Up).then_some(()));
+    }
+
+    pub(crate) fn sender(&self, to: u8) -> Sender {
+        self.participant.sender(module(to)).unwrap()
+    }
+
+    pub(crate) fn say(&self, sender: &mut Sender, number: u32) {
+        let from = module(self.id).with_local(local::REPLIES);
+        let label = Label { from, kind: Type::command(16), priority: Priority(100), ..Label::default() };
+        // A mailbox that is full for a moment is no matter here.
+        let _ = sender.send(&label, &[&number.to_le_bytes()]);
+    }
+
+    /// The next number that came.
+    pub(crate) fn hear(&mut self) -> Option<u32> {
+        let package = self.heard.try_receive()?;
+        Some(u32::from_le_bytes(package.body().try_into().unwrap()))
+    }
+
+    pub(crate) fn hear_within(&mut self, what: &str) -> u32 {
+        wait(what, || self.hear())
+    }
+}

@@ -1,0 +1,152 @@
+//! Sealed sessions: who has the right certificate takes part, and each other end learns why it does not.
+
+use crate::ground::{System, address, node, start_sealed, wait};
+use rcgen::{CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, date_time_ymd};
+use rohrpost_routers::tcp::{AUTHORITY, ClientSeal, Holder, LinkState, SealError, ServerSeal};
+use std::path::Path;
+use tempfile::TempDir;
+
+/// When a certificate holds.
+#[derive(Clone, Copy)]
+enum Holds {
+    Now,
+    UntilLongAgo,
+    NotYet,
+}
+
+/// An authority of its own, with a folder of certificates.
+struct Authority {
+    folder: TempDir,
+    issuer: Issuer<'static, KeyPair>,
+}
+
+impl Authority {
+    fn new() -> Self {
+        let (folder, key) = (tempfile::tempdir().unwrap(), KeyPair::generate().unwrap());
+        let mut params = CertificateParams::default();
+        params.is_ca = IsCa::Ca(rcgen::BasicConstraints::Unconstrained);
+        params.distinguished_name.push(DnType::CommonName, "test");
+        let certificate = params.self_signed(&key).unwrap();
+        std::fs::write(folder.path().join(format!("{AUTHORITY}.pem")), certificate.pem()).unwrap();
+        let authority = Self { issuer: Issuer::new(params, key), folder };
+        authority.issue(&Holder::Router, Holds::Now);
+        authority
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    fn issue(&self, holder: &Holder, holds: Holds) {
+        self.issue_as(holder, &holder.dns_name(), holds);
+    }
+
+    /// Whose files they are, and what the certificate says.
+    fn issue_as(&self, holder: &Holder, dns_name: &str, holds: Holds) {
+        let (key, mut params) = (KeyPair::generate().unwrap(), CertificateParams::new([dns_name.to_owned()]).unwrap());
+        params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ClientAuth, ExtendedKeyUsagePurpose::ServerAuth];
+        match holds {
+            Holds::Now => {}
+            Holds::UntilLongAgo => params.not_after = date_time_ymd(2020, 1, 1),
+            Holds::NotYet => params.not_before = date_time_ymd(2200, 1, 1),
+        }
+        let certificate = params.signed_by(&key, &self.issuer).unwrap();
+        let file = |end: &str| self.path().join(format!("{}.{end}", holder.file_name()));
+        std::fs::write(file("pem"), certificate.pem()).unwrap();
+        std::fs::write(file("key"), key.serialize_pem()).unwrap();
+    }
+
+    /// What a node of a system begins its connections with.
+    fn seal(&self, system: u8, holds: Holds) -> ClientSeal {
+        let holder = holder(system);
+        self.issue(&holder, holds);
+        ClientSeal::load(self.path(), &holder).unwrap()
+    }
+}
+
+fn holder(system: u8) -> Holder {
+    Holder::Node { node: "base".into(), system }
+}
+
+#[test]
+fn who_has_a_certificate_takes_part_under_the_name_in_it() {
+    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
+    let server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
+    let seal = |system| Some(authority.seal(system, Holds::Now));
+    let one = System::sealed(1, "one", address, seal(1));
+    let mut two = System::sealed(2, "two", address, seal(2));
+    one.wait_up();
+    two.wait_up();
+    let mut sender = one.sender(2);
+    for number in 0..50 {
+        one.say(&mut sender, number);
+        assert_eq!(two.hear_within("a package"), number);
+    }
+    let names = || server.members().members.into_iter().map(|member| member.name).collect::<Vec<_>>();
+    wait("names of certificates", || names().contains(&"node base of system 2".to_owned()).then_some(()));
+}
+
+#[test]
+fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
+    let (authority, foreign, address, (_folder, own)) = (Authority::new(), Authority::new(), address(), node());
+    let server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
+    let other_system = {
+        authority.issue(&holder(7), Holds::Now);
+        ClientSeal::load(authority.path(), &holder(7)).unwrap()
+    };
+    let nobody = {
+        authority.issue_as(&holder(8), "base.example", Holds::Now);
+        ClientSeal::load(authority.path(), &holder(8)).unwrap()
+    };
+    // It believes in the server's authority, but its own certificate is of another.
+    let forged = {
+        foreign.issue(&holder(9), Holds::Now);
+        std::fs::copy(authority.path().join("ca.pem"), foreign.path().join("ca.pem")).unwrap();
+        ClientSeal::load(foreign.path(), &holder(9)).unwrap()
+    };
+    // What the client says, and what the server says.
+    for (seal, words, said, what) in [
+        (Some(authority.seal(3, Holds::UntilLongAgo)), "expired", "has expired", "an expired one"),
+        (
+            Some(authority.seal(3, Holds::NotYet)),
+            "refuses this end's certificate",
+            "not valid yet",
+            "one of the future",
+        ),
+        (Some(forged), "foreign", "is foreign", "one of another authority"),
+        (Some(other_system), "certificate is of system 7", "certificate is of system 7", "one of another system"),
+        (Some(nobody), "closed the connection", "names no node", "one that names no node"),
+        (None, "TCP router", "does not speak TLS", "none, and no TLS"),
+    ] {
+        let client = System::sealed(3, "three", address, seal);
+        let link = wait(what, || Some(client.client.link()).filter(|link| link.why.contains(words)));
+        assert_ne!(link.state, LinkState::Up, "{what}");
+        wait(&format!("the server says {said}"), || server.members().refusal.contains(said).then_some(()));
+    }
+    assert!(server.members().members.iter().all(|member| !member.is_member));
+}
+
+#[test]
+fn a_server_of_another_installation_is_not_believed() {
+    let (authority, foreign, address, (_folder, own)) = (Authority::new(), Authority::new(), address(), node());
+    let _server = start_sealed(address, &own, 1, Some(ServerSeal::load(foreign.path()).unwrap())).unwrap();
+    let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
+    wait("why", || client.client.link().why.contains("its certificate is foreign").then_some(()));
+    // A node's certificate makes nobody a server.
+    authority.issue_as(&Holder::Router, "base.system-1.rohrpost", Holds::Now);
+    let (address, (_folder, own)) = (self::address(), node());
+    let _server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
+    let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
+    wait("why", || client.client.link().why.contains("not that of a TCP router").then_some(()));
+}
+
+#[test]
+fn files_that_are_not_there_are_named() {
+    let authority = Authority::new();
+    let error = ClientSeal::load(authority.path(), &holder(4)).unwrap_err();
+    assert!(
+        matches!(&error, SealError::File(path, _) if path.ends_with("base.system-4.pem") || path.ends_with("base.system-4.key")),
+        "{error}"
+    );
+    assert!(error.to_string().contains("`rohrpost certificates`"), "{error}");
+}

@@ -1,0 +1,222 @@
+//! What crosses, what a dead server costs, and who holds up whom.
+
+use crate::ground::{COMMON, System, address, module, node, start, wait};
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Priority, Type};
+use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
+use rohrpost_routers::tcp::{Link, LinkState};
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::time::Duration;
+
+/// A client that says what it likes.
+struct Raw(TcpStream);
+
+impl Raw {
+    fn new(server: SocketAddr, system: u8, common: u64) -> Self {
+        let mut raw = Self(TcpStream::connect(server).unwrap());
+        raw.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
+        raw.say(&Message::Hello(Hello {
+            system,
+            reaches_own: false,
+            common,
+            system_digest: system.into(),
+            life: 1000 + u64::from(system),
+            attempt: 1,
+            asked_ns: 0,
+            name: "raw",
+        }));
+        raw
+    }
+
+    fn say(&mut self, message: &Message<'_>) {
+        let mut bytes = Vec::new();
+        message.write(&mut bytes);
+        self.0.write_all(&bytes).unwrap();
+    }
+
+    fn hosts(&mut self, system: u8) {
+        let range = Range { first: module(system), last: module(system).with_local(255) };
+        let mut bytes = Vec::new();
+        self.say(&Message::Register(Ranges::new(1, &[range], &mut bytes)));
+    }
+
+    /// Reads until the connection is closed; what came.
+    fn rest(&mut self) -> Vec<u8> {
+        let mut all = Vec::new();
+        wait("the end of the connection", || {
+            let mut piece = [0; 4096];
+            match self.0.read(&mut piece) {
+                Ok(0) => Some(()),
+                Ok(bytes) => {
+                    all.extend_from_slice(&piece[..bytes]);
+                    None
+                }
+                Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => None,
+                Err(_) => Some(()),
+            }
+        });
+        all
+    }
+}
+
+#[test]
+fn packages_cross_from_system_to_system_and_what_is_not_there_is_answered() {
+    let (address, (_folder, own)) = (address(), node());
+    let _server = start(address, &own, 1).unwrap();
+    let (mut one, mut two) = (System::new(1, "one", address), System::new(2, "two", address));
+    one.wait_up();
+    two.wait_up();
+    let mut sender = one.sender(2);
+    for number in 0..100 {
+        one.say(&mut sender, number);
+        assert_eq!(two.hear_within("a package"), number);
+    }
+    let mut back = two.sender(1);
+    two.say(&mut back, 7);
+    assert_eq!(one.hear_within("the way back"), 7);
+    // Nobody hosts this one; the answer says so.
+    let mut nowhere = one.participant.sender(module(3)).unwrap();
+    one.say(&mut nowhere, 8);
+    let answer = wait("an answer", || one.replies.try_receive().map(|package| package.body().to_vec()));
+    assert_eq!(String::from_utf8_lossy(&answer), "no-route");
+    // What one node cannot deliver itself is told by it.
+    let mut absent = one.participant.sender(module(2).with_local(9)).unwrap();
+    one.say(&mut absent, 9);
+    let answer = wait("an answer", || one.replies.try_receive().map(|package| package.body().to_vec()));
+    assert_eq!(String::from_utf8_lossy(&answer), "no-mailbox");
+}
+
+#[test]
+fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
+    let (address, (_folder, own)) = (address(), node());
+    let mut server = Some(start(address, &own, 1).unwrap());
+    let (one, mut two) = (System::new(1, "one", address), System::new(2, "two", address));
+    one.wait_up();
+    two.wait_up();
+    let (mut sender, mut number, mut last) = (one.sender(2), 0, None);
+    for life in 2..6 {
+        // Under load until some came, then without a server while the load goes on.
+        let before = last;
+        wait("packages that cross", || {
+            number += 1;
+            one.say(&mut sender, number);
+            while let Some(heard) = two.hear() {
+                assert!(last.is_none_or(|last| heard > last), "in order, and none twice: {heard} after {last:?}");
+                last = Some(heard);
+            }
+            (last != before && last > Some(number.saturating_sub(20))).then_some(())
+        });
+        drop(server.take());
+        for _ in 0..50 {
+            number += 1;
+            one.say(&mut sender, number);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        server = Some(wait("its port is free", || start(address, &own, life).ok()));
+        one.wait_up();
+        two.wait_up();
+    }
+    wait("packages that cross again", || {
+        number += 1;
+        one.say(&mut sender, number);
+        while let Some(heard) = two.hear() {
+            assert!(last.is_none_or(|last| heard > last), "{heard} after {last:?}");
+            last = Some(heard);
+        }
+        (last > Some(number.saturating_sub(20))).then_some(())
+    });
+    assert!(one.client.link().connections >= 5);
+}
+
+#[test]
+fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
+    let (address, (_folder, own)) = (address(), node());
+    let _server = start(address, &own, 1).unwrap();
+    let first = System::new(1, "the first", address);
+    first.wait_up();
+    let second = System::new(1, "the second", address);
+    let why = |link: Link| (!link.why.is_empty()).then_some(link.why);
+    let why = wait("an objection", || why(second.client.link()));
+    assert!(why.contains("hosted by the first"), "{why}");
+    assert_eq!(first.client.link().state, LinkState::Up);
+    drop(first);
+    second.wait_up();
+}
+
+#[test]
+fn who_is_of_another_installation_or_no_client_at_all_is_told_and_closed() {
+    let (address, (_folder, own)) = (address(), node());
+    let server = start(address, &own, 1).unwrap();
+    let told = Raw::new(address, 1, COMMON + 1).rest();
+    assert!(told.windows(14).any(|bytes| bytes == b"the TCP router"), "a refusal that says whose digest differs");
+    let mut stranger = Raw(TcpStream::connect(address).unwrap());
+    stranger.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
+    stranger.0.write_all(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n").unwrap();
+    assert!(stranger.rest().windows(4).any(|bytes| bytes == b"RpTc"), "a refusal");
+    wait("both are counted", || (server.members().refused >= 2).then_some(()));
+    // Half open: it said nothing after its hello, and nothing for good.
+    let mut silent = Raw::new(address, 2, COMMON);
+    wait("it takes part", || server.members().members.iter().any(|member| member.is_member).then_some(()));
+    silent.rest();
+    wait("it is gone", || server.members().members.is_empty().then_some(()));
+}
+
+#[test]
+fn a_client_that_reads_nothing_holds_up_nobody() {
+    let (address, (_folder, own)) = (address(), node());
+    let server = start(address, &own, 1).unwrap();
+    let (one, mut two) = (System::new(1, "one", address), System::new(2, "two", address));
+    one.wait_up();
+    two.wait_up();
+    // It hosts names, and speaks now and then, but never reads.
+    let mut slow = Raw::new(address, 3, COMMON);
+    slow.hosts(3);
+    wait("it hosts", || {
+        server.members().members.iter().any(|member| member.system == 3 && member.ranges == 1).then_some(())
+    });
+    let mut flood = Raw::new(address, 4, COMMON);
+    flood.hosts(4);
+    let body = vec![0; 32 << 10];
+    let head = Head {
+        to: module(3),
+        from: module(4),
+        len: body.len() as u16,
+        kind: Type::data(1),
+        priority: Priority(90),
+        ..Head::default()
+    };
+    let mut sender = one.sender(2);
+    for number in 0..200 {
+        // 16 times 32 KiB into a connection that takes nothing, before each package beside it.
+        for _ in 0..16 {
+            flood.say(&Message::Package(Carried { hops: 0, published_ns: 0, head, body: &body }));
+        }
+        slow.say(&Message::Ask(0));
+        flood.say(&Message::Ask(0));
+        one.say(&mut sender, number);
+        assert_eq!(two.hear_within("a package beside the flood"), number);
+    }
+    let lost = || {
+        let classes = server.members().classes.into_iter().filter(|class| class.priority == Priority(90));
+        classes.flat_map(|class| class.lost).map(|(_, count)| count).sum::<u64>()
+    };
+    wait("what does not fit is lost, and counted", || (lost() > 0).then_some(()));
+    let bytes = server.members().members.iter().map(|member| member.bytes).max();
+    assert!(bytes < Some(2 << 20), "{bytes:?} B for one client");
+}
+
+#[test]
+fn what_is_for_all_systems_comes_once_to_each() {
+    let (address, (_folder, own)) = (address(), node());
+    let _server = start(address, &own, 1).unwrap();
+    let mut systems = [1, 2, 3].map(|id| System::new(id, "a system", address));
+    systems.iter().for_each(System::wait_up);
+    let mut to_all = systems[0].sender(ALL_SYSTEMS);
+    let mut to_each = [1, 2, 3].map(|id| systems[0].sender(id));
+    systems[0].say(&mut to_all, 7);
+    // What comes behind it shows that nothing else does.
+    to_each.iter_mut().for_each(|sender| systems[0].say(sender, 8));
+    for system in &mut systems {
+        assert_eq!([system.hear_within("one for all"), system.hear_within("one for each")], [7, 8]);
+    }
+}

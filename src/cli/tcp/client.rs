@@ -1,0 +1,90 @@
+//! A node's client of the TCP router, as a module.
+
+use super::{NoSettings, PERIOD, classes, levels, short};
+use crate::cli::router::faults::Encoded;
+use rohrpost::config::Tcp as Configured;
+use rohrpost::interfaces::{BeyondLink, BeyondState, Tcp, TcpInterface};
+use rohrpost::mailbox::realtime_ns;
+use rohrpost::{Context, Module, ModuleError};
+use rohrpost_routers::session::client::ClientSettings;
+use rohrpost_routers::tcp::{ClientParts, ClientSeal, ClientShell, Holder, LinkState};
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+pub(super) struct ClientModule {
+    shell: ClientShell,
+    node: String,
+    server: SocketAddr,
+}
+
+impl Tcp for ClientModule {}
+
+impl Module for ClientModule {
+    type Settings = NoSettings;
+    type Interfaces = TcpInterface;
+
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
+        let installation = context.installation();
+        let tcp = installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))?;
+        let node_name = installation.node_of(context.me()).unwrap_or_default().to_owned();
+        let holder = Holder::Node { node: node_name.clone(), system: installation.system.id };
+        let seal = match &tcp.certificates {
+            Some(folder) => Some(ClientSeal::load(&installation.resolve(folder), &holder)?),
+            None => {
+                tracing::warn!("{}", Configured::UNPROTECTED);
+                None
+            }
+        };
+        let digest = installation.digest();
+        let settings = ClientSettings {
+            name: short(&format!("node {node_name} of {}", installation.system.name)),
+            system: installation.system.id,
+            reaches_own: false,
+            common: digest.common,
+            system_digest: digest.system,
+            life: realtime_ns().max(1),
+            quota_bytes: tcp.quota_bytes,
+            levels: levels(tcp),
+        };
+        let server = tcp.address;
+        let node = context.link().borrow().participant().node().clone();
+        let shell = ClientShell::start(ClientParts {
+            node: &node,
+            name: context.me(),
+            server,
+            settings,
+            hosts: installation.names_on(&node_name),
+            beyond: installation.names_beyond(&node_name),
+            faults: Arc::new(Encoded::new(digest.lan())),
+            seal,
+        })?;
+        context.set_period(PERIOD);
+        Ok(Self { shell, node: node_name, server })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        // Without its thread it is of no use; started again, it is.
+        assert!(self.shell.is_well(), "the thread of the client of the TCP router has ended");
+        let link = self.shell.link();
+        context.publish_now(
+            TcpInterface::LINK,
+            &BeyondLink {
+                node: self.node.clone(),
+                server: self.server.to_string(),
+                state: match link.state {
+                    LinkState::Away => BeyondState::Away,
+                    LinkState::Joining => BeyondState::Joining,
+                    LinkState::Up => BeyondState::Up,
+                },
+                why: link.why,
+                reconnects: link.connections.saturating_sub(1),
+                round_trip_ns: link.round_trip_ns,
+                time_error_ns: link.time_error_ns,
+                waiting_bytes: link.waiting_bytes,
+                sent: classes(&link.out),
+                received: classes(&link.inn),
+            },
+        )?;
+        Ok(())
+    }
+}

@@ -1,0 +1,76 @@
+//! `rohrpost tcp-router` and `rohrpost tcp-client`: what carries packages beyond the LAN. Launch starts them where `[tcp]` says so.
+
+mod client;
+mod server;
+
+use super::Failure;
+use rohrpost::Start;
+use rohrpost::config::Tcp;
+use rohrpost::interfaces::{CarriedLoss, ClassPassed};
+use rohrpost::mailbox::Priority;
+use rohrpost_modules::runtime::{exit, run_started};
+use rohrpost_routers::tcp::Class;
+use serde::Deserialize;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// How often they tell how they are.
+const PERIOD: Duration = Duration::from_millis(500);
+/// Bytes of a name that sessions take.
+const NAME_BYTES_MAX: usize = rohrpost_routers::session::frame::NAME_BYTES_MAX;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Launch starts the TCP router on the node that `server` of [tcp] names, and a client of it on every node; by hand they are \
+of use where modules are started by hand: rohrpost tcp-router --config robot.toml --name tcp.255"
+)]
+pub(super) struct Arguments {
+    /// What every module takes: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the clients of the nodes.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+/// Runs the server.
+pub(super) fn serve(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(run_started::<server::ServerModule>)))
+}
+
+/// Runs a client.
+pub(super) fn join(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(run_started::<client::ClientModule>)))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NoSettings {}
+
+/// The level of each priority.
+fn levels(tcp: &Tcp) -> [u8; 256] {
+    std::array::from_fn(|priority| tcp.level(Priority(priority as u8)))
+}
+
+/// A name for people, no longer than sessions take it.
+fn short(name: &str) -> String {
+    let printable = || name.chars().filter(|c| !c.is_control());
+    let ends = printable().scan(0, |end, c| {
+        *end += c.len_utf8();
+        Some(*end)
+    });
+    printable().take(ends.take_while(|end| *end <= NAME_BYTES_MAX).count()).collect()
+}
+
+fn classes(all: &[Class]) -> Vec<ClassPassed> {
+    let class = |class: &Class| ClassPassed {
+        class: class.priority.0,
+        packages: class.packages,
+        passed: class.passed,
+        lost: class
+            .lost
+            .iter()
+            .map(|(cause, packages)| CarriedLoss { cause: cause.word().into(), packages: *packages })
+            .collect(),
+    };
+    all.iter().map(class).collect()
+}

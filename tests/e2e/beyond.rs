@@ -1,0 +1,242 @@
+//! Systems that meet at a TCP router, each in a network namespace of its own: `north` (system 1) runs it, `south` (system 2) reaches it.
+
+use crate::harness::{Place, Robot, probe, signal, skipped, wait};
+use crate::probe::ProbingInterface;
+use crate::process::{Running, Said};
+use nix::sys::signal::Signal;
+use rohrpost::CallError;
+use rohrpost::macro_support::{append, from_bytes};
+use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+/// Head of all configurations but for the system.
+const CLASSES: &str = r#"
+[classes]
+router = { id = 250 }
+probe = { id = 96 }
+tcp = { id = 64, text = "Carries packages beyond the LAN" }
+output = { id = 32, text = "Collects what modules say" }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+"#;
+
+/// Nodes, which are systems too, and their addresses.
+const NODES: [(&str, &str); 2] = [("north", "10.79.0.1"), ("south", "10.79.0.2")];
+const OPEN: &str = "security = \"none\"";
+const SEALED: &str = "security = \"tls\"\ncertificates = \"certificates\"";
+
+/// Two systems of one installation, each of one node.
+struct Systems {
+    // Dropped in this order: processes, what they left, their network.
+    nodes: Vec<(Running, Robot)>,
+    place: Place,
+    lab: Lab,
+}
+
+impl Systems {
+    /// None launched. None at all, and said so, where namespaces are not permitted.
+    fn new(security: &str) -> Option<Self> {
+        let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
+        let lab = match Lab::new(&NODES.map(spec), 1500) {
+            Ok(lab) => lab,
+            Err(LabError::NotAllowed(error)) => {
+                skipped(&format!("systems that meet (network namespaces: {error})"));
+                return None;
+            }
+            Err(error) => panic!("{error}"),
+        };
+        let place = Place::new();
+        for ((node, _), id) in NODES.into_iter().zip(1..) {
+            std::fs::write(place.path(&format!("{node}.toml")), configured(node, id, security)).unwrap();
+        }
+        Some(Self { nodes: Vec::new(), place, lab })
+    }
+
+    fn launched(security: &str) -> Option<Self> {
+        let mut systems = Self::new(security)?;
+        if security == SEALED {
+            for (node, _) in NODES {
+                systems.place.say(&["certificates", systems.config(node).to_str().unwrap()]).ok();
+            }
+        }
+        NODES.into_iter().for_each(|(node, _)| systems.launch(node));
+        NODES.into_iter().for_each(|(node, _)| systems.wait_up(node));
+        Some(systems)
+    }
+
+    fn config(&self, node: &str) -> PathBuf {
+        self.place.path(&format!("{node}.toml"))
+    }
+
+    fn launch(&mut self, node: &str) {
+        let command = self.place.command(&["launch", self.config(node).to_str().unwrap()]);
+        let mut launch = {
+            let _inside = self.lab.enter(node).unwrap();
+            Running::start(command)
+        };
+        let robot = self.place.robot(&self.config(node), node, &mut launch);
+        robot.wait_on(&mut launch);
+        self.nodes.push((launch, robot));
+    }
+
+    /// What `net` says of a node's client of the TCP router.
+    fn client(&self, node: &str) -> serde_json::Value {
+        let said = self.says(node, &["net", "--json"]);
+        let told: serde_json::Value = serde_json::from_str(said.out.trim()).unwrap_or_default();
+        told[0]["beyond"].clone()
+    }
+
+    fn wait_up(&self, node: &str) {
+        wait(format!("{node} takes part"), || (self.client(node)["state"] == "up").then_some(()));
+    }
+
+    /// A command of a person at a node.
+    fn says(&self, node: &str, arguments: &[&str]) -> Said {
+        self.place.say_at(&self.config(node), node, arguments)
+    }
+
+    /// A program that is no node, at `south`'s computer, in a system of its own.
+    fn foreign(&self, system: u8, order: &str, certificates: &[&str]) -> Running {
+        let common = format!("{:x}", self.robot("north").installation.digest().common);
+        let mut command = Command::new("python3");
+        command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/foreign.py"));
+        command.args([NODES[0].1, "21119", &common, &system.to_string(), order, "1.96.0.0"]).args(certificates);
+        command.current_dir(self.place.path("")).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let _inside = self.lab.enter("south").unwrap();
+        Running::start(command)
+    }
+
+    fn robot(&self, node: &str) -> &Robot {
+        &self.nodes[NODES.iter().position(|(known, _)| *known == node).unwrap()].1
+    }
+
+    /// What counting at `south` brings, called from `north`.
+    fn count(&self, number: u32) -> Result<u64, CallError> {
+        let north = self.robot("north");
+        let mut tool = north.tool(Duration::from_secs(1));
+        let write = |body: &mut Vec<u8>| append(body, &(number,));
+        let (probe, hash) = (north.name("2.probe.0.0"), ProbingInterface::hash());
+        let counted = tool.call(probe, crate::probe::COUNT, hash, write, |bytes| from_bytes(bytes));
+        tool.close();
+        counted
+    }
+
+    fn stop(mut self) {
+        for (mut launch, robot) in self.nodes.drain(..) {
+            drop(robot);
+            launch.stop();
+        }
+        self.place.assert_empty();
+    }
+}
+
+fn configured(node: &str, id: u8, security: &str) -> String {
+    let (server, address) = (if id == 1 { "server = \"north\"\n" } else { "" }, NODES[0].1);
+    format!(
+        "installation = \"test\"\n[system]\nname = \"{node}\"\nid = {id}\n{CLASSES}[nodes.{node}]\n[tcp]\n{security}\naddress = \"{address}\"\n\
+         {server}{}",
+        probe("probe.0", "rate-hz = 20.0", "")
+    )
+}
+
+/// What crosses, both ways.
+fn check_crossing(systems: &Systems) {
+    assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "1"]).ok(), "1\n");
+    assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "2"]).ok(), "2\n", "by another tool");
+    assert_eq!(systems.says("south", &["call", "1.probe.0.0", "count", "3"]).ok(), "1\n", "the other way");
+    let data = systems.says("north", &["echo", "2.probe.0.0", "beat", "--count", "3"]).ok();
+    assert_eq!(data.lines().count(), 3, "{data}");
+    let word = "x".repeat(900);
+    let told = systems.says("north", &["call", "2.probe.0.0", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
+    assert!(told.contains(&word), "{told}");
+}
+
+#[test]
+fn calls_and_data_cross_from_system_to_system() {
+    let Some(systems) = Systems::launched(OPEN) else { return };
+    check_crossing(&systems);
+    for nobodys in ["2.probe.7.0", "9.probe.0.0"] {
+        let told = systems.says("north", &["call", nobodys, "count", "1"]).fails();
+        assert!(told.contains("no router knows a way there"), "{told}");
+    }
+    systems.says("south", &["stop", "probe.0"]).ok();
+    let told = systems.says("north", &["call", "2.probe.0.0", "count", "1"]).fails();
+    assert!(told.contains("2.probe.0.0 does not run; start it in system 2"), "{told}");
+    let shown = systems.says("north", &["net"]).ok();
+    for words in ["TCP router", "up", "node south of south", "node north of north", "takes part"] {
+        assert!(shown.contains(words), "no `{words}` in:\n{shown}");
+    }
+    systems.stop();
+}
+
+#[test]
+fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
+    let Some(systems) = Systems::launched(OPEN) else { return };
+    let clients = || NODES.map(|(node, _)| systems.robot(node).pid("tcp.0"));
+    let before = clients();
+    let mut last = 0;
+    for number in 0..3 {
+        last = wait("a call that comes through", || systems.count(number).ok().filter(|counted| *counted > last));
+        let server = systems.robot("north").pid("tcp.255");
+        signal(server, Signal::SIGKILL);
+        systems.robot("north").wait_restarted("tcp.255", server);
+    }
+    wait("a call that comes through", || systems.count(9).ok().filter(|counted| *counted > last));
+    assert_eq!(clients(), before, "nothing else was started again");
+    let reconnects = systems.client("south")["reconnects"].as_u64().unwrap();
+    assert!(reconnects >= 3, "{reconnects}");
+    systems.stop();
+}
+
+#[test]
+fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
+    let Some(mut systems) = Systems::launched(SEALED) else { return };
+    check_crossing(&systems);
+    // South's certificates are made anew, by another authority.
+    let (mut south, robot) = systems.nodes.pop().unwrap();
+    drop(robot);
+    south.stop();
+    let config = systems.config("south");
+    let text = std::fs::read_to_string(&config).unwrap();
+    std::fs::write(&config, text.replace("\"certificates\"", "\"others\"")).unwrap();
+    systems.place.say(&["certificates", config.to_str().unwrap()]).ok();
+    systems.launch("south");
+    let why = wait("why it takes no part", || {
+        let why = systems.client("south")["why"].as_str().map(str::to_owned);
+        why.filter(|why| why.contains("foreign"))
+    });
+    assert!(why.contains("ca.pem"), "{why}");
+    let shown = systems.says("north", &["net"]).ok();
+    assert!(shown.contains("its certificate is foreign"), "the TCP router says it, too:\n{shown}");
+    systems.stop();
+}
+
+/// A program calls, subscribes and is called.
+fn check_foreign(systems: &Systems, system: u8, order: &str, certificates: &[&str]) {
+    let mut program = systems.foreign(system, order, certificates);
+    for line in ["takes part", "counted ", "heard 3 beats"] {
+        program.wait_for(line);
+    }
+    let module = format!("{system}.probe.0.0");
+    assert_eq!(systems.says("north", &["call", &module, "double", "21"]).ok(), "42\n", "{order}");
+    program.wait_for("doubled 21");
+    let said = systems.says("north", &["call", &module]).ok();
+    assert!(said.contains("double <number: u32> -> u32"), "{said}");
+}
+
+#[test]
+fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
+    let Some(systems) = Systems::launched(OPEN) else { return };
+    check_foreign(&systems, 3, "little", &[]);
+    check_foreign(&systems, 4, "big", &[]);
+    systems.stop();
+    let Some(systems) = Systems::launched(SEALED) else { return };
+    let file = systems.place.path("python.toml");
+    std::fs::write(&file, configured("python", 5, SEALED)).unwrap();
+    systems.place.say(&["certificates", file.to_str().unwrap()]).ok();
+    check_foreign(&systems, 5, "big", &["certificates", "python.system-5"]);
+    systems.stop();
+}
