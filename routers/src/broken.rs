@@ -91,6 +91,10 @@ mod variants {
         KeepsParts,
         /// Fragment: as many packages are put together at a time as have begun.
         Unbounded,
+        /// Security: what was opened before is opened again.
+        OpensTwice,
+        /// Security: whoever says hello is held to live.
+        BeginsUnproven,
         /// Time slots: a wake-up that comes too late is none too late.
         NoLateGate,
         /// Time slots: a node sends however far off its clock may be.

@@ -28,6 +28,7 @@ mod netlink;
 pub mod outbound;
 pub mod queue;
 pub mod report;
+pub mod security;
 pub mod settings;
 pub mod shell;
 pub mod sim;

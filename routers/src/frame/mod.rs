@@ -8,6 +8,7 @@
 //!  packages: (package head 16, body) over and over        fragment: first u64, index u16, count u16, offset u32, package head, bytes
 //!  alive: incarnation u64 and next sequence u64 of the peer as we heard it, datagrams of it that we missed u64
 //!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
+//!  byte 7: key that what follows the head is sealed with, 0: it is not, see `security`; hello: always sealed
 //! ```
 //!
 //! All fields of ours are little-endian; the head of a package is in the order that its own options tell. The check is the CRC-32 of
@@ -58,6 +59,8 @@ pub enum Kind {
     Alive = 3,
     /// "I take nothing from you."
     Refusal = 4,
+    /// Sealed always: "do you live?", and the answer to it.
+    Hello = 5,
     /// Time: the master says what time it is.
     Sync = 16,
     /// Time: makes the way warm for the next, and says nothing.
@@ -69,11 +72,12 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Packages,
         Self::Fragment,
         Self::Alive,
         Self::Refusal,
+        Self::Hello,
         Self::Sync,
         Self::WarmUp,
         Self::Request,
@@ -118,14 +122,19 @@ impl FrameHead {
     /// The 36 bytes that go before `rest`, which is all that follows, in parts.
     pub fn to_bytes(&self, rest: &[&[u8]]) -> [u8; HEAD_BYTES] {
         let mut bytes = [0; HEAD_BYTES];
-        bytes[0..2].copy_from_slice(&MAGIC);
-        bytes[2..7].copy_from_slice(&[VERSION, self.kind as u8, self.system, self.from, self.to]);
-        bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
-        bytes[16..24].copy_from_slice(&self.incarnation.to_le_bytes());
-        bytes[24..32].copy_from_slice(&self.sequence.to_le_bytes());
+        self.write(0, &mut bytes);
         let check = check(&bytes, rest);
         bytes[CHECK].copy_from_slice(&check.to_le_bytes());
         bytes
+    }
+
+    /// Writes all but the check to where a datagram begins. `key`: what it is to be sealed with.
+    pub(crate) fn write(&self, key: u8, bytes: &mut [u8]) {
+        bytes[0..2].copy_from_slice(&MAGIC);
+        bytes[2..8].copy_from_slice(&[VERSION, self.kind as u8, self.system, self.from, self.to, key]);
+        bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
+        bytes[16..24].copy_from_slice(&self.incarnation.to_le_bytes());
+        bytes[24..32].copy_from_slice(&self.sequence.to_le_bytes());
     }
 
     /// Reads the head; what follows is returned as it is, see [`Frame::parse`].
@@ -133,6 +142,15 @@ impl FrameHead {
     /// # Errors
     /// [`BadFrame`]
     pub fn parse(datagram: &[u8]) -> Result<(Self, &[u8]), BadFrame> {
+        let (head, key) = Self::read(datagram)?;
+        if key != 0 {
+            return Err(BadFrame::Damaged("it is sealed"));
+        }
+        Ok((head, &datagram[HEAD_BYTES..]))
+    }
+
+    /// Reads the head, and which key what follows it is sealed with; 0: none.
+    pub(crate) fn read(datagram: &[u8]) -> Result<(Self, u8), BadFrame> {
         let (b, rest) = datagram.split_first_chunk::<HEAD_BYTES>().ok_or(BadFrame::Foreign)?;
         if b[0..2] != MAGIC {
             return Err(BadFrame::Foreign);
@@ -144,9 +162,6 @@ impl FrameHead {
             return Err(BadFrame::Version(b[2]));
         }
         let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
-        if b[7] != 0 {
-            return Err(BadFrame::Damaged("byte 7 is not 0"));
-        }
         let head = Self {
             kind,
             system: b[4],
@@ -162,13 +177,26 @@ impl FrameHead {
         if head.sequence > SEQUENCE_MAX {
             return Err(BadFrame::Damaged("a sequence that no router reaches"));
         }
-        Ok((head, rest))
+        Ok((head, b[7]))
+    }
+}
+
+/// Of a head, what the check and a seal are over.
+pub(crate) fn before_check(head: &[u8]) -> &[u8] {
+    &head[..CHECK.start]
+}
+
+/// Writes the check of a datagram that is whole but for it.
+pub(crate) fn write_check(datagram: &mut [u8]) {
+    if let Some((head, rest)) = datagram.split_first_chunk_mut::<HEAD_BYTES>() {
+        let check = check(head, &[rest]);
+        head[CHECK].copy_from_slice(&check.to_le_bytes());
     }
 }
 
 fn check(head: &[u8; HEAD_BYTES], rest: &[&[u8]]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&head[..CHECK.start]);
+    hasher.update(before_check(head));
     rest.iter().for_each(|part| hasher.update(part));
     hasher.finalize()
 }
@@ -200,6 +228,7 @@ impl<'a> Frame<'a> {
             Kind::Fragment => Self::Fragment(Fragment::parse(rest)?),
             Kind::Alive => Self::Alive(Alive::parse(rest)?),
             Kind::Refusal => Self::Refusal(Refusal::parse(datagram[2], rest)?),
+            Kind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
             Kind::Sync | Kind::WarmUp | Kind::Request | Kind::Reply => Self::Time(rest),
         };
         Ok((head, frame))

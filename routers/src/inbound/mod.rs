@@ -8,7 +8,7 @@
 mod order;
 mod peer;
 mod refusing;
-mod window;
+pub(crate) mod window;
 
 pub use window::{REORDER_MAX, WINDOW};
 
