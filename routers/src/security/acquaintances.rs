@@ -74,6 +74,8 @@ struct Peer {
     life: Published,
     /// What it must answer for a life of it to begin.
     challenge: AtomicU64,
+    /// Questions to it.
+    asked: AtomicU32,
     /// By [`Port`]: the next sequence that may be sealed.
     sealed: [AtomicU64; 2],
 }
@@ -94,6 +96,7 @@ impl Acquaintances {
             hello_from: seals(node, who.own),
             life: Published::default(),
             challenge: AtomicU64::new(0),
+            asked: AtomicU32::new(0),
             sealed: Default::default(),
         };
         let peers = (0..who.nodes).map(peer).collect();
@@ -161,11 +164,15 @@ impl Acquaintances {
         &self.peer(peer).hello_from[key]
     }
 
-    /// A question to a peer, with one of its keys after the other: which of them the peer has is not known.
+    /// A question to a peer, with one of its keys after the other: which of them the peer has is not known. None
+    /// as long as there is nobody who would take an answer.
     pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
-        let key = self.hellos.load(Ordering::Relaxed) as usize % self.keys.len();
         let question = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
-        self.hello(peer, key, question, datagram)
+        if question.challenge == 0 {
+            return None;
+        }
+        let asked = self.peer(peer).asked.fetch_add(1, Ordering::Relaxed) as usize;
+        self.hello(peer, asked % self.keys.len(), question, datagram)
     }
 
     /// The sequences that come next, by [`Port`].

@@ -164,6 +164,13 @@ fn keys_are_changed_node_by_node_without_a_gap() {
 }
 
 #[test]
+fn each_peer_is_asked_with_each_key_in_turn() {
+    let a = Router::with_keys(0, 100, ring(&[2, 1]));
+    let asked: Vec<_> = [1, 2, 1, 2].map(|peer| (peer, a.ask(peer)[7])).into();
+    assert_eq!(asked, [(1, 2), (2, 2), (1, 1), (2, 1)]);
+}
+
+#[test]
 fn two_that_asked_at_once_with_different_keys_take_what_either_seals() {
     let (mut a, mut b) = (Router::with_keys(0, 100, ring(&[2, 1])), Router::with_keys(1, 200, ring(&[2, 1])));
     let _ = b.ask(0);
