@@ -42,6 +42,8 @@ pub struct Installation {
     pub modules: Vec<Module>,
     /// How nodes reach each other; none if there is one only.
     pub network: Option<Network>,
+    /// The folder with the keys that seal what passes between nodes; none if nothing is sealed.
+    pub keys: Option<PathBuf>,
     /// When each node sends; none if each sends as packages come.
     pub tdma: Option<Tdma>,
     /// Where system time comes from.
@@ -147,6 +149,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
     let tdma = Tdma::read(&file, sections(&file, "slot"), &nodes);
     let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes, tdma.as_ref()));
+    let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
     let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
     network::judge(&file, &nodes, &classes);
@@ -181,6 +184,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         nodes,
         modules,
         network,
+        keys,
         tdma,
         time,
         output,

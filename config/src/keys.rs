@@ -1,20 +1,26 @@
-//! The file with an installation's keys: the same on all its nodes, and readable by its owner alone.
+//! The folder with an installation's keys, and the file in it with those that seal datagrams: the same on all its nodes, and readable by
+//! its owner alone.
 //!
 //! ```text
+//! keys/udp.keys
 //! # Keys of a Rohrpost installation …
 //! key 2 7d2f…      64 digits; the newest first
 //! key 1 03c9…      while keys are changed: the one that goes
 //! ```
 
 use std::fmt;
-use std::fs::{File, OpenOptions, Permissions};
+use std::fs::{DirBuilder, File, OpenOptions, Permissions};
 use std::io::{self, Read, Write};
 use std::num::NonZeroU8;
-use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 /// Bytes of a key.
 pub const KEY_BYTES: usize = 32;
+/// The folder, beside the configuration unless that names another.
+pub(crate) const FOLDER: &str = "keys";
+/// The file in it.
+const FILE: &str = "udp.keys";
 /// Keys that are valid at a time.
 const KEYS_MAX: usize = 2;
 /// Longer is no such file; it is not read further.
@@ -54,7 +60,7 @@ pub struct Keys {
 #[derive(Debug, thiserror::Error)]
 pub enum KeysError {
     /// The file itself.
-    #[error("{path}: keys cannot be read ({1}); make them with `rohrpost keys new`, and copy the file to all nodes", path = .0.display())]
+    #[error("{path}: keys cannot be read ({1}); make them with `rohrpost keys new {folder}`, and copy them to all nodes", path = .0.display(), folder = folder_of(.0))]
     Read(PathBuf, io::Error),
     /// Others may read it.
     #[error("{path}: others than its owner may read these keys (mode {1:o}); run `chmod 600 {path}`, and if others could log in here, change the keys", path = .0.display())]
@@ -91,6 +97,11 @@ pub enum KeysError {
 }
 
 impl Keys {
+    /// Where they lie in a folder.
+    pub fn file(folder: &Path) -> PathBuf {
+        folder.join(FILE)
+    }
+
     /// The first key of an installation. `bytes` come from a source of random numbers that is fit for keys.
     pub fn first(bytes: [u8; KEY_BYTES]) -> Self {
         Self { newest: Key { id: NonZeroU8::MIN, bytes }, older: None }
@@ -137,12 +148,14 @@ impl Keys {
         Self::parse(&text).map_err(|(line, why)| KeysError::Wrong { path: path.to_owned(), line, why })
     }
 
-    /// Writes a file that is not there yet.
+    /// Writes a file that is not there yet, and its folder, if that is not there either.
     ///
     /// # Errors
     /// [`KeysError::Exists`] and [`KeysError::Write`]
     pub fn create(&self, path: &Path) -> Result<(), KeysError> {
-        let written = new_file(path).and_then(|mut file| self.write(&mut file));
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+        let made = folder.map_or(Ok(()), |folder| DirBuilder::new().recursive(true).mode(0o700).create(folder));
+        let written = made.and_then(|()| new_file(path)).and_then(|mut file| self.write(&mut file));
         written.map_err(|error| match error.kind() {
             io::ErrorKind::AlreadyExists => KeysError::Exists(path.to_owned()),
             _ => KeysError::Write(path.to_owned(), error),
@@ -212,6 +225,10 @@ impl Keys {
             None => Err((lines().count().max(1), "no key in it; make one with `rohrpost keys new`".into())),
         }
     }
+}
+
+fn folder_of(file: &Path) -> std::path::Display<'_> {
+    file.parent().unwrap_or(file).display()
 }
 
 /// A file that was not there, for its owner alone from its first moment on.

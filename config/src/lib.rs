@@ -69,7 +69,7 @@ pub use installation::Installation;
 pub use keys::{KEY_BYTES, Key, Keys, KeysError};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
 pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
-pub use network::{LEVEL_NOT_REAL_TIME, NODES_MAX, Network, Route, TRANSIT};
+pub use network::{LEVEL_NOT_REAL_TIME, NODES_MAX, Network, Route, Security, TRANSIT};
 pub use node::{Node, System};
 pub use output::{Level, LineFormat, Output};
 pub use program::{MissingProgram, find_program};

@@ -5,7 +5,7 @@ mod router;
 
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkState,
-    Links, PeerLink, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
+    Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
 };
 
 use crate::interface;

@@ -8,7 +8,7 @@ use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::settings::{NodeSettings, Settings};
 use crate::stats::{Cause, Side, Stats};
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -41,6 +41,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
         digest: 7,
         incarnation: 100 + u64::from(own),
         network: Network {
+            security: Security::None,
             port: 21117,
             mtu: 1500,
             datagram_bytes_max: 1472,

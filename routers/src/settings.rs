@@ -5,7 +5,7 @@
 use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
 use crate::tdma::{LATE_NS, Wire};
-use rohrpost_config::{Installation, Network, Route, Tdma};
+use rohrpost_config::{Installation, Network, Route, Security, Tdma};
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name};
 use std::net::IpAddr;
 
@@ -102,10 +102,15 @@ impl Settings {
         })
     }
 
-    /// Bytes that IP and UDP put before each datagram; the rate counts them.
+    /// Bytes around each datagram, of IP and UDP and of what seals it; the rate counts them.
     pub fn overhead_bytes(&self) -> usize {
         let is_v6 = self.nodes.iter().any(|node| node.address.is_ipv6());
-        if is_v6 { 40 + 8 } else { 20 + 8 }
+        Network::around_bytes(is_v6, self.network.security)
+    }
+
+    /// Whether what passes between nodes is sealed.
+    pub fn is_sealed(&self) -> bool {
+        self.network.security == Security::Keys
     }
 
     /// The longest datagram that this node sends. Where it has time slots, it fits into each of them, also if the thread comes as late

@@ -7,7 +7,7 @@
 pub mod counting;
 
 use counting::{CountingHeap, heap_uses};
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
@@ -44,6 +44,7 @@ fn settings(own: NodeIndex) -> Settings {
         digest: 7,
         incarnation: 9,
         network: Network {
+            security: Security::None,
             port: 21117,
             mtu: 1500,
             datagram_bytes_max: 1472,

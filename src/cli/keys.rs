@@ -9,7 +9,8 @@ use std::process::ExitCode;
 
 #[derive(Args)]
 #[command(
-    after_help = "Example: rohrpost keys new robot.keys\nThen copy the file to every node, as safely as a password. To change keys: `rotate`, copy the file and \
+    after_help = "Example: rohrpost keys new\nIt makes the folder `keys`, which belongs beside the configuration. Copy it to every node, as safely as a password, and \
+                  write `security = \"keys\"` in [network]. To change keys: `rotate`, copy the folder and \
                   restart the routers, one node after the other; then `finish`, and the same again."
 )]
 pub(super) struct Arguments {
@@ -31,31 +32,37 @@ enum Step {
 
 #[derive(Args)]
 struct Place {
-    /// The file with the keys.
-    #[arg(value_name = "FILE", default_value = "rohrpost.keys")]
-    file: PathBuf,
+    /// The folder with the keys.
+    #[arg(value_name = "FOLDER", default_value = "keys")]
+    folder: PathBuf,
+}
+
+impl Place {
+    fn file(&self) -> PathBuf {
+        Keys::file(&self.folder)
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (place, keys) = match &arguments.step {
         Step::New(place) => {
             let keys = Keys::first(security::random()?);
-            keys.create(&place.file)?;
+            keys.create(&place.file())?;
             (place, keys)
         }
         Step::Rotate(place) => {
-            let keys = Keys::load(&place.file)?.rotated(security::random()?)?;
-            keys.replace(&place.file)?;
+            let keys = Keys::load(&place.file())?.rotated(security::random()?)?;
+            keys.replace(&place.file())?;
             (place, keys)
         }
         Step::Finish(place) => {
-            let keys = Keys::load(&place.file)?.finished()?;
-            keys.replace(&place.file)?;
+            let keys = Keys::load(&place.file())?.finished()?;
+            keys.replace(&place.file())?;
             (place, keys)
         }
-        Step::Show(place) => (place, Keys::load(&place.file)?),
+        Step::Show(place) => (place, Keys::load(&place.file())?),
     };
-    say(text(&place.file.display().to_string(), &keys));
+    say(text(&place.file().display().to_string(), &keys));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -76,29 +83,30 @@ fn fingerprint(key: &Key) -> String {
 mod tests {
     use super::*;
 
-    fn step(step: fn(Place) -> Step, file: &std::path::Path) -> Result<ExitCode, String> {
-        let arguments = Arguments { step: step(Place { file: file.into() }) };
+    fn step(step: fn(Place) -> Step, folder: &std::path::Path) -> Result<ExitCode, String> {
+        let arguments = Arguments { step: step(Place { folder: folder.into() }) };
         run(&arguments).map_err(|failure| failure.to_string())
     }
 
     #[test]
     fn keys_are_made_changed_and_shown_but_never_said() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("robot.keys");
-        assert!(step(Step::Show, &file).unwrap_err().contains("rohrpost keys new"));
-        step(Step::New, &file).unwrap();
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("keys");
+        let file = Keys::file(&folder);
+        assert!(step(Step::Show, &folder).unwrap_err().contains("rohrpost keys new"));
+        step(Step::New, &folder).unwrap();
         let first = Keys::load(&file).unwrap();
-        assert!(step(Step::New, &file).unwrap_err().contains("already"), "no key is ever overwritten by a first one");
-        step(Step::Rotate, &file).unwrap();
+        assert!(step(Step::New, &folder).unwrap_err().contains("already"), "no key is ever overwritten by a first one");
+        step(Step::Rotate, &folder).unwrap();
         let both = Keys::load(&file).unwrap();
         assert_eq!(both.older, Some(first.newest));
         assert_ne!(both.older.as_ref().map(|older| older.bytes), Some(both.newest.bytes));
-        let said = text("robot.keys", &both);
+        let said = text("udp.keys", &both);
         let secret = std::fs::read_to_string(&file).unwrap();
         let digits = secret.lines().filter_map(|line| line.split_whitespace().nth(2)).filter(|word| word.len() == 64);
         assert_eq!(digits.filter(|digits| said.contains(&digits[..8])).count(), 0, "{said}");
         assert_ne!(fingerprint(&both.newest), fingerprint(both.older.as_ref().unwrap()));
-        step(Step::Finish, &file).unwrap();
+        step(Step::Finish, &folder).unwrap();
         assert_eq!(Keys::load(&file).unwrap(), Keys { older: None, ..both });
     }
 }

@@ -113,6 +113,9 @@ pub enum BadFrame {
     /// Another version of the format.
     #[error("wire format {theirs}, ours is {VERSION}; run the same version of Rohrpost on all nodes", theirs = .0)]
     Version(u8),
+    /// Sealed, and nothing else is taken here that is.
+    #[error("sealed, and this node's configuration says `security = \"none\"`; launch all nodes from the same file")]
+    Sealed,
     /// Of this format, but wrong in itself.
     #[error("damaged: {0}")]
     Damaged(&'static str),
@@ -144,7 +147,7 @@ impl FrameHead {
     pub fn parse(datagram: &[u8]) -> Result<(Self, &[u8]), BadFrame> {
         let (head, key) = Self::read(datagram)?;
         if key != 0 {
-            return Err(BadFrame::Damaged("it is sealed"));
+            return Err(BadFrame::Sealed);
         }
         Ok((head, &datagram[HEAD_BYTES..]))
     }
@@ -179,6 +182,20 @@ impl FrameHead {
         }
         Ok((head, b[7]))
     }
+}
+
+/// Of a head that was written: for whom it is, and its sequence.
+///
+/// # Panics
+/// If there is none.
+pub(crate) fn place_of(datagram: &[u8]) -> (NodeIndex, u64) {
+    let (head, _) = datagram.split_first_chunk::<HEAD_BYTES>().expect("a datagram has a head");
+    (head[6], long(head, 24))
+}
+
+/// Says in a head what the datagram is sealed with.
+pub(crate) fn write_key(key: u8, datagram: &mut [u8]) {
+    datagram[7] = key;
 }
 
 /// Of a head, what the check and a seal are over.
@@ -223,15 +240,19 @@ impl<'a> Frame<'a> {
     /// [`BadFrame`]
     pub fn parse(datagram: &'a [u8]) -> Result<(FrameHead, Self), BadFrame> {
         let (head, rest) = FrameHead::parse(datagram)?;
-        let frame = match head.kind {
+        Ok((head, Self::read(head.kind, datagram[2], rest)?))
+    }
+
+    /// The same of what follows a head, as a router of a `version` wrote it.
+    pub(crate) fn read(kind: Kind, version: u8, rest: &'a [u8]) -> Result<Self, BadFrame> {
+        Ok(match kind {
             Kind::Packages => Self::Packages(Packages::check(rest)?),
             Kind::Fragment => Self::Fragment(Fragment::parse(rest)?),
             Kind::Alive => Self::Alive(Alive::parse(rest)?),
-            Kind::Refusal => Self::Refusal(Refusal::parse(datagram[2], rest)?),
+            Kind::Refusal => Self::Refusal(Refusal::parse(version, rest)?),
             Kind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
             Kind::Sync | Kind::WarmUp | Kind::Request | Kind::Reply => Self::Time(rest),
-        };
-        Ok((head, frame))
+        })
     }
 }
 
@@ -371,6 +392,8 @@ pub enum Reason {
     Digest = 2,
     /// Its configuration has no such node, or that node has another address.
     Stranger = 3,
+    /// Who seals is not understood by who does not.
+    Sealed = 4,
 }
 
 /// "I take nothing from you, since …"
@@ -395,7 +418,7 @@ impl Refusal {
 
     fn parse(version: u8, rest: &[u8]) -> Result<Self, BadFrame> {
         let b: &[u8; REFUSAL_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("a refusal has 16 bytes"))?;
-        let reasons = [Reason::Version, Reason::Digest, Reason::Stranger];
+        let reasons = [Reason::Version, Reason::Digest, Reason::Stranger, Reason::Sealed];
         let reason = reasons.into_iter().find(|reason| *reason as u8 == b[0]);
         let reason = reason.filter(|_| b[1..8] == [0; 7]).ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
         Ok(Self { version, reason, digest: long(b, 8) })

@@ -55,14 +55,22 @@ impl Peer {
     /// Whether a datagram is of the life that is heard. A life that was not known begins; of one that is over nothing is taken, unless
     /// it goes on, and the one that was taken for its successor is silent: then it was the other way round. What it sent before it was
     /// over says nothing: that may be a copy, which the wire or a stranger kept.
-    pub(super) fn lives(&mut self, now_ns: u64, head: &FrameHead, way: &Way<'_>, deliver: &mut impl Deliver) -> bool {
+    /// `is_sure`: it is the present life, for it has shown so.
+    pub(super) fn lives(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        is_sure: bool,
+        way: &Way<'_>,
+        deliver: &mut impl Deliver,
+    ) -> bool {
         if head.incarnation == self.incarnation {
             return true;
         }
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
-        if was.is_some() && !(is_silent && goes_on) && !broken!(TakesOldLives) {
+        if was.is_some() && !is_sure && !(is_silent && goes_on) && !broken!(TakesOldLives) {
             if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
                 deliver.event(Event::Twice { peer: way.from });

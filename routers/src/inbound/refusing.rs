@@ -23,7 +23,7 @@ pub(super) struct Refusing {
 }
 
 impl Inbound {
-    pub(super) fn peer_at(&self, source: IpAddr) -> Option<NodeIndex> {
+    pub(crate) fn peer_at(&self, source: IpAddr) -> Option<NodeIndex> {
         self.settings.node_at(source).filter(|node| *node != self.settings.own)
     }
 
@@ -52,7 +52,8 @@ impl Inbound {
                 &mut self.strangers
             }
         };
-        if refusing.due.is_none() {
+        // Sealed, nobody is told: that would have to be believed without a seal.
+        if refusing.due.is_none() && !self.settings.is_sealed() {
             refusing.due = Some((source, mismatch.reason));
             self.must_refuse = true;
         }

@@ -5,7 +5,9 @@ use super::keys::{Binding, End, KeyRing, Purpose};
 use super::seal::{self, Seal, TAG_BYTES};
 use super::tally::Rejections;
 use super::{HELLO_BYTES, HELLO_DATAGRAM_BYTES};
+use crate::settings::Settings;
 use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 
@@ -45,6 +47,14 @@ pub struct Who {
     pub incarnation: u64,
 }
 
+impl Who {
+    /// The router of these settings.
+    pub fn of(settings: &Settings) -> Self {
+        let Settings { system, own, digest, incarnation, .. } = *settings;
+        Self { system, own, nodes: settings.nodes.len() as NodeIndex, digest, incarnation }
+    }
+}
+
 /// A life of a peer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Life {
@@ -60,10 +70,20 @@ pub struct Acquaintances {
     pub(super) who: Who,
     pub(super) keys: KeyRing,
     peers: Box<[Peer]>,
+    /// Peers of which a life is known, one bit each.
+    known: AtomicU64,
+    /// Peers of whose life datagrams said something else, one bit each.
+    doubts: AtomicU64,
     /// Hellos of this life.
     hellos: AtomicU64,
     /// By [`Port`].
     rejections: [Arc<Rejections>; 2],
+}
+
+impl fmt::Debug for Acquaintances {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Acquaintances").field("who", &self.who).finish_non_exhaustive()
+    }
 }
 
 /// A peer.
@@ -101,12 +121,18 @@ impl Acquaintances {
         };
         let peers = (0..who.nodes).map(peer).collect();
         let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(who.nodes)));
-        Arc::new(Self { peers, who, keys, hellos: AtomicU64::new(0), rejections })
+        let none = || AtomicU64::new(0);
+        Arc::new(Self { peers, who, keys, known: none(), doubts: none(), hellos: none(), rejections })
     }
 
     /// What was not taken at a port.
     pub fn rejections(&self, port: Port) -> &Arc<Rejections> {
         &self.rejections[port as usize]
+    }
+
+    /// The peers that something can be sealed to, one bit each.
+    pub fn known(&self) -> u64 {
+        self.known.load(Ordering::Relaxed)
     }
 
     /// The life of a peer that is known to live, if there is one.
@@ -131,6 +157,23 @@ impl Acquaintances {
 
     pub(super) fn begin(&self, peer: NodeIndex, life: Life) {
         self.peer(peer).life.write(life);
+        self.known.fetch_or(1 << peer, Ordering::Relaxed);
+        self.doubts.fetch_and(!(1 << peer), Ordering::Relaxed);
+    }
+
+    /// Something came of another life of a peer, or to another of ours: perhaps it has another by now. It is to be asked soon.
+    pub(super) fn doubt(&self, peer: NodeIndex) {
+        if !self.doubts(peer) {
+            self.doubts.fetch_or(1 << peer, Ordering::Relaxed);
+        }
+    }
+
+    pub(super) fn doubts(&self, peer: NodeIndex) -> bool {
+        self.doubts.load(Ordering::Relaxed) & 1 << peer != 0
+    }
+
+    pub(super) fn doubted(&self, peer: NodeIndex) {
+        self.doubts.fetch_and(!(1 << peer), Ordering::Relaxed);
     }
 
     pub(super) fn challenge(&self, peer: NodeIndex) -> u64 {
@@ -198,7 +241,10 @@ impl Acquaintances {
     }
 }
 
-const _: () = assert!(HELLO_DATAGRAM_BYTES == HEAD_BYTES + HELLO_BYTES + TAG_BYTES);
+const _: () = {
+    assert!(HELLO_DATAGRAM_BYTES == HEAD_BYTES + HELLO_BYTES + TAG_BYTES);
+    assert!(rohrpost_config::NODES_MAX <= 64, "peers are the bits of a word");
+};
 
 /// A life that one thread writes and others read, whole. Who reads while it is written gets nothing, and goes on with what it had.
 #[derive(Default)]

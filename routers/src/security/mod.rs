@@ -15,7 +15,7 @@
 //! sequence on its life will be heard, so nothing that a life had sent before is taken either.
 //!
 //! ```text
-//!  arrivals:   Opening (packages), Greeter ──── Acquaintances: who lives ────▶ departures: Sealing (packages)
+//!  arrivals:   Gate: Opening (packages), Greeter ──── Acquaintances: who lives ────▶ departures: Sealing (packages)
 //!                                                                        └────▶ clock:     Sealing, Opening (time)
 //! ```
 //!
@@ -23,6 +23,7 @@
 //! nobody brings about who has no key.
 
 mod acquaintances;
+mod gate;
 mod greeter;
 mod hello;
 mod keys;
@@ -33,6 +34,7 @@ mod sealing;
 mod tally;
 
 pub use acquaintances::{Acquaintances, Port, Who};
+pub use gate::{ASK_EVERY_NS, Gate, Said};
 pub use greeter::{ANSWERS_MAX, Greeted, Greeter, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};

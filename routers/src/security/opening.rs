@@ -49,12 +49,22 @@ pub enum Rejection {
     /// Its seal is not right: made with another key, or altered.
     #[error("its seal is not right: another key with this id, or someone altered it; all nodes need the same key file")]
     Forged,
+    /// Of another wire format: nothing more can be told of it.
+    #[error("it is of another wire format; run the same version of Rohrpost on all nodes")]
+    Version,
 }
 
 impl Rejection {
     /// All, in their order.
-    pub const ALL: [Self; 6] =
-        [Self::Unsealed, Self::OtherKey, Self::NotOurs, Self::OtherLife, Self::Replay, Self::Forged];
+    pub const ALL: [Self; 7] = [
+        Self::Unsealed,
+        Self::OtherKey,
+        Self::NotOurs,
+        Self::OtherLife,
+        Self::Replay,
+        Self::Forged,
+        Self::Version,
+    ];
 
     /// A word for people and programs.
     pub const fn word(self) -> &'static str {
@@ -65,6 +75,7 @@ impl Rejection {
             Self::OtherLife => "other-life",
             Self::Replay => "replay",
             Self::Forged => "forged",
+            Self::Version => "version",
         }
     }
 }
@@ -120,7 +131,10 @@ impl Opening {
             return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));
         }
         let heard = Self::heard(&mut self.peers, all, self.port, head.from);
-        let heard = heard.filter(|heard| heard.incarnation == head.incarnation).ok_or(Rejection::OtherLife)?;
+        let heard = heard.filter(|heard| heard.incarnation == head.incarnation).ok_or_else(|| {
+            all.doubt(head.from);
+            Rejection::OtherLife
+        })?;
         if heard.window.is_copy(head.sequence) && !broken!(OpensTwice) {
             return Err(Rejection::Replay.into());
         }

@@ -3,7 +3,7 @@
 use super::acquaintances::{Acquaintances, Known, Port};
 use super::keys::End;
 use super::seal::{self, Seal};
-use crate::frame::{FrameHead, NodeIndex};
+use crate::frame::{self, FrameHead, NodeIndex};
 use std::sync::Arc;
 
 /// No life of the peer is known to live, so there is nobody to seal to.
@@ -38,18 +38,43 @@ impl Sealing {
     /// # Panics
     /// If a sequence of the head was sealed before.
     pub fn seal(&mut self, head: &FrameHead, datagram: &mut [u8]) -> Result<(), Unacquainted> {
-        let Self { all, port, peers } = self;
-        let (to, port) = (head.to, *port);
-        let way = peers[usize::from(to)].of(all, to, |life| {
+        head.write(0, datagram);
+        self.close(datagram)
+    }
+
+    /// The same of a datagram whose head was written, with a check or without.
+    ///
+    /// # Errors
+    /// [`Unacquainted`]: ask first.
+    ///
+    /// # Panics
+    /// If a sequence of the head was sealed before, or there is no head.
+    pub fn close(&mut self, datagram: &mut [u8]) -> Result<(), Unacquainted> {
+        let (to, sequence) = frame::place_of(datagram);
+        let port = self.port;
+        let all = &self.all;
+        let way = Self::way(&mut self.peers, all, port, to).ok_or(Unacquainted)?;
+        all.use_up(port, to, sequence);
+        frame::write_key(way.key_id, datagram);
+        way.seal.close(seal::of_sequence(sequence), datagram);
+        Ok(())
+    }
+
+    /// Takes back what [`Self::close`] did last to a datagram that could not be sent: what is in it can be read again.
+    pub fn reopen(&mut self, datagram: &mut [u8]) {
+        let (to, sequence) = frame::place_of(datagram);
+        if let Some(way) = Self::way(&mut self.peers, &self.all, self.port, to) {
+            // Another life has begun meanwhile: then it is as good as lost on the wire.
+            let _ = way.seal.open(seal::of_sequence(sequence), datagram);
+        }
+    }
+
+    fn way<'a>(peers: &'a mut [Known<Way>], all: &Acquaintances, port: Port, to: NodeIndex) -> Option<&'a mut Way> {
+        peers[usize::from(to)].of(all, to, |life| {
             let peer = End { node: to, incarnation: life.incarnation };
             let seal = all.keys.derive(life.key, &all.binding(port, all.own(), peer));
             Way { key_id: all.keys.id(life.key), seal }
-        });
-        let way = way.ok_or(Unacquainted)?;
-        all.use_up(port, to, head.sequence);
-        head.write(way.key_id, datagram);
-        way.seal.close(seal::of_sequence(head.sequence), datagram);
-        Ok(())
+        })
     }
 
     /// Asks a peer whether it lives, in the first bytes of a datagram; how many. It is to be asked until it is heard.

@@ -20,6 +20,7 @@ mod modules;
 pub mod packages;
 pub mod plan;
 pub mod receiving;
+mod seals;
 mod rough;
 pub mod run;
 pub mod sending;

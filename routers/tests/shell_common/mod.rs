@@ -1,6 +1,6 @@
 //! Two nodes in one process, each with its router, at addresses of the loopback.
 
-use rohrpost_config::{Network, Route, Tdma, TimeSlot};
+use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::settings::{NodeSettings, Settings};
@@ -72,6 +72,7 @@ impl Side {
         let there = module(1 - own);
         let nodes = [0, 1].map(|node| NodeSettings { name: format!("node{node}"), address: addresses[node] });
         let network = Network {
+            security: Security::None,
             port: 21_117,
             mtu: 1500,
             datagram_bytes_max: 1472,

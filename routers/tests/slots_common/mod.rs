@@ -5,7 +5,7 @@
 pub(crate) mod process;
 pub(crate) mod talk;
 
-use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
+use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
 use rohrpost_mailbox::{
     HEAD_BYTES, Head, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type,
     monotonic_ns, realtime_ns,
@@ -272,6 +272,7 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
         digest: 7,
         incarnation: realtime_ns(),
         network: Network {
+            security: Security::None,
             port: PORT,
             mtu: 1500,
             datagram_bytes_max: 1472,

@@ -3,7 +3,7 @@
 
 use crate::frames::checked;
 use crate::split::Bytes;
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::fragment::PARTIAL_MAX;
 use rohrpost_routers::frame::NodeIndex;
@@ -50,6 +50,7 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
         digest: 7,
         incarnation,
         network: Network {
+            security: Security::None,
             port: 21117,
             mtu: 576,
             datagram_bytes_max: DATAGRAM_BYTES,
