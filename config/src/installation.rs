@@ -1,5 +1,6 @@
 //! An installation as its file describes it, read and checked as a whole.
 
+use crate::access::Access;
 use crate::check;
 use crate::classes::ClassTable;
 use crate::directory::Directory;
@@ -48,6 +49,8 @@ pub struct Installation {
     pub tdma: Option<Tdma>,
     /// Where system time comes from.
     pub time: TimeSource,
+    /// Which classes may command which from other nodes.
+    pub access: Vec<Access>,
     /// What the output service keeps.
     pub output: Output,
     /// What the GUI draws.
@@ -165,6 +168,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let read = sections.into_iter().enumerate().filter_map(|(index, section)| context.read(section, index));
     let (modules, lines): (Vec<Module>, Vec<_>) = routers.into_iter().chain(read).unzip();
 
+    let access = Access::read_all(file.section("access", "[access]"), &classes);
     let output = Output::read(file.section("output", "[output]"), &directory, &folder);
     let gui = Gui::read(file.section("gui", "[gui]"), &directory);
     let flow_sections = self::sections(&file, "flow").into_iter();
@@ -187,6 +191,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         keys,
         tdma,
         time,
+        access,
         output,
         gui,
         flows,

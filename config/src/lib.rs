@@ -31,6 +31,7 @@
 //! Every key of the file is described in [`manual`].
 #![forbid(unsafe_code)]
 
+mod access;
 mod bounds;
 mod calls;
 mod check;
@@ -58,6 +59,7 @@ mod time;
 mod units;
 pub mod wire;
 
+pub use access::Access;
 pub use bounds::{Bound, FlowBound, TAKEN_BEFORE, Unbounded, bounds};
 pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TOOL, is_word as is_class_name};
 pub use digest::Digest;

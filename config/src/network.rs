@@ -205,9 +205,7 @@ pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
         file.reader.report(node.line, format!("[nodes]: there are {}; a system has at most {NODES_MAX}", nodes.len()));
     }
     if file.get("network").is_none() {
-        file.report(format!(
-            "section `[network]` is missing; with several nodes add it, and {CHOICES}"
-        ));
+        file.report(format!("section `[network]` is missing; with several nodes add it, and {CHOICES}"));
     }
     if classes.id(ROUTER).is_none() {
         let line = file.get("classes").map_or(file.line, |classes| classes.line);
@@ -259,7 +257,10 @@ impl Installation {
         let network = self.network?;
         Some(match (network.security, &self.keys) {
             (Security::Keys, Some(folder)) => {
-                format!("security = \"keys\": what passes between nodes is sealed with {}", Keys::file(folder).display())
+                format!(
+                    "security = \"keys\": what passes between nodes is sealed with {}",
+                    Keys::file(folder).display()
+                )
             }
             _ => Network::UNPROTECTED.into(),
         })

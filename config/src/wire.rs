@@ -172,3 +172,27 @@ pub(crate) struct Parcel {
     /// The last one from a switch to the receiver.
     pub(crate) forward_ns: u64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn link(security: Security) -> Link {
+        let around = Network::around_bytes(false, security);
+        let datagram_bytes_max = 1500 - around;
+        Link { bytes_s: 1_000_000, heads_bytes: around, datagram_bytes_max, answer_bytes: answer_bytes(security) }
+    }
+
+    #[test]
+    fn what_seals_is_counted_in_all_that_a_slot_carries() {
+        let [open, sealed] = [Security::None, Security::Keys].map(link);
+        // At a byte a microsecond.
+        let tag_ns = 16_000;
+        assert_eq!(sealed.time_wire_ns(), open.time_wire_ns() + tag_ns);
+        assert_eq!(sealed.alive_ns(), open.alive_ns() + tag_ns);
+        assert_eq!(sealed.package(100).takes_ns, open.package(100).takes_ns + tag_ns);
+        assert_eq!(sealed.largest_ns(), open.largest_ns(), "a packet carries as much as before");
+        assert_eq!(open.package(1472 - 52).datagrams, 1);
+        assert_eq!(sealed.package(1472 - 52).datagrams, 2, "of which the seal takes its part");
+    }
+}

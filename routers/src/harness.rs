@@ -1,5 +1,6 @@
 //! What the tests of the cores have in common: settings from plain values, a log of all that is told, and a router without sockets.
 
+use crate::access::Access;
 use crate::broken::{Broken, with};
 use crate::flows::Flow;
 use crate::frame::NodeIndex;
@@ -52,6 +53,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
         tdma: None,
         routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
         senders: vec![vec![module(200, own)], vec![module(100, own)]],
+        access: Access::default(),
         flows: Vec::new(),
     }
 }

@@ -13,6 +13,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod access;
 pub mod broken;
 pub mod flows;
 pub mod fragment;

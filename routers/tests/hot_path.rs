@@ -9,6 +9,7 @@ pub mod counting;
 use counting::{CountingHeap, heap_uses};
 use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::{Datagram, Inbound};
@@ -55,6 +56,7 @@ fn settings(own: NodeIndex) -> Settings {
         tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(255), node: other }],
         senders: vec![vec![module(own)]],
+        access: Access::default(),
         flows: vec![Flow {
             from: vec![module(own)],
             to: vec![module(other)],

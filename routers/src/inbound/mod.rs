@@ -16,10 +16,11 @@ use crate::broken::broken;
 use crate::frame::{BadFrame, Frame, FrameHead, Reason, VERSION};
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
-use crate::stats::Stats;
+use crate::stats::{Cause, Stats};
 use order::position;
 use peer::{Peer, Way};
 use refusing::Refusing;
+use rohrpost_mailbox::Head;
 use std::net::IpAddr;
 use std::sync::Arc;
 
@@ -189,14 +190,7 @@ impl Inbound {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    fn take(
-        &mut self,
-        now_ns: u64,
-        came: &Came,
-        head: &FrameHead,
-        frame: Frame<'_>,
-        deliver: &mut impl Deliver,
-    ) {
+    fn take(&mut self, now_ns: u64, came: &Came, head: &FrameHead, frame: Frame<'_>, deliver: &mut impl Deliver) {
         let from = head.from;
         let way = Way { from, stats: &self.stats, peer: self.stats.peer(from) };
         let peer = &mut self.peers[usize::from(from)];
@@ -211,11 +205,20 @@ impl Inbound {
         way.peer.received.datagrams.add(1);
         way.peer.received.bytes.add(came.bytes as u64);
         let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS && !broken!(TakesStale);
+        let settings = &self.settings;
+        let refused = |package: &Head| if is_old { Some(Cause::Stale) } else { settings.refuses(from, package) };
         match frame {
             Frame::Packages(packages) => {
                 for (index, (package, body)) in (0..).zip(packages) {
                     way.stats.inn.came(package.priority);
-                    way.pass(is_old, &mut peer.order, position(head.sequence, index), &package, body, deliver);
+                    way.pass(
+                        refused(&package),
+                        &mut peer.order,
+                        position(head.sequence, index),
+                        &package,
+                        body,
+                        deliver,
+                    );
                 }
             }
             Frame::Fragment(part) => {
@@ -223,7 +226,14 @@ impl Inbound {
                 let whole =
                     peer.reassembly.take(now_ns, &part, |head, body, change| way.partial(head, body, change, deliver));
                 if let Some(whole) = whole {
-                    way.pass(is_old, &mut peer.order, position(whole.first, 0), &whole.head, whole.body, deliver);
+                    way.pass(
+                        refused(&whole.head),
+                        &mut peer.order,
+                        position(whole.first, 0),
+                        &whole.head,
+                        whole.body,
+                        deliver,
+                    );
                 }
             }
             Frame::Alive(alive) => way.hears_of_us(now_ns, self.settings.incarnation, &alive),

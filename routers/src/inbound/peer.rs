@@ -186,10 +186,10 @@ pub(super) struct Way<'a> {
 }
 
 impl Way<'_> {
-    /// Delivers a package that is there as a whole, or says why not.
+    /// Delivers a package that is there as a whole, unless it is `refused`, or says why not.
     pub(super) fn pass(
         &self,
-        is_old: bool,
+        refused: Option<Cause>,
         order: &mut Order,
         position: u64,
         head: &Head,
@@ -197,8 +197,8 @@ impl Way<'_> {
         deliver: &mut impl Deliver,
     ) {
         self.peer.received.packages.add(1);
-        if is_old {
-            return self.lose(head, body, Cause::Stale, deliver);
+        if let Some(cause) = refused {
+            return self.lose(head, body, cause, deliver);
         }
         if !order.admit(head, position) {
             return self.lose(head, body, Cause::Late, deliver);

@@ -56,15 +56,8 @@ pub enum Rejection {
 
 impl Rejection {
     /// All, in their order.
-    pub const ALL: [Self; 7] = [
-        Self::Unsealed,
-        Self::OtherKey,
-        Self::NotOurs,
-        Self::OtherLife,
-        Self::Replay,
-        Self::Forged,
-        Self::Version,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Unsealed, Self::OtherKey, Self::NotOurs, Self::OtherLife, Self::Replay, Self::Forged, Self::Version];
 
     /// A word for people and programs.
     pub const fn word(self) -> &'static str {

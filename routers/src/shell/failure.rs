@@ -24,15 +24,8 @@ pub enum Failure {
 
 impl Failure {
     /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::NobodyThere,
-        Self::NoWay,
-        Self::TooLong,
-        Self::NoRoom,
-        Self::Full,
-        Self::Unacquainted,
-        Self::Other,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Full, Self::Unacquainted, Self::Other];
 
     pub(super) fn of(error: &io::Error) -> Self {
         use nix::errno::Errno;

@@ -78,7 +78,9 @@ pub enum ShellError {
     #[error("time slots need the time of a master; write `source = \"master\"` in [time]")]
     NoTime,
     /// What passes between nodes is to be sealed, and there is nothing to seal it with, or the other way round.
-    #[error("configuration says `security = \"keys\"`, and the router was given no keys; or it says `none`, and there are some")]
+    #[error(
+        "configuration says `security = \"keys\"`, and the router was given no keys; or it says `none`, and there are some"
+    )]
     Keys,
     /// No incarnation that nobody has had before.
     #[error(transparent)]

@@ -6,6 +6,7 @@ use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
 use super::plan::{Plan, SYSTEM};
 use super::seals::{PackageSeals, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
+use crate::access::Access;
 use crate::fragment::PARTIAL_MAX;
 use crate::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS, TICK_EVERY_NS};
@@ -70,6 +71,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
         tdma: plan.slots.as_ref().map(|slots| slots.table.clone()),
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
+        access: Access::default(),
         flows: Vec::new(),
     }
 }
@@ -185,7 +187,11 @@ impl Packages {
         let Some(seals) = &mut self.seals else { return };
         while let Some(said) = seals.gate.ask(io.now.monotonic_ns, &self.stats, &mut self.buffer) {
             io.book.saw("asked");
-            self.refusals.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(&self.buffer[..said.bytes]) });
+            self.refusals.push_back(Sent {
+                port: PORT,
+                to: said.to.into(),
+                bytes: Rc::from(&self.buffer[..said.bytes]),
+            });
         }
     }
 
@@ -291,7 +297,8 @@ impl Packages {
         };
         let rejected = self.seals.as_ref().map_or(0, |seals| seals.rejected(source.map(|node| node as NodeIndex)));
         let received = &peer.received;
-        let dropped = rejected + received.old.get() + received.damaged.get() + received.refused.get() + self.stats.foreign.get();
+        let dropped =
+            rejected + received.old.get() + received.damaged.get() + received.refused.get() + self.stats.foreign.get();
         (received.datagrams.get(), received.copies.get(), dropped)
     }
 

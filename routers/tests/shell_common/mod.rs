@@ -2,6 +2,7 @@
 
 use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::ClockParts;
@@ -90,6 +91,7 @@ impl Side {
             tdma,
             routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
             senders: vec![vec![module(own)]],
+            access: Access::default(),
             flows: vec![declared(module(own), there)],
         };
         Self { node, settings, shell: None }

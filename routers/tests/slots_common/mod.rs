@@ -10,6 +10,7 @@ use rohrpost_mailbox::{
     HEAD_BYTES, Head, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type,
     monotonic_ns, realtime_ns,
 };
+use rohrpost_routers::access::Access;
 use rohrpost_routers::frame::{Alive, FrameHead, Kind};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Crossing, Lab, LabError, NodeSpec};
@@ -283,6 +284,7 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
         tdma: Some(Tdma { tunnel, ..table() }),
         routes: others().map(module).chain(others().map(router)).map(route).collect(),
         senders: vec![vec![module(own)]],
+        access: Access::default(),
         flows: Vec::new(),
     }
 }

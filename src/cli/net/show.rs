@@ -25,7 +25,15 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
         }
     }
     let slots = all.iter().filter_map(|told| told.slots.as_ref());
-    parts.extend([strangers(all), rejections(all), failures(all), waiting(all), losses(running, all), clocks(all), kept(slots)]);
+    parts.extend([
+        strangers(all),
+        rejections(all),
+        failures(all),
+        waiting(all),
+        losses(running, all),
+        clocks(all),
+        kept(slots),
+    ]);
     parts.push(measured(running, all));
     parts.retain(|part| !part.is_empty());
     parts.join("\n")

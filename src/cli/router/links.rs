@@ -37,7 +37,10 @@ fn rejections(shell: &Shell) -> Vec<Rejected> {
     let told = all.map(|(peer, why)| Rejected {
         node: peer.map_or_else(String::new, |peer| settings.nodes[usize::from(peer)].name.clone()),
         cause: why.word().into(),
-        datagrams: [Port::Packages, Port::Time].into_iter().filter_map(|port| Some(shell.rejections(port)?.of(peer, why))).sum(),
+        datagrams: [Port::Packages, Port::Time]
+            .into_iter()
+            .filter_map(|port| Some(shell.rejections(port)?.of(peer, why)))
+            .sum(),
     });
     told.filter(|rejected| rejected.datagrams > 0).collect()
 }

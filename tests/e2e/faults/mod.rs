@@ -221,8 +221,7 @@ fn configure(place: &Place, name: &str, nodes: usize, network: &str, further: &[
     };
     let all: String = NODES[..nodes].iter().map(node).collect();
     let security = if network.contains("security") { "" } else { "security = \"none\"\n" };
-    let sections =
-        format!("{all}[network]\n{security}{network}\n[time]\nsource = \"master\"\ninterval = \"500 ms\"\n");
+    let sections = format!("{all}[network]\n{security}{network}\n[time]\nsource = \"master\"\ninterval = \"500 ms\"\n");
     let on = |(index, (node, ..)): (usize, &(&str, &str, &str))| {
         probe(&format!("probe.{index}"), "rate-hz = 50.0", &format!("node = \"{node}\""))
     };

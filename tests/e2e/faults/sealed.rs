@@ -4,6 +4,7 @@ use super::{Field, LOG, configure, lines};
 use crate::harness::{OUTPUT, signal, wait};
 use crate::process::Said;
 use nix::sys::signal::Signal;
+use rohrpost::CallError;
 use rohrpost::interfaces::LinkState;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -28,9 +29,8 @@ impl Field {
     /// The field's configuration, but with keys in this folder; or with this said of security.
     fn with(&self, name: &str, security: &str) -> PathBuf {
         let text = std::fs::read_to_string(&self.config).unwrap();
-        let log = LOG.replace("robot.log", &format!("{name}.log"));
         let other = self.place.path(&format!("{name}.toml"));
-        std::fs::write(&other, text.replace(KEYS, security).replace(LOG.trim(), log.trim())).unwrap();
+        std::fs::write(&other, text.replace(KEYS, security)).unwrap();
         other
     }
 
@@ -38,16 +38,21 @@ impl Field {
         self.place.say_at(&self.config, node, arguments)
     }
 
-    /// A router has said of datagrams that it does not take them, and why.
-    fn wait_said(&self, log: &str, router: &str, words: &[&str]) {
-        let log = self.place.path(log);
-        wait(format!("{router} says {words:?}"), || (!lines(&log, router, words).is_empty()).then_some(()));
+    /// A configuration of two nodes with this said of security, in which the collector of lines is on the other node.
+    fn collects_on_arm(&self, security: &str) -> PathBuf {
+        let log = LOG.replace("robot.log", "arm.log");
+        let other = configure(&self.place, "other", 2, security, &[&format!("{OUTPUT}node = \"arm\"\n"), &log]);
+        // One installation, as far as shared memory knows.
+        let text = std::fs::read_to_string(&other).unwrap();
+        std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
+        other
     }
 
-    /// Each of the two has said why it takes nothing from the other, and neither hears it.
+    /// Each of the two has said why it takes nothing from the other.
     fn wait_apart(&self, base: &[&str], arm: &[&str]) {
-        self.wait_said("robot.log", "router.0", base);
-        self.wait_said("arm.log", "router.1", arm);
+        self.wait_told("router.0", base, 1);
+        let log = self.place.path("arm.log");
+        wait(format!("arm says {arm:?}"), || (!lines(&log, "router.1", arm).is_empty()).then_some(()));
     }
 }
 
@@ -67,7 +72,7 @@ fn sealed_nodes_exchange_calls_and_data_and_nothing_of_it_can_be_read() {
     };
     for (number, (node, to)) in (1..).zip([("base", "probe.1"), ("arm", "probe.2"), ("desk", "probe.0")]) {
         field.wait_counted(node, to, number);
-        let word = SECRET.repeat(number as usize * 20);
+        let word = SECRET.repeat(20);
         let told = field.say_at(node, &["call", to, "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
         assert!(told.contains(&word), "{told}");
         look();
@@ -102,7 +107,7 @@ fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
         ("second", "security = \"keys\"\nkeys = \"second\"", "an id that we have not", "an id that we have not"),
         ("none", "security = \"none\"", "it is not sealed", "one of both seals"),
     ] {
-        let other = field.with("arm", security);
+        let other = field.collects_on_arm(security);
         field.launch_from(&other, &["arm"], &[]);
         field.wait_apart(&[from_arm, base], &[from_base, arm]);
         let peer = field.peer("base", "arm");
@@ -110,7 +115,7 @@ fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
         assert!(field.links("base").rejections.iter().any(|rejected| rejected.node == "arm"), "{name}");
         assert!(field.count("base", "probe.1", super::NEVER, Duration::from_secs(1)).is_err(), "{name}");
         field.halt_node("arm");
-        let _ = std::fs::remove_file(field.place.path("arm.log"));
+        std::fs::remove_file(field.place.path("arm.log")).unwrap();
     }
     // Without the file a node is not even launched.
     let other = field.with("arm", "security = \"keys\"\nkeys = \"nowhere\"");
@@ -125,10 +130,7 @@ fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
 #[test]
 fn sealed_nodes_with_different_configurations_both_say_why() {
     let Some(mut field) = Field::sealed(2) else { return };
-    let log = LOG.replace("robot.log", "arm.log");
-    let other = configure(&field.place, "other", 2, KEYS, &[&format!("{OUTPUT}node = \"arm\"\n"), &log]);
-    let text = std::fs::read_to_string(&other).unwrap();
-    std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
+    let other = field.collects_on_arm(KEYS);
     let config = field.config.clone();
     field.launch_from(&config, &["base"], &[]);
     field.launch_from(&other, &["arm"], &[]);
@@ -175,5 +177,24 @@ fn keys_are_changed_node_by_node_while_calls_go_on() {
             all_reach_all(&field);
         }
     }
+    field.stop();
+}
+
+#[test]
+fn a_command_of_a_class_that_is_not_listed_is_answered_with_the_rule() {
+    let Some(mut field) = Field::sealed(2) else { return };
+    let text = std::fs::read_to_string(&field.config).unwrap();
+    std::fs::write(&field.config, format!("{text}\n[access]\nprobe = [\"probe\"]\n")).unwrap();
+    field.launch(&["base", "arm"], &[]);
+    let fault = wait("a fault", || match field.count("base", "probe.1", super::NEVER, Duration::from_secs(2)) {
+        Err(CallError::Fault(_, fault)) => Some(fault.to_string()),
+        // A router that has just begun answers nothing.
+        _ => None,
+    });
+    let line = text.lines().count() + 3;
+    assert!(fault.contains(&format!("test.toml:{line}, [access]")) && fault.contains("node arm refuses it"), "{fault}");
+    assert_eq!(field.counted("probe.1"), [0; 0]);
+    // On one node all trust each other.
+    field.wait_counted("arm", "probe.1", 1);
     field.stop();
 }

@@ -25,8 +25,7 @@ impl Case for Sealed {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
-        let [sealed, open] =
-            [true, false].map(|sealed| Ground::new(settings, &Network { sealed, ..network }));
+        let [sealed, open] = [true, false].map(|sealed| Ground::new(settings, &Network { sealed, ..network }));
         let messages = settings.count(MESSAGES);
         let cell = Cell {
             bytes: self.bytes,
