@@ -141,6 +141,12 @@ impl Packages {
             }
             io.book.accepted(io.life, parcel.number, parcel.published_ns);
             io.book.saw("accepted");
+            let to = self.settings.node_of(parcel.head.to);
+            if let (Some(seals), Some(to)) = (&self.seals, to)
+                && !seals.knows(to)
+            {
+                io.book.held(parcel.number);
+            }
             let alone = io.host.transit.is_empty();
             self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone);
             io.book.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);

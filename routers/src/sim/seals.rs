@@ -35,6 +35,11 @@ impl PackageSeals {
         Self { gate: Gate::new(all, seed), sealing: Sealing::new(all, Port::Packages), all: all.clone() }
     }
 
+    /// Whether something can be sealed to a node.
+    pub(super) fn knows(&self, node: u8) -> bool {
+        self.all.known() & 1 << node != 0
+    }
+
     /// Datagrams that were not taken.
     pub(super) fn rejected(&self, peer: Option<u8>) -> u64 {
         Rejection::ALL.iter().map(|why| self.all.rejections(Port::Packages).of(peer, *why)).sum()
