@@ -70,7 +70,8 @@ impl Peer {
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
-        if was.is_some() && !is_sure && !(is_silent && goes_on) && !broken!(TakesOldLives) {
+        let may_go_on = is_sure || (is_silent && goes_on) || broken!(TakesOldLives);
+        if was.is_some() && !may_go_on {
             if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
                 deliver.event(Event::Twice { peer: way.from });

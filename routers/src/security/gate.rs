@@ -17,6 +17,9 @@ pub const ASK_EVERY_NS: u64 = 100_000_000;
 /// A peer that says something of another life than the one that is known is asked so often at most.
 const DOUBT_EVERY_NS: u64 = 20_000_000;
 
+/// Who is to be asked is looked for so often at most, however many datagrams come.
+const LOOK_EVERY_NS: u64 = 10_000_000;
+
 /// A hello in the buffer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Said {
@@ -33,6 +36,8 @@ pub struct Gate {
     greeter: Greeter,
     tally: Tally,
     peers: Box<[Asked]>,
+    /// Nobody is to be asked before this, ns.
+    look_ns: u64,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -52,6 +57,7 @@ impl Gate {
             tally: Tally::new(all.rejections(Port::Packages)),
             peers: vec![Asked::default(); all.who.nodes.into()].into(),
             all: all.clone(),
+            look_ns: 0,
         }
     }
 
@@ -90,7 +96,13 @@ impl Gate {
 
     /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
     pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
-        let to = (0..self.all.who.nodes).find(|peer| self.is_to_be_asked(*peer, now_ns, stats))?;
+        if now_ns < self.look_ns {
+            return None;
+        }
+        let Some(to) = (0..self.all.who.nodes).find(|peer| self.is_to_be_asked(*peer, now_ns, stats)) else {
+            self.look_ns = now_ns + LOOK_EVERY_NS;
+            return None;
+        };
         self.peers[usize::from(to)].at_ns = Some(now_ns);
         self.all.doubted(to);
         self.all.ask(to, datagram).map(|bytes| Said { to, bytes })

@@ -4,11 +4,13 @@ use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
 use rohrpost_routers::access::Access;
 use rohrpost_routers::flows::Flow;
+use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
 use rohrpost_routers::time::TimeSettings;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::num::NonZeroU8;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
@@ -35,6 +37,10 @@ impl Faults for Words {
         answer.extend_from_slice(why.cause.word().as_bytes());
         true
     }
+}
+
+fn keys() -> KeyRing {
+    KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &[7; KEY_BYTES]), None)
 }
 
 /// A node of two.
@@ -103,8 +109,18 @@ impl Side {
         self.settings.incarnation += 1;
         let name = router(self.settings.own);
         let (settings, faults, clock) = (self.settings.clone(), Arc::new(Words), self.clock());
+        let is_sealed = settings.is_sealed();
         let parts = Parts { node: &self.node, name, settings, faults, socket: None, impair: None, clock };
-        self.shell = Some(Shell::start(parts).unwrap());
+        let shell = if is_sealed { Shell::start_sealed(parts, keys()) } else { Shell::start(parts) };
+        self.shell = Some(shell.unwrap());
+    }
+
+    /// From now on its routers seal.
+    #[allow(dead_code, reason = "each test uses a part")]
+    pub(crate) fn seal(&mut self) {
+        self.settings.network.security = Security::Keys;
+        self.settings.network.datagram_bytes_max -= Security::Keys.tag_bytes();
+        self.start();
     }
 
     /// Of the first node's time, where slots need one.

@@ -4,6 +4,7 @@ use crate::access::Access;
 use crate::frame::{FrameHead, Kind};
 use crate::harness::{End, START, address, head, module};
 use crate::inbound::Came;
+use crate::link::State;
 use crate::stats::Cause;
 use rohrpost_config::{self as config, Security};
 use rohrpost_mailbox::{Class, Head, Name, Type};
@@ -49,4 +50,17 @@ fn only_classes_that_are_listed_may_command_from_another_node() {
     let data = head(module(200, 0), module(61, 1), 60);
     let packages = [command(200, 60), command(200, 61), command(199, 61), data];
     assert_eq!(causes(&mut end, &packages), [None, Some(Cause::NotAllowed), None, None]);
+}
+
+#[test]
+fn what_a_peer_said_before_it_had_our_configuration_does_not_part_us() {
+    let mut end = End::new(0, |settings| settings.network.security = Security::Keys);
+    let old = FrameHead { digest: 8, ..datagram(0, &head(module(200, 0), module(60, 1), 60)).0 };
+    assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));
+    assert!(matches!(end.stats.state(1, START), State::Refused(_)), "of whom nothing else is known");
+    assert_eq!(causes(&mut end, &[head(module(200, 0), module(60, 1), 60)]), [None]);
+    assert_eq!(end.stats.state(1, START), State::Alive);
+    assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));
+    assert_eq!(end.stats.state(1, START), State::Alive);
+    assert!(end.refusals(START).is_empty(), "and nobody is told without a seal");
 }

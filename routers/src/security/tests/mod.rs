@@ -1,6 +1,7 @@
 //! Two routers that seal, a wire that keeps all that ever passed, and whoever has it.
 
 mod acquaintance;
+mod gate;
 mod hostile;
 mod sealed;
 
