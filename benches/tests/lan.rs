@@ -14,13 +14,15 @@ const CBWARE: &str = "CBWare, its table";
 const HOP: &[&str] = &["chain", "chain of mailboxes", "udp"];
 
 /// The cases: a size, and who is in it besides ours.
-const CASES: [(&str, u64, &[&str]); 14] = [
+const CASES: [(&str, u64, &[&str]); 16] = [
     ("hop", 64, HOP),
     ("hop", 1024, HOP),
     ("hop", 16_384, HOP),
     ("hop", 62_000, HOP),
     ("hop, paced", 64, HOP),
     ("hop, in fragments", 16_384, HOP),
+    ("hop, sealed", 64, &["not sealed"]),
+    ("hop, sealed", 1024, &["not sealed"]),
     ("rate", 64, &["udp"]),
     ("rate", 2112, &["udp", CBWARE]),
     ("rate", 5860, &["udp", CBWARE]),

@@ -1,5 +1,6 @@
 //! Rules across modules.
 
+use crate::access;
 use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::module::{Lines, Module};
@@ -18,6 +19,7 @@ const FLOW_BYTES_MAX: u64 = 1 << 30;
 pub(crate) fn across(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
     claims(installation, lines, reader);
     for (module, lines) in installation.modules.iter().zip(lines) {
+        access::judge(installation, module, lines, reader);
         for (to, line) in module.calls.iter().zip(&lines.calls) {
             importance(installation, module, *to, *line, reader);
         }

@@ -7,7 +7,7 @@ use crate::Full;
 use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
-use crate::network::{LEVEL_NOT_REAL_TIME, Network, TRANSIT};
+use crate::network::{LEVEL_NOT_REAL_TIME, TRANSIT};
 use crate::node::Node;
 use crate::output::LineFormat;
 use crate::saved::SavedValue;
@@ -136,7 +136,9 @@ impl Page<'_> {
                 size_text(network.quota_bytes as u64)
             ),
         );
-        self.entry("security", Network::UNPROTECTED);
+        if let Some(security) = self.installation.security_text() {
+            self.entry("security", &security);
+        }
     }
 
     fn tcp(&mut self) {

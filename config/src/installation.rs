@@ -1,5 +1,6 @@
 //! An installation as its file describes it, read and checked as a whole.
 
+use crate::access::Access;
 use crate::check;
 use crate::classes::ClassTable;
 use crate::directory::Directory;
@@ -43,12 +44,16 @@ pub struct Installation {
     pub modules: Vec<Module>,
     /// How nodes reach each other; none if there is one only.
     pub network: Option<Network>,
+    /// The folder with the keys that seal what passes between nodes; none if nothing is sealed.
+    pub keys: Option<PathBuf>,
     /// When each node sends; none if each sends as packages come.
     pub tdma: Option<Tdma>,
     /// The TCP router beyond the LAN; none if nothing goes there.
     pub tcp: Option<Tcp>,
     /// Where system time comes from.
     pub time: TimeSource,
+    /// Which classes may command which from other nodes.
+    pub access: Vec<Access>,
     /// What the output service keeps.
     pub output: Output,
     /// What the GUI draws.
@@ -150,6 +155,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
     let tdma = Tdma::read(&file, sections(&file, "slot"), &nodes);
     let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes, tdma.as_ref()));
+    let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
     let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
     network::judge(&file, &nodes, &classes);
@@ -170,6 +176,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let read = sections.into_iter().enumerate().filter_map(|(index, section)| context.read(section, index));
     let (modules, lines): (Vec<Module>, Vec<_>) = routers.into_iter().chain(read).unzip();
 
+    let access = Access::read_all(file.section("access", "[access]"), &classes);
     let output = Output::read(file.section("output", "[output]"), &directory, &folder);
     let gui = Gui::read(file.section("gui", "[gui]"), &directory);
     let flow_sections = self::sections(&file, "flow").into_iter();
@@ -189,9 +196,11 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         nodes,
         modules,
         network,
+        keys,
         tdma,
         tcp,
         time,
+        access,
         output,
         gui,
         flows,

@@ -31,6 +31,7 @@
 //! Every key of the file is described in [`manual`].
 #![forbid(unsafe_code)]
 
+mod access;
 mod bounds;
 mod calls;
 mod check;
@@ -42,6 +43,7 @@ mod explain;
 mod flow;
 mod gui;
 mod installation;
+mod keys;
 mod mailbox;
 mod module;
 mod network;
@@ -58,6 +60,7 @@ mod time;
 mod units;
 pub mod wire;
 
+pub use access::Access;
 pub use bounds::{Bound, FlowBound, TAKEN_BEFORE, Unbounded, bounds};
 pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TCP, TOOL, is_word as is_class_name};
 pub use digest::Digest;
@@ -66,9 +69,10 @@ pub use explain::explain;
 pub use flow::Flow;
 pub use gui::{Gui, Show};
 pub use installation::Installation;
+pub use keys::{KEY_BYTES, Key, Keys, KeysError};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
 pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
-pub use network::{LEVEL_NOT_REAL_TIME, NODES_MAX, Network, Route, TRANSIT};
+pub use network::{LEVEL_NOT_REAL_TIME, NODES_MAX, Network, Route, Security, TRANSIT};
 pub use node::{Node, System};
 pub use output::{Level, LineFormat, Output};
 pub use program::{MissingProgram, find_program};

@@ -5,6 +5,7 @@
 
 use crate::classes::{ClassTable, ROUTER};
 use crate::installation::Installation;
+use crate::keys::{self, Keys};
 use crate::mailbox::MailboxSpec;
 use crate::module::{Lines, Module, Restart, RestartPolicy};
 use crate::node::Node;
@@ -13,6 +14,7 @@ use crate::tdma::Tdma;
 use crate::units::rate_text;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Full, Name, Priority};
 use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Most nodes of a system.
@@ -31,6 +33,11 @@ pub const TRANSIT: MailboxSpec = MailboxSpec {
     claims: u8::MAX,
 };
 
+/// Behind what is sealed.
+const TAG_BYTES: usize = 16;
+/// What a file with several nodes must say.
+const CHOICES: &str = "write `security = \"keys\"` (what passes between nodes is sealed; `rohrpost keys new` makes what it takes), or \
+                       `security = \"none\"` (it is neither sealed nor signed, and anyone on the network may read and send)";
 const PORT: u16 = 21_117;
 const MTU: i64 = 1500;
 const MTUS: RangeInclusive<i64> = 576..=65_535;
@@ -49,16 +56,37 @@ const QUOTA: u64 = 256 << 10;
 const QUOTAS: RangeInclusive<u64> = 128 << 10..=64 << 20;
 const BULK_BELOW: u8 = 16;
 
+/// Whether what routers say to each other is sealed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Security {
+    /// Neither sealed nor signed, and the file says so in words.
+    None,
+    /// Sealed with the keys in [`Installation::keys`].
+    Keys,
+}
+
+impl Security {
+    /// Bytes behind what each datagram says.
+    pub const fn tag_bytes(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Keys => TAG_BYTES,
+        }
+    }
+}
+
 /// How the routers of an installation send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Network {
+    /// Whether it is sealed.
+    pub security: Security,
     /// UDP port of packages; time has the next one.
     pub port: u16,
     /// Largest IP packet that every link carries, in bytes.
     pub mtu: u16,
-    /// Largest datagram, in bytes behind the heads of IP and UDP.
+    /// Largest datagram, in bytes behind the heads of IP and UDP, and without what seals it.
     pub datagram_bytes_max: usize,
-    /// Bytes a second that a router sends at most, the heads of IP and UDP counted; with time slots those that the link carries.
+    /// Bytes a second that a router sends at most, the heads of IP and UDP and what seals counted; with time slots those that the link carries.
     pub rate_bytes_s: u64,
     /// Bytes of one sender's packages that its node's router keeps waiting.
     pub quota_bytes: usize,
@@ -93,9 +121,10 @@ impl Network {
         level(priority, self.bulk_below)
     }
 
-    /// What IP and UDP put before each datagram.
-    pub(crate) fn heads_bytes(is_v6: bool) -> usize {
-        if is_v6 { HEADS_V6 } else { HEADS_V4 }
+    /// What each datagram takes besides what it says: the heads of IP and UDP before it, and what seals it behind it.
+    pub fn around_bytes(is_v6: bool, security: Security) -> usize {
+        let heads = if is_v6 { HEADS_V6 } else { HEADS_V4 };
+        heads + security.tag_bytes()
     }
 
     /// `tdma` are the time slots in which nodes send, if they do.
@@ -104,14 +133,16 @@ impl Network {
             section
                 .report("there is one node, so nothing goes over a network; drop this section, or add the other nodes");
         }
-        let security = section.required("security", "security = \"none\"");
-        security.and_then(|item| item.choice(&[("none", ())]));
+        let security = read_security(&section);
+        if tdma.is_some() && security == Security::Keys {
+            section.report("`security = \"keys\"`: with time slots nothing is sealed in this version; write `security = \"none\"`, or drop `mode`");
+        }
         let port = section.get("port").and_then(|item| item.whole(1024..=65_534, PORT.into()));
         let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
         let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
         let mtu = section.get("mtu").and_then(|item| item.whole(least..=*MTUS.end(), MTU)).unwrap_or(MTU) as usize;
-        // Whoever reads the slots has judged it.
-        let _ = section.get("mode");
+        // Whoever reads the slots has judged it, and whoever looks for the keys their folder.
+        let _ = (section.get("mode"), section.get("keys"));
         let rate = section.get("rate").and_then(|item| match tdma {
             None => item.size(RATES, "100 MiB"),
             Some(tdma) => {
@@ -125,11 +156,12 @@ impl Network {
         let quota = section.get("quota").and_then(|item| item.size(QUOTAS, "256 KiB"));
         let bulk = section.get("bulk-below").and_then(|item| item.whole(0..=255, BULK_BELOW.into()));
         section.finish();
-        let heads = Self::heads_bytes(is_v6);
+        let around = Self::around_bytes(is_v6, security);
         Self {
+            security,
             port: port.map_or(PORT, |port| port as u16),
             mtu: mtu as u16,
-            datagram_bytes_max: (mtu - heads).min(PAYLOAD_MAX),
+            datagram_bytes_max: (mtu - around).min(PAYLOAD_MAX - security.tag_bytes()),
             rate_bytes_s: tdma.map_or(rate.unwrap_or(RATE), |tdma| tdma.link_bytes_s),
             quota_bytes: quota.unwrap_or(QUOTA) as usize,
             bulk_below: bulk.map_or(BULK_BELOW, |bulk| bulk as u8),
@@ -138,13 +170,35 @@ impl Network {
 
     /// What must be equal at both ends of the wire.
     pub(crate) fn lan_text(&self) -> String {
-        format!("port {} mtu {}", self.port, self.mtu)
+        let sealed = if self.security == Security::Keys { " sealed" } else { "" };
+        format!("port {} mtu {}{sealed}", self.port, self.mtu)
     }
 }
 
 /// The level of a priority, if classes below `bulk_below` are not real time.
 pub(crate) fn level(priority: Priority, bulk_below: u8) -> u8 {
     if priority.0 < bulk_below { LEVEL_NOT_REAL_TIME } else { (15 - (priority.0 >> 4)) * 2 }
+}
+
+/// It must be said. What would be right is not known: so an error names both.
+fn read_security(section: &Section<'_>) -> Security {
+    let Some(item) = section.get("security") else {
+        section.report(format!("`security` is missing; {CHOICES}"));
+        return Security::None;
+    };
+    item.choice(&[("keys", Security::Keys), ("none", Security::None)]).unwrap_or(Security::None)
+}
+
+/// The folder with the keys; none if nothing is sealed.
+pub(crate) fn keys_folder(file: &Section<'_>, security: Security, folder: &Path) -> Option<PathBuf> {
+    let item = file.section("network", "[network]")?.get("keys");
+    if security == Security::None {
+        let mistake = "`keys` without `security = \"keys\"`: nothing would be sealed with them; write both, or neither";
+        item.inspect(|item| item.report(mistake));
+        return None;
+    }
+    let named = item.map_or(Some(keys::FOLDER), |item| item.text(keys::FOLDER));
+    named.map(|path| folder.join(path))
 }
 
 /// Judges what several nodes need beside `[network]`: addresses that can reach each other, and the class of routers.
@@ -156,10 +210,7 @@ pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
         file.reader.report(node.line, format!("[nodes]: there are {}; a system has at most {NODES_MAX}", nodes.len()));
     }
     if file.get("network").is_none() {
-        file.report(
-            "section `[network]` is missing; with several nodes add `[network]` with `security = \"none\"`: packages between \
-             nodes are neither sealed nor signed in this version, and the file says so in words",
-        );
+        file.report(format!("section `[network]` is missing; with several nodes add it, and {CHOICES}"));
     }
     if classes.id(ROUTER).is_none() {
         let line = file.get("classes").map_or(file.line, |classes| classes.line);
@@ -190,6 +241,20 @@ pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(
 }
 
 impl Installation {
+    /// What `check` and every start say of security; none if nothing goes over a network.
+    pub fn security_text(&self) -> Option<String> {
+        let network = self.network?;
+        Some(match (network.security, &self.keys) {
+            (Security::Keys, Some(folder)) => {
+                format!(
+                    "security = \"keys\": what passes between nodes is sealed with {}",
+                    Keys::file(folder).display()
+                )
+            }
+            _ => Network::UNPROTECTED.into(),
+        })
+    }
+
     /// The place of a node in the file, from 0: what routers call it.
     pub fn node_index(&self, node: &str) -> Option<u8> {
         self.nodes.iter().position(|known| known.name == node).and_then(|index| u8::try_from(index).ok())

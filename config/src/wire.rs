@@ -1,6 +1,6 @@
 //! What packages take of a link: the sizes that routers write and that bounds are computed with.
 
-use crate::network::Network;
+use crate::network::{Network, Security};
 use crate::node::Node;
 use crate::tdma::{LATE, Tdma};
 use rohrpost_mailbox::HEAD_BYTES as PACKAGE_HEAD_BYTES;
@@ -18,6 +18,8 @@ pub const TIME_BYTES: usize = 72;
 pub const ALIVE_BYTES: usize = 24;
 /// What a datagram says that refuses others.
 pub const REFUSAL_BYTES: usize = 16;
+/// What a datagram says by which nodes that seal get to know each other.
+pub const HELLO_BYTES: usize = 32;
 /// A router keeps the body of a package that waits in pieces of so many bytes.
 pub const KEPT_IN_BYTES: u64 = 256;
 /// A clock that was not compared with another yet is off by one, at most, in so long.
@@ -42,9 +44,17 @@ pub struct TimeShare {
 }
 
 impl TimeShare {
-    /// `heads_bytes`: what IP and UDP put before each datagram.
+    /// `heads_bytes`: what is around each datagram, see [`Network::around_bytes`].
     pub fn new(tdma: &Tdma, heads_bytes: usize, nodes: usize, masters: usize) -> Self {
-        Link { bytes_s: tdma.link_bytes_s.max(1), heads_bytes, datagram_bytes_max: 0 }.time_share(tdma, nodes, masters)
+        let link = Link { bytes_s: tdma.link_bytes_s.max(1), heads_bytes, datagram_bytes_max: 0, answer_bytes: 0 };
+        link.time_share(tdma, nodes, masters)
+    }
+}
+
+fn answer_bytes(security: Security) -> usize {
+    match security {
+        Security::None => REFUSAL_BYTES,
+        Security::Keys => HELLO_BYTES,
     }
 }
 
@@ -54,13 +64,19 @@ pub(crate) struct Link {
     bytes_s: u64,
     heads_bytes: usize,
     datagram_bytes_max: usize,
+    /// Of what goes once in a slot to whoever is not known: a refusal, or a hello.
+    answer_bytes: usize,
 }
 
 impl Link {
     pub(crate) fn new(tdma: &Tdma, network: &Network, nodes: &[Node]) -> Self {
         let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
-        let heads_bytes = Network::heads_bytes(is_v6);
-        Self { bytes_s: tdma.link_bytes_s.max(1), heads_bytes, datagram_bytes_max: network.datagram_bytes_max }
+        Self {
+            bytes_s: tdma.link_bytes_s.max(1),
+            heads_bytes: Network::around_bytes(is_v6, network.security),
+            datagram_bytes_max: network.datagram_bytes_max,
+            answer_bytes: answer_bytes(network.security),
+        }
     }
 
     /// How long the wire carries a datagram, ns.
@@ -106,12 +122,12 @@ impl Link {
     }
 
     /// What routers say to each other in a slot at most, before any package, ns: frames of time, one to each other node that says "still
-    /// there", and a refusal.
+    /// there", and a refusal or a hello.
     pub(crate) fn said_ns(&self, tdma: &Tdma, nodes: usize, masters: usize) -> u64 {
         let others = nodes.saturating_sub(1);
-        let refusal_ns = self.takes_ns(FRAME_HEAD_BYTES + REFUSAL_BYTES);
+        let answer_ns = self.takes_ns(FRAME_HEAD_BYTES + self.answer_bytes);
         let frames = self.time_share(tdma, nodes, masters).frames_in_slot;
-        frames as u64 * self.time_ns() + others as u64 * self.alive_ns() + refusal_ns
+        frames as u64 * self.time_ns() + others as u64 * self.alive_ns() + answer_ns
     }
 
     /// What the datagrams of a package take, none of them shared with another package.
@@ -155,4 +171,28 @@ pub(crate) struct Parcel {
     pub(crate) last_ns: u64,
     /// The last one from a switch to the receiver.
     pub(crate) forward_ns: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn link(security: Security) -> Link {
+        let around = Network::around_bytes(false, security);
+        let datagram_bytes_max = 1500 - around;
+        Link { bytes_s: 1_000_000, heads_bytes: around, datagram_bytes_max, answer_bytes: answer_bytes(security) }
+    }
+
+    #[test]
+    fn what_seals_is_counted_in_all_that_a_slot_carries() {
+        let [open, sealed] = [Security::None, Security::Keys].map(link);
+        // At a byte a microsecond.
+        let tag_ns = 16_000;
+        assert_eq!(sealed.time_wire_ns(), open.time_wire_ns() + tag_ns);
+        assert_eq!(sealed.alive_ns(), open.alive_ns() + tag_ns);
+        assert_eq!(sealed.package(100).takes_ns, open.package(100).takes_ns + tag_ns);
+        assert_eq!(sealed.largest_ns(), open.largest_ns(), "a packet carries as much as before");
+        assert_eq!(open.package(1472 - 52).datagrams, 1);
+        assert_eq!(sealed.package(1472 - 52).datagrams, 2, "of which the seal takes its part");
+    }
 }

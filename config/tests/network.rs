@@ -103,6 +103,27 @@ fn datagrams_fit_in_packets() {
 }
 
 #[test]
+fn what_seals_a_datagram_has_its_place_in_the_packet() {
+    for (mtu, bytes) in [(1500, 1456), (576, 532), (65_535, 65_491)] {
+        let text = FULL.replacen("security = \"none\"", "security = \"keys\"", 1).replacen(
+            "mtu = 9000",
+            &format!("mtu = {mtu}"),
+            1,
+        );
+        let installation = parse(&text);
+        assert_eq!(installation.network.unwrap().datagram_bytes_max, bytes, "mtu {mtu}");
+    }
+}
+
+#[test]
+fn keys_lie_beside_the_file_or_where_it_says() {
+    let folder = |security: &str| parse(&FULL.replacen("security = \"none\"", security, 1)).keys;
+    assert_eq!(folder("security = \"none\""), None);
+    assert_eq!(folder("security = \"keys\"").as_deref(), Some(Path::new("./keys")));
+    assert_eq!(folder("security = \"keys\"\nkeys = \"/etc/robot\"").as_deref(), Some(Path::new("/etc/robot")));
+}
+
+#[test]
 fn what_is_not_said_has_its_default() {
     let installation = two(["10.0.0.1", "10.0.0.2"], "");
     let network = installation.network.unwrap();
@@ -120,6 +141,8 @@ fn routers_agree_on_what_is_on_the_wire() {
         ("rate = \"10 MiB\"", "rate = \"20 MiB\"", true, "a node's own pace"),
         ("quota = \"1 MiB\"", "quota = \"2 MiB\"", true, "a node's own memory"),
         ("port = 4000", "port = 4002", false, "another port"),
+        ("security = \"none\"", "security = \"keys\"", false, "one seals"),
+        ("security = \"none\"", "security = \"none\"\n#", true, "a remark"),
         ("mtu = 9000", "mtu = 1500", false, "another MTU"),
         ("[\"desk\", \"base\"]", "[\"base\", \"desk\"]", false, "another first master"),
         ("\"500 ms\"\n\n[output]", "\"1 s\"\n\n[output]", false, "another interval"),

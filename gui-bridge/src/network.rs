@@ -281,6 +281,7 @@ mod tests {
             classes: Vec::new(),
             foreign: 0,
             failures: Vec::new(),
+            rejections: Vec::new(),
         }
     }
 

@@ -6,7 +6,7 @@ mod tcp;
 
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkState,
-    Links, PeerLink, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
+    Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
 };
 
 pub use tcp::{BeyondClient, BeyondClients, BeyondLink, BeyondState, ClassPassed, Tcp, TcpInterface, TcpProxy};

@@ -132,6 +132,7 @@ fn faults_have_the_documented_numbers() {
         Fault::NodeRefuses { node: text(), why: text() },
         Fault::RouterFull,
         Fault::Delayed,
+        Fault::NotAllowed { node: text(), rule: text() },
     ];
     assert_eq!(rows, faults.len());
     for (number, fault) in faults.iter().enumerate() {

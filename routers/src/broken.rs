@@ -127,6 +127,10 @@ mod variants {
         RegistersOnce,
         /// Session: a client tries again at once, however often it fails.
         NeverBacksOff,
+        /// Security: what was opened before is opened again.
+        OpensTwice,
+        /// Security: whoever says hello is held to live.
+        BeginsUnproven,
         /// Time slots: a wake-up that comes too late is none too late.
         NoLateGate,
         /// Time slots: a node sends however far off its clock may be.

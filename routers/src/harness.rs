@@ -1,5 +1,6 @@
 //! What the tests of the cores have in common: settings from plain values, a log of all that is told, and a router without sockets.
 
+use crate::access::Access;
 use crate::broken::{Broken, with};
 use crate::flows::Flow;
 use crate::frame::NodeIndex;
@@ -8,7 +9,7 @@ use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::settings::{NodeSettings, Settings};
 use crate::stats::{Cause, Side, Stats};
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -41,6 +42,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
         digest: 7,
         incarnation: 100 + u64::from(own),
         network: Network {
+            security: Security::None,
             port: 21117,
             mtu: 1500,
             datagram_bytes_max: 1472,
@@ -51,6 +53,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
         tdma: None,
         routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
         senders: vec![vec![module(200, own)], vec![module(100, own)]],
+        access: Access::default(),
         flows: Vec::new(),
     }
 }

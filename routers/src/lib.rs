@@ -13,6 +13,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod access;
 pub mod broken;
 pub mod flows;
 pub mod fragment;
@@ -28,6 +29,7 @@ mod netlink;
 pub mod outbound;
 pub mod queue;
 pub mod report;
+pub mod security;
 pub mod session;
 pub mod settings;
 pub mod shell;

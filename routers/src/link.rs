@@ -118,6 +118,7 @@ impl Link {
         let reason = match why >> 8 & 0xff {
             1 => Reason::Version,
             2 => Reason::Digest,
+            4 => Reason::Sealed,
             _ => Reason::Stranger,
         };
         let digest = (why >> 16 & 1 == 1).then(|| self.refused_digest.get());

@@ -1,6 +1,7 @@
 //! What the cores tell of: packages that go no further, and what happens to peers.
 
 use crate::frame::{NodeIndex, Reason};
+use crate::security::NotOpened;
 use crate::stats::Cause;
 use rohrpost_mailbox::{Head, SendError};
 use std::net::IpAddr;
@@ -84,6 +85,17 @@ pub enum Event {
         peer: Option<NodeIndex>,
         /// What differs.
         mismatch: Mismatch,
+    },
+    /// Datagrams were not taken, since they were not sealed as they must be; told once a second at most.
+    Rejected {
+        /// Where the last of them came from.
+        source: IpAddr,
+        /// The node with that address.
+        peer: Option<NodeIndex>,
+        /// Why that was not taken.
+        why: NotOpened,
+        /// How many from there since it was told last.
+        datagrams: u64,
     },
     /// A peer takes nothing from us.
     Refuses {

@@ -2,11 +2,13 @@
 //!
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
+use crate::access::Access;
 use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
+use crate::stats::Cause;
 use crate::tdma::{LATE_NS, Wire};
-use rohrpost_config::{Installation, Network, Route, Tdma};
-use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Name};
+use rohrpost_config::{Installation, Network, Route, Security, Tdma};
+use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Head, Name};
 use std::net::IpAddr;
 
 /// Levels of the queue; 0 goes first, the last takes what is not real time: see [`Network::level`].
@@ -50,6 +52,8 @@ pub struct Settings {
     pub routes: Vec<Route>,
     /// The modules of this node: the names of a group have a quota together, and so have all other names.
     pub senders: Vec<Vec<Name>>,
+    /// Which classes may command which on this node.
+    pub access: Access,
     /// Declared flows that leave this node, to be measured.
     pub flows: Vec<Flow>,
 }
@@ -98,14 +102,20 @@ impl Settings {
             tdma: installation.tdma.clone(),
             routes: installation.routes_from(node),
             senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
+            access: Access::new(&installation.access),
             flows: Flow::all_from(installation, node),
         })
     }
 
-    /// Bytes that IP and UDP put before each datagram; the rate counts them.
+    /// Bytes around each datagram, of IP and UDP and of what seals it; the rate counts them.
     pub fn overhead_bytes(&self) -> usize {
         let is_v6 = self.nodes.iter().any(|node| node.address.is_ipv6());
-        if is_v6 { 40 + 8 } else { 20 + 8 }
+        Network::around_bytes(is_v6, self.network.security)
+    }
+
+    /// Whether what passes between nodes is sealed.
+    pub fn is_sealed(&self) -> bool {
+        self.network.security == Security::Keys
     }
 
     /// The longest datagram that this node sends. Where it has time slots, it fits into each of them, also if the thread comes as late
@@ -127,6 +137,15 @@ impl Settings {
         let after = self.routes.partition_point(|route| route.first <= name);
         let route = self.routes.get(after.checked_sub(1)?)?;
         (name <= route.last).then_some(route.node)
+    }
+
+    /// Why a package of a node is not to be delivered, whatever its mailbox says. That a seal is right says which node has sent it, so a
+    /// node speaks for its own names alone; without seals anyone may say that.
+    pub fn refuses(&self, from: NodeIndex, package: &Head) -> Option<Cause> {
+        if self.is_sealed() && self.node_of(package.from) != Some(from) {
+            return Some(Cause::ForeignName);
+        }
+        (!self.access.allows(package)).then_some(Cause::NotAllowed)
     }
 
     /// The nodes besides this one.

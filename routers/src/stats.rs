@@ -44,11 +44,15 @@ pub enum Cause {
     MailboxFull,
     /// Incoming: its mailbox has smaller slots.
     TooLarge,
+    /// Incoming: the node that sent it does not have its sender.
+    ForeignName,
+    /// Incoming: a command of a class that may not command this one.
+    NotAllowed,
 }
 
 impl Cause {
     /// All, in their order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::NoRoute,
         Self::Quota,
         Self::Stale,
@@ -61,6 +65,8 @@ impl Cause {
         Self::NoMailbox,
         Self::MailboxFull,
         Self::TooLarge,
+        Self::ForeignName,
+        Self::NotAllowed,
     ];
 
     /// A word for people and programs.
@@ -78,6 +84,8 @@ impl Cause {
             Self::NoMailbox => "no-mailbox",
             Self::MailboxFull => "mailbox-full",
             Self::TooLarge => "too-large",
+            Self::ForeignName => "foreign-name",
+            Self::NotAllowed => "not-allowed",
         }
     }
 }

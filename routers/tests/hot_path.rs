@@ -7,8 +7,9 @@
 pub mod counting;
 
 use counting::{CountingHeap, heap_uses};
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::{Datagram, Inbound};
@@ -44,6 +45,7 @@ fn settings(own: NodeIndex) -> Settings {
         digest: 7,
         incarnation: 9,
         network: Network {
+            security: Security::None,
             port: 21117,
             mtu: 1500,
             datagram_bytes_max: 1472,
@@ -54,6 +56,7 @@ fn settings(own: NodeIndex) -> Settings {
         tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(255), node: other }],
         senders: vec![vec![module(own)]],
+        access: Access::default(),
         flows: vec![Flow {
             from: vec![module(own)],
             to: vec![module(other)],

@@ -1,13 +1,14 @@
 //! A package on its way through two routers takes nothing from the heap: neither alone, nor in a crowd, nor in parts,
-//! nor in time slots.
+//! nor sealed, nor in time slots.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 #[path = "shell_common/mod.rs"]
 mod common;
 
-use common::{PATIENCE, Pair, label, module, turns};
+use common::{PATIENCE, Pair, Side, label, module, turns};
 use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
+use rohrpost_routers::security::Port;
 use rohrpost_routers::stats::Stats;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -61,10 +62,15 @@ fn round(sender: &mut Sender, receiver: &mut Receiver, large: &[u8]) {
     assert_eq!(bytes, large.len() + 40 * 11);
 }
 
-/// Both ways of sending in one test, one after the other: all threads of the process are counted.
+/// All ways of sending in one test, one after the other: all threads of the process are counted.
 #[test]
 fn no_package_takes_from_the_heap() {
-    as_packages_come();
+    as_packages_come(&Pair::new());
+    let mut sealed = Pair::new();
+    sealed.sides.iter_mut().for_each(Side::seal);
+    as_packages_come(&sealed);
+    assert!(sealed.sides[0].shell.as_ref().unwrap().rejections(Port::Packages).is_some());
+    drop(sealed);
     in_time_slots();
 }
 
@@ -74,9 +80,8 @@ fn mailboxes(pair: &Pair) -> (Sender, Receiver) {
     (pair.sides[0].sender(module(1)), receiver)
 }
 
-fn as_packages_come() {
-    let pair = Pair::new();
-    let (mut sender, mut receiver) = mailboxes(&pair);
+fn as_packages_come(pair: &Pair) {
+    let (mut sender, mut receiver) = mailboxes(pair);
     let large = vec![7; 40_000];
     // Ways are opened, and room for parts is taken, once.
     (0..50).for_each(|_| round(&mut sender, &mut receiver, &large));

@@ -24,6 +24,8 @@ const MISTAKE_SEEDS: u64 = 20;
 const LOSSY_CYCLES: u64 = 1000;
 /// The test of all promises.
 const NETWORKS: &str = "a_hundred_networks";
+/// The same with sealed datagrams: a quarter as many.
+const SEALED: &str = "sealed_networks";
 /// The same with time slots: a quarter as many.
 const SLOTTED: &str = "networks_with_time_slots";
 /// Those in which all goes wrong: a tenth as many.
@@ -51,6 +53,15 @@ const SEEN_IN_A_HUNDRED: [(&str, u64); 22] = [
     ("frozen", 40),
     ("router killed", 50),
     ("split", 15),
+    ("time: taken", 300_000),
+];
+/// The same where datagrams are sealed.
+const SEEN_IN_A_HUNDRED_SEALED: [(&str, u64); 6] = [
+    ("delivered", 100_000),
+    ("answered", 10_000),
+    ("asked", 1000),
+    ("rejected", 1000),
+    ("router killed", 50),
     ("time: taken", 300_000),
 ];
 /// The same with time slots.
@@ -201,6 +212,17 @@ fn networks_with_time_slots_keep_their_promises() {
     let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 4;
     let seen = keep_promises(SLOTTED, seeds, Plan::slotted);
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED_SLOTTED);
+}
+
+#[test]
+fn sealed_networks_keep_their_promises_whatever_is_recorded_altered_and_sent_again() {
+    let plan = |seed| Plan::new(seed).sealed();
+    if let Some(seed) = number("ROHRPOST_SIM_SEED") {
+        return replay(plan(seed));
+    }
+    let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 4;
+    let seen = keep_promises(SEALED, seeds, plan);
+    saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED_SEALED);
 }
 
 #[test]

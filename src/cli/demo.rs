@@ -37,6 +37,7 @@ const FIRST_FUNCTION: u16 = 16;
   rohrpost demo --seconds 20
   rohrpost demo --log run.log.gz --speed 10
   rohrpost demo --nodes 3 --seconds 30 --impair loss=5%,delay=2ms,reorder=5%
+  rohrpost demo --nodes 3 --secure --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
 Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml) of the present folder if there is one, else its own copy.")]
@@ -56,6 +57,9 @@ pub(super) struct Arguments {
     /// The nodes send in time slots, each in its own.
     #[arg(long, requires = "nodes", conflicts_with = "config")]
     tdma: bool,
+    /// What passes between the nodes is sealed, with keys that are made for this run.
+    #[arg(long, requires = "nodes", conflicts_with = "tdma")]
+    secure: bool,
     /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch starts it again.
     #[arg(long, requires_all = ["nodes", "seconds"])]
     kill_master: bool,

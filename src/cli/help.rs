@@ -1,4 +1,4 @@
-//! `rohrpost --help`: thirty subcommands, those of every day first.
+//! `rohrpost --help`: thirty-one subcommands, those of every day first.
 
 use clap::{Command, CommandFactory};
 
@@ -8,7 +8,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
     ("One of its modules", &["restart", "stop", "start"]),
     ("To measure", &["hz", "bw", "delay", "mailbox", "graph", "ping", "send"]),
-    ("Several nodes", &["net", "time", "certificates"]),
+    ("Several nodes", &["net", "time", "keys", "certificates"]),
     ("This computer", &["doctor", "bench", "clean", "completions", "version"]),
     ("Else", &["run", "router", "tcp-router", "tcp-client", "help"]),
 ];

@@ -8,7 +8,7 @@ use super::manager::Manager;
 use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
 pub(super) use all::{Nodes, lab};
-use rohrpost::config::Network;
+use rohrpost::config::{Installation, Keys};
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::survey::Survey;
 use rohrpost_routers::impair;
@@ -58,13 +58,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
+/// An installation that could run here: mistakes that a router would only find when it starts are told at once.
+fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
+    let installation = super::check::load(&arguments.file)?;
+    installation.keys.as_deref().map(|folder| Keys::load(&Keys::file(folder))).transpose()?;
+    Ok(Arc::new(installation))
+}
+
 /// Every node here, until all have ended or it is told to stop.
 fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let installation = Arc::new(super::check::load(&arguments.file)?);
+    let installation = load(arguments)?;
     // Before the first thread, of which the speech has two.
     let lab = all::lab(&installation)?;
     let speech = Speech::begin()?;
-    speech.say(Network::UNPROTECTED);
+    installation.security_text().iter().for_each(|security| speech.say(security));
     let mut nodes = Nodes::begin(installation, lab, arguments.impair, &speech)?;
     while nodes.watch(Duration::MAX) {}
     let code = nodes.stop();
@@ -73,7 +80,7 @@ fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
-    let installation = Arc::new(super::check::load(&arguments.file)?);
+    let installation = load(arguments)?;
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
     let mut manager = Manager::from_environment(|warning| speech.complain(warning));
     manager.starting(&node);

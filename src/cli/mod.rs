@@ -16,6 +16,7 @@ mod flows;
 mod graph;
 mod help;
 mod hz;
+mod keys;
 mod launch;
 mod list;
 mod log;
@@ -111,6 +112,8 @@ enum Command {
     Doctor(doctor::Arguments),
     /// Measure how this computer hands packages over.
     Bench(bench::Arguments),
+    /// Make and change the keys with which nodes seal what they send.
+    Keys(keys::Arguments),
     /// Begin a module of your own: a project that builds and runs.
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
@@ -159,6 +162,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Keys(arguments) => keys::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Certificates(arguments) => certificates::run(&arguments),

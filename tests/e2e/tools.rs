@@ -26,7 +26,8 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "echo" => &["probe.0", "beat"],
         "send" => &["probe.0", "count", "1", "--count", "1"],
         "param" => &["list"],
-        "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run" => {
+        "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run"
+        | "keys" => {
             return None;
         }
         // Of several nodes, see `lan`; of several systems, see `beyond`.

@@ -7,6 +7,7 @@ use crate::harness::{End, Placement, Scheduling, Scratch, settle};
 use rohrpost_mailbox::{Class, Name};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const INSTALLATION: &str = "bench-lan";
 /// Class of the modules that are timed, and of those that flood.
@@ -22,6 +23,8 @@ pub struct Network {
     pub rate: &'static str,
     /// How much one sender may have waiting in its node's router.
     pub quota: &'static str,
+    /// Whether what passes is sealed.
+    pub sealed: bool,
 }
 
 /// More than the computer can do, so that it is not in the way.
@@ -44,6 +47,9 @@ impl Nodes {
         let config = nodes.scratch.directory().join("bench-lan.toml");
         let text = configuration(network);
         fs::write(&config, text).map_err(|error| Failure::of("configuration", error))?;
+        if network.sealed {
+            make_keys(&command, &nodes.scratch.directory().join("keys"))?;
+        }
         for end in [End::Ping, End::Pong] {
             let scratch = nodes.scratch.directory();
             let spec = spec(end, &command, &config, &scratch);
@@ -70,6 +76,13 @@ impl Drop for Nodes {
     }
 }
 
+fn make_keys(command: &Path, folder: &Path) -> Result<(), Failure> {
+    let made = Command::new(command).args(["keys", "new"]).arg(folder).output();
+    let made = made.map_err(|error| Failure::of("rohrpost keys", error))?;
+    let said = || String::from_utf8_lossy(&made.stderr).into_owned();
+    if made.status.success() { Ok(()) } else { Err(Failure::Failed(format!("rohrpost keys new: {}", said()))) }
+}
+
 fn spec<'a>(end: End, command: &'a Path, config: &'a Path, scratch: &'a Path) -> RouterSpec<'a> {
     RouterSpec { command, config, installation: INSTALLATION, node: name_of(end).into(), index: index(end), scratch }
 }
@@ -90,7 +103,8 @@ pub fn flood(end: End, turn: u8) -> Name {
 }
 
 fn configuration(network: &Network) -> String {
-    let Network { mtu, rate, quota } = network;
+    let Network { mtu, rate, quota, sealed } = network;
+    let security = if *sealed { "keys" } else { "none" };
     let [near, far] = [End::Ping, End::Pong].map(address);
     let modules = [("bench", End::Ping), ("bench", End::Pong), ("flood", End::Ping), ("flood", End::Pong)];
     let modules = modules.map(|(class, end)| {
@@ -117,7 +131,7 @@ tools = [0, 63]
 address = "{far}"
 tools = [64, 127]
 [network]
-security = "none"
+security = "{security}"
 mtu = {mtu}
 rate = "{rate}"
 quota = "{quota}"

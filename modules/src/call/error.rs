@@ -95,6 +95,16 @@ pub enum Fault {
     /// A router: the package has been under way for too long, and was dropped.
     #[error("it waited too long for the network; more important packages used up its rate (`rohrpost net`)")]
     Delayed,
+    /// A router: the caller's class may not command this one from another node.
+    #[error(
+        "node {node} refuses it: {rule}, [access], lists the classes that may command this one, and the caller's is not among them"
+    )]
+    NotAllowed {
+        /// The module's node.
+        node: String,
+        /// File and line of the rule.
+        rule: String,
+    },
 }
 
 impl Fault {
@@ -123,7 +133,8 @@ impl Fault {
             | Self::NodeDeaf { .. }
             | Self::NodeRefuses { .. }
             | Self::RouterFull
-            | Self::Delayed => true,
+            | Self::Delayed
+            | Self::NotAllowed { .. } => true,
             Self::ModuleOff
             | Self::ModuleError(_)
             | Self::Interrupted

@@ -139,12 +139,25 @@ pub struct Links {
     pub foreign: u64,
     /// What this computer said when it was to send a datagram, and how often.
     pub failures: Vec<SocketFailure>,
+    /// Datagrams that were not taken, since they were not sealed as they must be.
+    pub rejections: Vec<Rejected>,
+}
+
+/// Datagrams that were not taken.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Rejected {
+    /// The node whose address they came from, which anybody can write on a datagram; empty: no node has it.
+    pub node: String,
+    /// In a word: `unsealed`, `other-key`, `not-ours`, `other-life`, `replay`, `forged`, `version`.
+    pub cause: String,
+    /// Of packages and of time.
+    pub datagrams: u64,
 }
 
 /// Why datagrams could not be sent.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct SocketFailure {
-    /// In a word: `nobody-there` (of an earlier one), `no-way`, `too-long`, `no-room`, `full`, `other`.
+    /// In a word: `nobody-there` (of an earlier one), `no-way`, `too-long`, `no-room`, `full`, `unacquainted`, `other`.
     pub cause: String,
     /// How often.
     pub times: u64,

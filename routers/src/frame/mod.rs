@@ -8,6 +8,7 @@
 //!  packages: (package head 16, body) over and over        fragment: first u64, index u16, count u16, offset u32, package head, bytes
 //!  alive: incarnation u64 and next sequence u64 of the peer as we heard it, datagrams of it that we missed u64
 //!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
+//!  byte 7: key that what follows the head is sealed with, 0: it is not, see `security`; hello: always sealed
 //! ```
 //!
 //! All fields of ours are little-endian; the head of a package is in the order that its own options tell. The check is the CRC-32 of
@@ -58,6 +59,8 @@ pub enum Kind {
     Alive = 3,
     /// "I take nothing from you."
     Refusal = 4,
+    /// Sealed always: "do you live?", and the answer to it.
+    Hello = 5,
     /// Time: the master says what time it is.
     Sync = 16,
     /// Time: makes the way warm for the next, and says nothing.
@@ -69,11 +72,12 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Packages,
         Self::Fragment,
         Self::Alive,
         Self::Refusal,
+        Self::Hello,
         Self::Sync,
         Self::WarmUp,
         Self::Request,
@@ -109,6 +113,9 @@ pub enum BadFrame {
     /// Another version of the format.
     #[error("wire format {theirs}, ours is {VERSION}; run the same version of Rohrpost on all nodes", theirs = .0)]
     Version(u8),
+    /// Sealed, and nothing else is taken here that is.
+    #[error("sealed, and this node's configuration says `security = \"none\"`; launch all nodes from the same file")]
+    Sealed,
     /// Of this format, but wrong in itself.
     #[error("damaged: {0}")]
     Damaged(&'static str),
@@ -118,14 +125,19 @@ impl FrameHead {
     /// The 36 bytes that go before `rest`, which is all that follows, in parts.
     pub fn to_bytes(&self, rest: &[&[u8]]) -> [u8; HEAD_BYTES] {
         let mut bytes = [0; HEAD_BYTES];
-        bytes[0..2].copy_from_slice(&MAGIC);
-        bytes[2..7].copy_from_slice(&[VERSION, self.kind as u8, self.system, self.from, self.to]);
-        bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
-        bytes[16..24].copy_from_slice(&self.incarnation.to_le_bytes());
-        bytes[24..32].copy_from_slice(&self.sequence.to_le_bytes());
+        self.write(0, &mut bytes);
         let check = check(&bytes, rest);
         bytes[CHECK].copy_from_slice(&check.to_le_bytes());
         bytes
+    }
+
+    /// Writes all but the check to where a datagram begins. `key`: what it is to be sealed with.
+    pub(crate) fn write(&self, key: u8, bytes: &mut [u8]) {
+        bytes[0..2].copy_from_slice(&MAGIC);
+        bytes[2..8].copy_from_slice(&[VERSION, self.kind as u8, self.system, self.from, self.to, key]);
+        bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
+        bytes[16..24].copy_from_slice(&self.incarnation.to_le_bytes());
+        bytes[24..32].copy_from_slice(&self.sequence.to_le_bytes());
     }
 
     /// Reads the head; what follows is returned as it is, see [`Frame::parse`].
@@ -133,6 +145,15 @@ impl FrameHead {
     /// # Errors
     /// [`BadFrame`]
     pub fn parse(datagram: &[u8]) -> Result<(Self, &[u8]), BadFrame> {
+        let (head, key) = Self::read(datagram)?;
+        if key != 0 {
+            return Err(BadFrame::Sealed);
+        }
+        Ok((head, &datagram[HEAD_BYTES..]))
+    }
+
+    /// Reads the head, and which key what follows it is sealed with; 0: none.
+    pub(crate) fn read(datagram: &[u8]) -> Result<(Self, u8), BadFrame> {
         let (b, rest) = datagram.split_first_chunk::<HEAD_BYTES>().ok_or(BadFrame::Foreign)?;
         if b[0..2] != MAGIC {
             return Err(BadFrame::Foreign);
@@ -144,9 +165,6 @@ impl FrameHead {
             return Err(BadFrame::Version(b[2]));
         }
         let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
-        if b[7] != 0 {
-            return Err(BadFrame::Damaged("byte 7 is not 0"));
-        }
         let head = Self {
             kind,
             system: b[4],
@@ -162,13 +180,40 @@ impl FrameHead {
         if head.sequence > SEQUENCE_MAX {
             return Err(BadFrame::Damaged("a sequence that no router reaches"));
         }
-        Ok((head, rest))
+        Ok((head, b[7]))
+    }
+}
+
+/// Of a head that was written: for whom it is, and its sequence.
+///
+/// # Panics
+/// If there is none.
+pub(crate) fn place_of(datagram: &[u8]) -> (NodeIndex, u64) {
+    let (head, _) = datagram.split_first_chunk::<HEAD_BYTES>().expect("a datagram has a head");
+    (head[6], long(head, 24))
+}
+
+/// Says in a head what the datagram is sealed with.
+pub(crate) fn write_key(key: u8, datagram: &mut [u8]) {
+    datagram[7] = key;
+}
+
+/// Of a head, what the check and a seal are over.
+pub(crate) fn before_check(head: &[u8]) -> &[u8] {
+    &head[..CHECK.start]
+}
+
+/// Writes the check of a datagram that is whole but for it.
+pub(crate) fn write_check(datagram: &mut [u8]) {
+    if let Some((head, rest)) = datagram.split_first_chunk_mut::<HEAD_BYTES>() {
+        let check = check(head, &[rest]);
+        head[CHECK].copy_from_slice(&check.to_le_bytes());
     }
 }
 
 fn check(head: &[u8; HEAD_BYTES], rest: &[&[u8]]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&head[..CHECK.start]);
+    hasher.update(before_check(head));
     rest.iter().for_each(|part| hasher.update(part));
     hasher.finalize()
 }
@@ -195,14 +240,19 @@ impl<'a> Frame<'a> {
     /// [`BadFrame`]
     pub fn parse(datagram: &'a [u8]) -> Result<(FrameHead, Self), BadFrame> {
         let (head, rest) = FrameHead::parse(datagram)?;
-        let frame = match head.kind {
+        Ok((head, Self::read(head.kind, datagram[2], rest)?))
+    }
+
+    /// The same of what follows a head, as a router of a `version` wrote it.
+    pub(crate) fn read(kind: Kind, version: u8, rest: &'a [u8]) -> Result<Self, BadFrame> {
+        Ok(match kind {
             Kind::Packages => Self::Packages(Packages::check(rest)?),
             Kind::Fragment => Self::Fragment(Fragment::parse(rest)?),
             Kind::Alive => Self::Alive(Alive::parse(rest)?),
-            Kind::Refusal => Self::Refusal(Refusal::parse(datagram[2], rest)?),
+            Kind::Refusal => Self::Refusal(Refusal::parse(version, rest)?),
+            Kind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
             Kind::Sync | Kind::WarmUp | Kind::Request | Kind::Reply => Self::Time(rest),
-        };
-        Ok((head, frame))
+        })
     }
 }
 
@@ -342,6 +392,8 @@ pub enum Reason {
     Digest = 2,
     /// Its configuration has no such node, or that node has another address.
     Stranger = 3,
+    /// Who seals is not understood by who does not.
+    Sealed = 4,
 }
 
 /// "I take nothing from you, since …"
@@ -366,7 +418,7 @@ impl Refusal {
 
     fn parse(version: u8, rest: &[u8]) -> Result<Self, BadFrame> {
         let b: &[u8; REFUSAL_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("a refusal has 16 bytes"))?;
-        let reasons = [Reason::Version, Reason::Digest, Reason::Stranger];
+        let reasons = [Reason::Version, Reason::Digest, Reason::Stranger, Reason::Sealed];
         let reason = reasons.into_iter().find(|reason| *reason as u8 == b[0]);
         let reason = reason.filter(|_| b[1..8] == [0; 7]).ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
         Ok(Self { version, reason, digest: long(b, 8) })

@@ -76,7 +76,7 @@ fn what_is_wrong_says_why() {
         (changed(2, 2), damaged("the check differs")),
         (checked(changed(2, 2)), Err(BadFrame::Version(2))),
         (checked(changed(3, 9)), damaged("unknown kind")),
-        (checked(changed(7, 1)), damaged("byte 7 is not 0")),
+        (checked(changed(7, 1)), Err(BadFrame::Sealed)),
         (no_incarnation, damaged("incarnation 0")),
         (long_sequence, damaged("a sequence that no router reaches")),
         (datagram(Kind::Packages, &[]), damaged("a package is cut short")),

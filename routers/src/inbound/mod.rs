@@ -8,18 +8,19 @@
 mod order;
 mod peer;
 mod refusing;
-mod window;
+pub(crate) mod window;
 
 pub use window::{REORDER_MAX, WINDOW};
 
 use crate::broken::broken;
-use crate::frame::{BadFrame, Frame, FrameHead, Reason};
+use crate::frame::{BadFrame, Frame, FrameHead, Reason, VERSION};
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
-use crate::stats::Stats;
+use crate::stats::{Cause, Stats};
 use order::position;
 use peer::{Peer, Way};
 use refusing::Refusing;
+use rohrpost_mailbox::Head;
 use std::net::IpAddr;
 use std::sync::Arc;
 
@@ -42,6 +43,17 @@ pub struct Datagram<'a> {
     pub arrived_ns: u64,
     /// What is in it.
     pub bytes: &'a [u8],
+}
+
+/// How a datagram came that was opened: as [`Datagram`] has it.
+#[derive(Clone, Copy, Debug)]
+pub struct Came {
+    /// Who sent it.
+    pub source: IpAddr,
+    /// When.
+    pub arrived_ns: u64,
+    /// How long it was.
+    pub bytes: usize,
 }
 
 /// What to do.
@@ -90,22 +102,70 @@ impl Inbound {
 
     /// Takes a datagram, whatever it is.
     pub fn handle(&mut self, now_ns: u64, datagram: &Datagram<'_>, deliver: &mut impl Deliver) {
-        let source = datagram.source;
+        let Datagram { source, arrived_ns, bytes } = *datagram;
+        let came = Came { source, arrived_ns, bytes: bytes.len() };
         match Frame::parse(datagram.bytes) {
             Ok((_, Frame::Refusal(refusal))) => self.refused_by(now_ns, source, &refusal, deliver),
             Ok((_, Frame::Time(_))) | Err(BadFrame::Foreign) => self.stats.foreign.add(1),
             Ok((head, frame)) => match self.mismatch(source, &head) {
-                None => self.take(now_ns, datagram, &head, frame, deliver),
+                None => self.take(now_ns, &came, &head, frame, deliver),
                 Some(mismatch) => self.refuse(now_ns, source, mismatch, deliver),
             },
             Err(BadFrame::Version(version)) => {
                 let mismatch = Mismatch { reason: Reason::Version, version, digest: None };
                 self.refuse(now_ns, source, mismatch, deliver);
             }
-            Err(BadFrame::Damaged(_)) => match self.peer_at(source) {
-                Some(peer) => self.stats.peer(peer).received.damaged.add(1),
-                None => self.stats.foreign.add(1),
-            },
+            Err(BadFrame::Sealed) => {
+                let mismatch = Mismatch { reason: Reason::Sealed, version: VERSION, digest: None };
+                self.refuse(now_ns, source, mismatch, deliver);
+            }
+            Err(BadFrame::Damaged(_)) => self.damaged(source),
+        }
+    }
+
+    /// The same of one that was sealed, and opened: `text` is what follows its head.
+    pub fn handle_opened(
+        &mut self,
+        now_ns: u64,
+        came: &Came,
+        (head, text): (&FrameHead, &[u8]),
+        deliver: &mut impl Deliver,
+    ) {
+        match Frame::read(head.kind, VERSION, text) {
+            Ok(frame @ (Frame::Packages(_) | Frame::Fragment(_) | Frame::Alive(_))) => {
+                match self.mismatch(came.source, head) {
+                    None => self.take(now_ns, came, head, frame, deliver),
+                    Some(mismatch) => self.refuse(now_ns, came.source, mismatch, deliver),
+                }
+            }
+            Ok(Frame::Refusal(_) | Frame::Time(_)) | Err(_) => self.damaged(came.source),
+        }
+    }
+
+    /// Whether a life of a peer may begin that has this head: it may if all that must be equal is.
+    pub(crate) fn may_greet(
+        &mut self,
+        now_ns: u64,
+        source: IpAddr,
+        head: &FrameHead,
+        deliver: &mut impl Deliver,
+    ) -> bool {
+        let mismatch = self.mismatch(source, head);
+        mismatch.inspect(|mismatch| self.refuse(now_ns, source, *mismatch, deliver)).is_none()
+    }
+
+    /// Counts what is no datagram of a router, or a damaged one.
+    pub(crate) fn bad(&self, source: IpAddr, why: BadFrame) {
+        match why {
+            BadFrame::Foreign => self.stats.foreign.add(1),
+            BadFrame::Version(_) | BadFrame::Sealed | BadFrame::Damaged(_) => self.damaged(source),
+        }
+    }
+
+    fn damaged(&self, source: IpAddr) {
+        match self.peer_at(source) {
+            Some(peer) => self.stats.peer(peer).received.damaged.add(1),
+            None => self.stats.foreign.add(1),
         }
     }
 
@@ -130,18 +190,11 @@ impl Inbound {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    fn take(
-        &mut self,
-        now_ns: u64,
-        datagram: &Datagram<'_>,
-        head: &FrameHead,
-        frame: Frame<'_>,
-        deliver: &mut impl Deliver,
-    ) {
+    fn take(&mut self, now_ns: u64, came: &Came, head: &FrameHead, frame: Frame<'_>, deliver: &mut impl Deliver) {
         let from = head.from;
         let way = Way { from, stats: &self.stats, peer: self.stats.peer(from) };
         let peer = &mut self.peers[usize::from(from)];
-        if !peer.lives(now_ns, head, &way, deliver) {
+        if !peer.lives(now_ns, head, self.settings.is_sealed(), &way, deliver) {
             return way.peer.received.old.add(1);
         }
         if !peer.is_new(head.sequence, &way) {
@@ -150,13 +203,22 @@ impl Inbound {
         // A copy says nothing of whether its sender is still there.
         peer.is_heard(now_ns, &way, deliver);
         way.peer.received.datagrams.add(1);
-        way.peer.received.bytes.add(datagram.bytes.len() as u64);
-        let is_old = now_ns.saturating_sub(datagram.arrived_ns) > SOCKET_MAX_NS && !broken!(TakesStale);
+        way.peer.received.bytes.add(came.bytes as u64);
+        let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS && !broken!(TakesStale);
+        let settings = &self.settings;
+        let refused = |package: &Head| if is_old { Some(Cause::Stale) } else { settings.refuses(from, package) };
         match frame {
             Frame::Packages(packages) => {
                 for (index, (package, body)) in (0..).zip(packages) {
                     way.stats.inn.came(package.priority);
-                    way.pass(is_old, &mut peer.order, position(head.sequence, index), &package, body, deliver);
+                    way.pass(
+                        refused(&package),
+                        &mut peer.order,
+                        position(head.sequence, index),
+                        &package,
+                        body,
+                        deliver,
+                    );
                 }
             }
             Frame::Fragment(part) => {
@@ -164,7 +226,14 @@ impl Inbound {
                 let whole =
                     peer.reassembly.take(now_ns, &part, |head, body, change| way.partial(head, body, change, deliver));
                 if let Some(whole) = whole {
-                    way.pass(is_old, &mut peer.order, position(whole.first, 0), &whole.head, whole.body, deliver);
+                    way.pass(
+                        refused(&whole.head),
+                        &mut peer.order,
+                        position(whole.first, 0),
+                        &whole.head,
+                        whole.body,
+                        deliver,
+                    );
                 }
             }
             Frame::Alive(alive) => way.hears_of_us(now_ns, self.settings.incarnation, &alive),

@@ -55,14 +55,23 @@ impl Peer {
     /// Whether a datagram is of the life that is heard. A life that was not known begins; of one that is over nothing is taken, unless
     /// it goes on, and the one that was taken for its successor is silent: then it was the other way round. What it sent before it was
     /// over says nothing: that may be a copy, which the wire or a stranger kept.
-    pub(super) fn lives(&mut self, now_ns: u64, head: &FrameHead, way: &Way<'_>, deliver: &mut impl Deliver) -> bool {
+    /// `is_sure`: it is the present life, for it has shown so.
+    pub(super) fn lives(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        is_sure: bool,
+        way: &Way<'_>,
+        deliver: &mut impl Deliver,
+    ) -> bool {
         if head.incarnation == self.incarnation {
             return true;
         }
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
-        if was.is_some() && !(is_silent && goes_on) && !broken!(TakesOldLives) {
+        let may_go_on = is_sure || (is_silent && goes_on) || broken!(TakesOldLives);
+        if was.is_some() && !may_go_on {
             if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
                 deliver.event(Event::Twice { peer: way.from });
@@ -178,10 +187,10 @@ pub(super) struct Way<'a> {
 }
 
 impl Way<'_> {
-    /// Delivers a package that is there as a whole, or says why not.
+    /// Delivers a package that is there as a whole, unless it is `refused`, or says why not.
     pub(super) fn pass(
         &self,
-        is_old: bool,
+        refused: Option<Cause>,
         order: &mut Order,
         position: u64,
         head: &Head,
@@ -189,8 +198,8 @@ impl Way<'_> {
         deliver: &mut impl Deliver,
     ) {
         self.peer.received.packages.add(1);
-        if is_old {
-            return self.lose(head, body, Cause::Stale, deliver);
+        if let Some(cause) = refused {
+            return self.lose(head, body, cause, deliver);
         }
         if !order.admit(head, position) {
             return self.lose(head, body, Cause::Late, deliver);

@@ -3,6 +3,7 @@
 use super::{Inbound, REFUSE_EVERY_NS};
 use crate::broken::broken;
 use crate::frame::{self, FrameHead, Kind, NodeIndex, Reason, Refusal};
+use crate::link::State;
 use crate::report::{Deliver, Event, Mismatch};
 use crate::settings::Settings;
 use std::net::IpAddr;
@@ -23,7 +24,7 @@ pub(super) struct Refusing {
 }
 
 impl Inbound {
-    pub(super) fn peer_at(&self, source: IpAddr) -> Option<NodeIndex> {
+    pub(crate) fn peer_at(&self, source: IpAddr) -> Option<NodeIndex> {
         self.settings.node_at(source).filter(|node| *node != self.settings.own)
     }
 
@@ -44,7 +45,10 @@ impl Inbound {
             Some(peer) => {
                 let stats = self.stats.peer(peer);
                 stats.received.refused.add(1);
-                stats.link.refuse(now_ns, mismatch);
+                // Sealed, it may be what a peer said when it had another configuration: who is heard has ours by now.
+                if !self.settings.is_sealed() || self.stats.state(peer, now_ns) != State::Alive {
+                    stats.link.refuse(now_ns, mismatch);
+                }
                 &mut self.peers[usize::from(peer)].refusing
             }
             None => {
@@ -52,7 +56,8 @@ impl Inbound {
                 &mut self.strangers
             }
         };
-        if refusing.due.is_none() {
+        // Sealed, nobody is told: that would have to be believed without a seal.
+        if refusing.due.is_none() && !self.settings.is_sealed() {
             refusing.due = Some((source, mismatch.reason));
             self.must_refuse = true;
         }

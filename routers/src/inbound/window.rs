@@ -15,7 +15,7 @@ pub const REORDER_MAX: u64 = 64;
 
 /// What a sequence is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Arrival {
+pub(crate) enum Arrival {
     /// The newest.
     Newest,
     /// Newer ones came before it.
@@ -28,7 +28,7 @@ pub(super) enum Arrival {
 
 /// Sequences of one life of one peer; at first all from 0 on are to come.
 #[derive(Debug, Default)]
-pub(super) struct Window {
+pub(crate) struct Window {
     next: u64,
     /// All below is judged.
     settled: u64,
@@ -43,44 +43,49 @@ impl Window {
     /// Of a life that may have begun long before us: what it sent before this sequence is not missed. Near its beginning both have just
     /// begun, and what is missing is lost, also if nobody listened yet: a router sends to a peer of which it knows nothing, so packages
     /// may have been in it, and no account may forget them.
-    pub(super) fn joining(sequence: u64) -> Self {
+    pub(crate) fn joining(sequence: u64) -> Self {
         let start = if sequence < REORDER_MAX { 0 } else { sequence };
         Self { next: start, settled: start, start, ticks: [start; 2], ..Self::default() }
     }
 
     /// Of a life that was heard before: what it sent before this sequence has come.
-    pub(super) fn going_on(sequence: u64) -> Self {
+    pub(crate) fn going_on(sequence: u64) -> Self {
         let came = [u64::MAX; (WINDOW / 64) as usize];
         Self { next: sequence, settled: sequence, start: sequence, came, ticks: [sequence; 2] }
     }
 
     /// The sequence expected next.
-    pub(super) fn next(&self) -> u64 {
+    pub(crate) fn next(&self) -> u64 {
         self.next
     }
 
     /// Judges a sequence that came, and adds to `lost` what is given up since newer ones have come.
-    pub(super) fn arrive(&mut self, sequence: u64, lost: &mut u64) -> Arrival {
+    pub(crate) fn arrive(&mut self, sequence: u64, lost: &mut u64) -> Arrival {
         if sequence >= self.next {
             self.advance(sequence, lost);
             return Arrival::Newest;
         }
-        if (self.next - sequence > WINDOW || self.has(sequence)) && !broken!(TakesCopies) {
+        if self.is_copy(sequence) && !broken!(TakesCopies) {
             return Arrival::Copy;
         }
         self.note(sequence);
         if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Overtaken }
     }
 
+    /// Whether a sequence came before, or is so old that it cannot be told.
+    pub(crate) fn is_copy(&self, sequence: u64) -> bool {
+        sequence < self.next && (self.next - sequence > WINDOW || self.has(sequence))
+    }
+
     /// Gives up what was missing two ticks ago; how many.
-    pub(super) fn tick(&mut self) -> u64 {
+    pub(crate) fn tick(&mut self) -> u64 {
         let lost = self.settle(self.ticks[1]);
         self.ticks = [self.next, self.ticks[0]];
         lost
     }
 
     /// Gives up all that is missing; how many.
-    pub(super) fn close(&mut self) -> u64 {
+    pub(crate) fn close(&mut self) -> u64 {
         self.settle(self.next)
     }
 

@@ -126,7 +126,7 @@ impl Outbound {
     fn left(&mut self, now_ns: u64, to: NodeIndex, bytes: usize, level: Option<u8>) {
         let sent = &self.stats.peer(to).sent;
         sent.datagrams.add(1);
-        sent.bytes.add(bytes as u64);
+        sent.bytes.add((bytes + self.settings.network.security.tag_bytes()) as u64);
         self.peers[usize::from(to)].quiet_until_ns = now_ns + ALIVE_EVERY_NS;
         self.pace.left(now_ns, bytes, level);
     }
@@ -134,7 +134,8 @@ impl Outbound {
     /// A peer that is to be told that we are still there. If none is, notes when one will be.
     pub(super) fn due(&mut self, now_ns: u64) -> Option<NodeIndex> {
         let when = |peer: &Peer| peer.quiet_until_ns.min(peer.tell_ns);
-        let peers = self.settings.peers().map(|node| (when(&self.peers[usize::from(node)]), node));
+        let reached = self.settings.peers().filter(|node| self.reached & 1 << node != 0);
+        let peers = reached.map(|node| (when(&self.peers[usize::from(node)]), node));
         match peers.min() {
             Some((at_ns, node)) if at_ns <= now_ns => Some(node),
             Some((at_ns, _)) => {

@@ -12,6 +12,7 @@ use crate::frame::{self, Fragment, Kind, NodeIndex};
 use crate::link::State;
 use crate::queue::{Place, Queue, Waiting};
 use crate::report::Report;
+use crate::security::Acquaintances;
 use crate::settings::{LEVELS, Settings};
 use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
@@ -95,6 +96,10 @@ pub struct Outbound {
     /// Most bytes of a datagram.
     datagram_bytes: usize,
     aboard: Aboard,
+    /// Where datagrams are sealed: who is known. What is for others waits.
+    acquaintances: Option<Arc<Acquaintances>>,
+    /// Those to whom it sends, one bit each.
+    reached: u64,
     /// It sends in time slots only.
     in_slots: bool,
     /// Nobody is due to be told anything before this, ns.
@@ -126,12 +131,20 @@ impl Outbound {
             peers: vec![Peer::default(); settings.nodes.len()].into(),
             datagram_bytes: settings.datagram_bytes(),
             aboard: Aboard::new(settings.datagram_bytes()),
+            acquaintances: None,
+            reached: u64::MAX,
             in_slots: settings.tdma.is_some(),
             alive_ns: 0,
             sweep_ns: 0,
             settings: settings.clone(),
             stats,
         }
+    }
+
+    /// From now on datagrams are sealed, by who has them sent, and only for those who are known.
+    #[must_use]
+    pub fn sealed(self, acquaintances: Arc<Acquaintances>) -> Self {
+        Self { reached: 0, acquaintances: Some(acquaintances), ..self }
     }
 
     /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram; nor need one
@@ -153,7 +166,7 @@ impl Outbound {
         };
         let needs_no_company = alone || self.fills_a_datagram(package.body.len());
         let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
-        if needs_no_company && self.may_leave_at_once(now_ns, level, package.body.len()) {
+        if needs_no_company && self.reaches(peer) && self.may_leave_at_once(now_ns, level, package.body.len()) {
             return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package) };
         }
         let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
@@ -189,7 +202,7 @@ impl Outbound {
 
     /// What waits has at most this priority: only what is above it may leave before what waits.
     pub fn waits_up_to(&self) -> Priority {
-        let level = self.queue.first().map(|place| self.queue.at(place).level);
+        let level = self.queue.first_among(self.reached).map(|place| self.queue.at(place).level);
         let highest = (0..=u8::MAX).rev().find(|priority| Some(self.levels[usize::from(*priority)]) == level);
         Priority(highest.unwrap_or_default())
     }
@@ -201,6 +214,7 @@ impl Outbound {
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
         let datagram = &mut datagram[..self.datagram_bytes];
         self.aboard.clear();
+        self.look_who_is_known();
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
         }
@@ -210,7 +224,7 @@ impl Outbound {
             return Output::Send { to: peer, bytes: self.alive(now_ns, peer, datagram) };
         }
         let quiet_until_ns = if self.queue.is_empty() { self.alive_ns } else { self.alive_ns.min(self.sweep_ns) };
-        while let Some(place) = self.queue.first() {
+        while let Some(place) = self.queue.first_among(self.reached) {
             let waiting = *self.queue.at(place);
             if let Err(until_ns) = self.pace.may_leave(now_ns, waiting.level) {
                 return Output::Wait { until_ns: until_ns.min(quiet_until_ns) };
@@ -226,7 +240,8 @@ impl Outbound {
             };
             return Output::Send { to: waiting.peer, bytes };
         }
-        Output::Wait { until_ns: self.alive_ns }
+        // What waits for somebody who is not known may become too old.
+        Output::Wait { until_ns: if self.queue.is_empty() { self.alive_ns } else { quiet_until_ns } }
     }
 
     /// Says that the socket did not take what was to be sent last: the datagram, and the body besides if it was [`Accepted::Send`].
@@ -285,6 +300,19 @@ impl Outbound {
             State::Silent => Some(Cause::Silent),
             State::Unheard => Some(Cause::Unheard),
             State::Refused(_) => Some(Cause::Refused),
+        }
+    }
+
+    fn reaches(&self, peer: NodeIndex) -> bool {
+        self.acquaintances.as_ref().is_none_or(|all| all.known() & 1 << peer != 0)
+    }
+
+    /// Whoever is known since just now is told at once that we are there.
+    fn look_who_is_known(&mut self) {
+        let Some(all) = &self.acquaintances else { return };
+        let known = all.known();
+        if known != self.reached {
+            (self.reached, self.alive_ns) = (known, 0);
         }
     }
 

@@ -31,13 +31,14 @@ impl Outbound {
         let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };
         let datagram = &mut datagram[..room_bytes];
         self.aboard.clear();
+        self.look_who_is_known();
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {
             let fits = HEAD_BYTES + ALIVE_BYTES <= room_bytes;
             return fits.then(|| (peer, self.alive(now_ns, peer, datagram)));
         }
-        while let Some(place) = self.queue.first() {
+        while let Some(place) = self.queue.first_among(self.reached) {
             let waiting = *self.queue.at(place);
             if let Some(cause) = self.why_not(now_ns, waiting.peer, waiting.published_ns) {
                 self.drop_out(place, cause, report);

@@ -178,6 +178,11 @@ impl Queue {
 
     /// The package that goes next: of the first level, the one that has waited longest.
     pub fn first(&self) -> Option<Place> {
+        self.first_among(u64::MAX)
+    }
+
+    /// The same of those for some peers alone, one bit each.
+    pub fn first_among(&self, peers: u64) -> Option<Place> {
         if self.levels == 0 {
             return None;
         }
@@ -185,8 +190,8 @@ impl Queue {
             let firsts = self.peers.iter().flatten().filter_map(List::first);
             return firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place);
         }
-        let level = self.levels.trailing_zeros() as usize;
-        let firsts = bits(self.busy[level]).filter_map(|peer| self.peers[peer][level].first());
+        let level = bits(self.levels.into()).find(|level| self.busy[*level] & peers != 0)?;
+        let firsts = bits(self.busy[level] & peers).filter_map(|peer| self.peers[peer][level].first());
         firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place)
     }
 

@@ -17,8 +17,10 @@ const ANSWER_BYTES_MAX: usize = 1024;
 pub struct Undelivered<'a> {
     /// What happened.
     pub cause: Cause,
-    /// The node that it was for.
+    /// The node that it was for; of one that came and is not allowed, this one.
     pub node: Option<&'a str>,
+    /// Of a command that is not allowed: line of the rule.
+    pub rule: Option<usize>,
     /// What differs between that node and this one, if one of them refuses the other.
     pub mismatch: Option<Mismatch>,
     /// Of a command too large: bytes of a body that its mailbox takes.
@@ -94,7 +96,9 @@ impl Answers {
             State::Refused(mismatch) => Some(mismatch),
             _ => None,
         });
-        let why = Undelivered { cause, node: node.map(|node| node.name.as_str()), mismatch, takes_bytes };
+        let rule = settings.access.line(head.to.class()).filter(|_| cause == Cause::NotAllowed);
+        let node = if rule.is_some() { settings.nodes.get(usize::from(settings.own)) } else { node };
+        let why = Undelivered { cause, node: node.map(|node| node.name.as_str()), rule, mismatch, takes_bytes };
         self.body.clear();
         if !self.faults.write(body, &why, &mut self.body) {
             return;

@@ -8,10 +8,13 @@ use super::socket::{InSocket, Received};
 use super::threads::{Awake, Shared};
 use super::ways::Ways;
 use crate::frame::NodeIndex;
-use crate::inbound::{Datagram, Inbound, Output, SOCKET_MAX_NS};
+use crate::inbound::{Came, Datagram, Inbound, Output, SOCKET_MAX_NS};
 use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::stats::Cause;
+use crate::security::{Acquaintances, Gate, Said};
+use crate::settings::Settings;
+use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
@@ -28,8 +31,26 @@ pub(super) struct Arrivals {
     pub(super) socket: Arc<InSocket>,
     pub(super) inbound: Inbound,
     pub(super) desk: Desk,
-    /// Where there are time slots, refusals leave through them.
+    pub(super) settings: Arc<Settings>,
+    pub(super) stats: Arc<Stats>,
+    /// Where datagrams are sealed.
+    pub(super) guard: Option<Guard>,
+    /// Where there are time slots, refusals and hellos leave through them.
     pub(super) refusals: Option<SyncSender<Refusal>>,
+}
+
+/// What opens datagrams, and knows who lives.
+pub(super) struct Guard {
+    gate: Gate,
+    all: Arc<Acquaintances>,
+    known: u64,
+}
+
+impl Guard {
+    /// `seed`: see [`Gate::new`].
+    pub(super) fn new(all: &Arc<Acquaintances>, seed: [u8; 32]) -> Self {
+        Self { gate: Gate::new(all, seed), all: all.clone(), known: 0 }
+    }
 }
 
 impl Arrivals {
@@ -49,23 +70,55 @@ impl Arrivals {
                 Received::Datagram { waited_ns, .. } if is_of_before && waited_ns > SOCKET_MAX_NS => continue,
                 Received::Datagram { bytes, source, waited_ns } => {
                     is_of_before = false;
-                    let bytes = &datagram[..bytes];
-                    let datagram = Datagram { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
-                    self.inbound.handle(now_ns, &datagram, &mut self.desk);
+                    let came = Came { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
+                    self.take(now_ns, &came, &mut datagram[..bytes]);
                 }
             }
+            self.ask(now_ns);
             while let Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.desk) {
-                match &self.refusals {
-                    // With no room in the line it is lost, and said again a second later.
-                    Some(slots) => drop(slots.try_send(Refusal { to, bytes, datagram: refusal })),
-                    None => self.socket.answer(to, &refusal[..bytes]),
-                }
+                self.say(to, bytes, refusal);
             }
             if now_ns >= ring_ns {
                 ring_ns = now_ns + RING_EVERY_NS;
                 self.shared.ring_if_due(now_ns);
             }
             awake.pause_if_long(now_ns);
+        }
+    }
+
+    fn take(&mut self, now_ns: u64, came: &Came, datagram: &mut [u8]) {
+        let Self { inbound, desk, guard, shared, .. } = self;
+        let Some(Guard { gate, known, all }) = guard else {
+            let Came { source, arrived_ns, .. } = *came;
+            return inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: datagram }, desk);
+        };
+        let mut reply = [0; REFUSAL_BYTES];
+        let said = gate.take(now_ns, came, datagram, inbound, desk, &mut reply);
+        if all.known() != *known {
+            *known = all.known();
+            // What waits for this peer may leave.
+            shared.ring();
+        }
+        if let Some(Said { to, bytes }) = said {
+            self.say(self.settings.nodes[usize::from(to)].address, bytes, reply);
+        }
+    }
+
+    /// Asks who is not known, or not heard, where datagrams are sealed.
+    fn ask(&mut self, now_ns: u64) {
+        let mut question = [0; REFUSAL_BYTES];
+        while let Some(Guard { gate, .. }) = &mut self.guard
+            && let Some(Said { to, bytes }) = gate.ask(now_ns, &self.stats, &mut question)
+        {
+            self.say(self.settings.nodes[usize::from(to)].address, bytes, question);
+        }
+    }
+
+    fn say(&self, to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES]) {
+        match &self.refusals {
+            // With no room in the line it is lost, and said again a second later.
+            Some(slots) => drop(slots.try_send(Refusal { to, bytes, datagram })),
+            None => self.socket.answer(to, &datagram[..bytes]),
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::frame::NodeIndex;
 use crate::impair::{self, Impairment};
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
 use crate::report::Report;
+use crate::security::{Sealing, TAG_BYTES};
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
 use rohrpost_config::Tdma;
@@ -76,14 +77,22 @@ impl Departures {
     /// most important of all that came since. A flood that is taken in faster than it leaves would only be lost to its quota there, and
     /// cost the processor that modules need; in the mailbox its least important gives way by itself.
     fn take(&mut self) -> bool {
-        let Self { transit, outbound, answers, wire, .. } = self;
+        let Self { transit, outbound, answers, wire, datagram, .. } = self;
         for taken in 0..BURST {
             let Some(waiting) = transit.try_receive() else { return false };
             let (now_ns, body) = (monotonic_ns(), waiting.body());
             let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body };
             let alone = taken == 0 && !waiting.is_followed();
             if let Accepted::Send { to, head } = outbound.accept(now_ns, &package, alone, answers) {
-                let sent = wire.send(now_ns, to, &[IoSlice::new(&head), IoSlice::new(body)]);
+                let sent = match wire.seals() {
+                    false => wire.send(now_ns, to, &[IoSlice::new(&head), IoSlice::new(body)]),
+                    true => {
+                        // The one copy that sealing takes: the body must stay as it is.
+                        datagram[..head.len()].copy_from_slice(&head);
+                        datagram[head.len()..head.len() + body.len()].copy_from_slice(body);
+                        wire.send_made(now_ns, to, datagram, head.len() + body.len())
+                    }
+                };
                 settle(sent, outbound, (&head, body), answers);
             }
             if outbound.has_plenty() {
@@ -94,9 +103,8 @@ impl Departures {
     }
 
     fn send(&mut self, to: NodeIndex, bytes: usize) {
-        let datagram = &self.datagram[..bytes];
-        let sent = self.wire.send(monotonic_ns(), to, &[IoSlice::new(datagram)]);
-        settle(sent, &mut self.outbound, (datagram, &[]), &mut self.answers);
+        let sent = self.wire.send_made(monotonic_ns(), to, &mut self.datagram, bytes);
+        settle(sent, &mut self.outbound, (&self.datagram[..bytes], &[]), &mut self.answers);
     }
 
     /// The pace holds the wire, and the mailbox holds more. Only what may leave before all that waits is worth waking up for.
@@ -129,6 +137,7 @@ fn settle(sent: Result<(), Failure>, outbound: &mut Outbound, (datagram, body): 
 pub(super) struct Wire {
     /// By node; none for the own one.
     sockets: Box<[Option<OutSocket>]>,
+    sealing: Option<Sealing>,
     impairment: Option<Impairment<NodeIndex>>,
     failures: Arc<Failures>,
     news: News,
@@ -137,7 +146,12 @@ pub(super) struct Wire {
 }
 
 impl Wire {
-    pub(super) fn new(settings: &Arc<Settings>, impair: Option<impair::Settings>, failures: &Arc<Failures>) -> Self {
+    pub(super) fn new(
+        settings: &Arc<Settings>,
+        sealing: Option<Sealing>,
+        impair: Option<impair::Settings>,
+        failures: &Arc<Failures>,
+    ) -> Self {
         let own = settings.nodes[usize::from(settings.own)].address;
         // In a slot the thread must not sleep until the device has room.
         let waiting_bytes = settings.tdma.as_ref().map(|tdma| slot_bytes_max(tdma, settings.own));
@@ -150,6 +164,7 @@ impl Wire {
         };
         Self {
             sockets: (0..settings.nodes.len() as NodeIndex).map(socket).collect(),
+            sealing,
             // Each node's own stream of the seed.
             impairment: impair.map(|impair| Impairment::new(impair, settings.own.into())),
             failures: failures.clone(),
@@ -158,7 +173,30 @@ impl Wire {
         }
     }
 
-    /// Sends a datagram, or has the impairment keep it for a while.
+    /// Whether what leaves is sealed: [`Self::send_made`] does.
+    fn seals(&self) -> bool {
+        self.sealing.is_some()
+    }
+
+    /// Sends the first bytes of a buffer, with room for a seal behind them; sealed, if that is to be. What could not be sent is as it was.
+    pub(super) fn send_made(
+        &mut self,
+        now_ns: u64,
+        to: NodeIndex,
+        buffer: &mut [u8],
+        bytes: usize,
+    ) -> Result<(), Failure> {
+        let Some(sealing) = &mut self.sealing else { return self.send(now_ns, to, &[IoSlice::new(&buffer[..bytes])]) };
+        let sealed = &mut buffer[..bytes + TAG_BYTES];
+        sealing.close(sealed).map_err(|_| Failure::Unacquainted)?;
+        let sent = self.send(now_ns, to, &[IoSlice::new(sealed)]);
+        if let (Err(_), Some(sealing)) = (sent, &mut self.sealing) {
+            sealing.reopen(sealed);
+        }
+        sent
+    }
+
+    /// Sends a datagram as it is, or has the impairment keep it for a while.
     pub(super) fn send(&mut self, now_ns: u64, to: NodeIndex, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
         let Some(impairment) = &mut self.impairment else { return self.send_now(to, parts) };
         self.whole.clear();

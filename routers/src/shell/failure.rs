@@ -16,13 +16,16 @@ pub enum Failure {
     NoRoom,
     /// So much waits already for its device: who sends in time slots does not wait for that.
     Full,
+    /// Nobody is known there that it could be sealed to.
+    Unacquainted,
     /// Anything else.
     Other,
 }
 
 impl Failure {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Full, Self::Other];
+    pub const ALL: [Self; 7] =
+        [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Full, Self::Unacquainted, Self::Other];
 
     pub(super) fn of(error: &io::Error) -> Self {
         use nix::errno::Errno;
@@ -56,6 +59,7 @@ impl Failure {
             Self::TooLong => "too-long",
             Self::NoRoom => "no-room",
             Self::Full => "full",
+            Self::Unacquainted => "unacquainted",
             Self::Other => "other",
         }
     }
@@ -75,6 +79,7 @@ impl Failure {
                 "its device has not sent what earlier slots brought; does it carry what `link` in [tdma] says (`ethtool DEVICE`), and is \
                  net.core.wmem_max enough for a slot (`sysctl`)?"
             }
+            Self::Unacquainted => "its router has not shown yet that it has the same key",
             Self::Other => "the kernel refused it",
         }
     }

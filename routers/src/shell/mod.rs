@@ -40,11 +40,12 @@ pub use socket::{SocketError, listen};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
+use crate::security::{self, Acquaintances, KeyRing, NoRandom, Port, Rejections, Sealing, Who};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{Discipline, Table};
 use answers::Answers;
-use arrivals::{Arrivals, Desk};
+use arrivals::{Arrivals, Desk, Guard};
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
 use departures::{Departures, Wire};
 use news::News;
@@ -77,6 +78,14 @@ pub enum ShellError {
     /// Time slots without a master of time, by which they are counted.
     #[error("time slots need the time of a master; write `source = \"master\"` in [time]")]
     NoTime,
+    /// What passes between nodes is to be sealed, and there is nothing to seal it with, or the other way round.
+    #[error(
+        "configuration says `security = \"keys\"`, and the router was given no keys; or it says `none`, and there are some"
+    )]
+    Keys,
+    /// No incarnation that nobody has had before.
+    #[error(transparent)]
+    Random(#[from] NoRandom),
     /// The system has no thread for it.
     #[error("a thread of the router: {0}; is the limit of processes reached (ulimit -u)?")]
     Thread(io::Error),
@@ -111,6 +120,8 @@ pub struct Shell {
     clock: Option<Arc<ClockState>>,
     slots: Option<Arc<slots::State>>,
     tunnel: Option<Arc<tunnel::Passed>>,
+    /// Where datagrams are sealed.
+    acquaintances: Option<Arc<Acquaintances>>,
     /// The clock's own thread.
     service: Option<ClockService>,
     threads: Vec<JoinHandle<()>>,
@@ -122,6 +133,22 @@ impl Shell {
     /// # Errors
     /// [`ShellError`]
     pub fn start(parts: Parts<'_>) -> Result<Self, ShellError> {
+        Self::start_with(parts, None)
+    }
+
+    /// The same of a router that seals what it sends, and takes only what is sealed. The incarnation in its settings is random.
+    ///
+    /// # Errors
+    /// [`ShellError`]
+    pub fn start_sealed(parts: Parts<'_>, keys: KeyRing) -> Result<Self, ShellError> {
+        Self::start_with(parts, Some(keys))
+    }
+
+    fn start_with(parts: Parts<'_>, keys: Option<KeyRing>) -> Result<Self, ShellError> {
+        if parts.settings.is_sealed() != keys.is_some() {
+            return Err(ShellError::Keys);
+        }
+        let seed = security::random()?;
         let Parts { node, name, mut settings, faults, socket, impair, clock } = parts;
         let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
         if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
@@ -143,6 +170,11 @@ impl Shell {
         }
         let settings = Arc::new(settings);
         let stats = Stats::new(&settings, monotonic_ns());
+        let all = keys.map(|keys| Acquaintances::new(Who::of(&settings), keys));
+        let mut outbound = Outbound::new(&settings, stats.clone());
+        if let Some(all) = &all {
+            outbound = outbound.sealed(all.clone());
+        }
         let failures = Arc::new(Failures::default());
         let ages = Arc::new(Ages::new(node));
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
@@ -154,11 +186,11 @@ impl Shell {
         let departures = Departures {
             shared: shared.clone(),
             transit,
-            outbound: Outbound::new(&settings, stats.clone()),
+            outbound,
             stats: stats.clone(),
             answers: answers(&sender),
-            wire: Wire::new(&settings, impair, &failures),
-            datagram: vec![0; settings.network.datagram_bytes_max].into(),
+            wire: Wire::new(&settings, all.as_ref().map(|all| Sealing::new(all, Port::Packages)), impair, &failures),
+            datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
         };
         let mut arrivals = Arrivals {
             shared: shared.clone(),
@@ -171,6 +203,9 @@ impl Shell {
                 ages: ages.clone(),
                 takes_bytes: None,
             },
+            settings: settings.clone(),
+            stats: stats.clone(),
+            guard: all.as_ref().map(|all| Guard::new(all, seed)),
             refusals: None,
         };
         // From here on, whatever fails ends what has begun.
@@ -186,12 +221,14 @@ impl Shell {
             tunnel: None,
             service: None,
             threads: Vec::new(),
+            acquaintances: all,
         };
         if shell.settings.tdma.is_some() {
             arrivals.refusals = Some(shell.send_in_slots(name, departures, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
-            shell.service = clock.map(ClockService::start).transpose()?;
+            let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.acquaintances.as_ref()));
+            shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
             shell.begin("departures", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
@@ -223,7 +260,7 @@ impl Shell {
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
-        let works = Works::new(clock)?.in_slots(table.for_clock());
+        let works = Works::new(clock)?.sealed(self.acquaintances.as_ref()).in_slots(table.for_clock());
         let spin_ns = slots::spin_ns(table.cycle_ns());
         let (refusals, line) = sync_channel(slots::REFUSALS);
         let discipline = Discipline::new(table, spin_ns);
@@ -277,6 +314,11 @@ impl Shell {
     /// Who it is, who the others are.
     pub fn settings(&self) -> &Arc<Settings> {
         &self.settings
+    }
+
+    /// What was not taken at a port, since it was not sealed as it must be; none where nothing is sealed.
+    pub fn rejections(&self, port: Port) -> Option<&Arc<Rejections>> {
+        self.acquaintances.as_ref().map(|all| all.rejections(port))
     }
 
     /// What it counts.

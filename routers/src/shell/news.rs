@@ -21,6 +21,11 @@ pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
         (Reason::Digest, None) => {
             format!("its configuration is another than this node's, {digest:016x}; launch all nodes from the same file")
         }
+        (Reason::Sealed, _) => {
+            "one of both seals what it sends (`security = \"keys\"`), the other does not (`security = \"none\"`); launch all nodes from the \
+             same file"
+                .into()
+        }
         (Reason::Stranger, _) => {
             "its packages come from another address than the configuration has for it, or are for another \
              node; correct `address` in the configuration, and launch all nodes from it"
@@ -63,6 +68,10 @@ impl News {
             }
             Event::Refuses { peer, mismatch } => {
                 tracing::warn!("{} takes nothing from this node: {}", self.node(peer), difference(&mismatch, digest));
+            }
+            Event::Rejected { source, peer, why, datagrams } => {
+                let from = peer.map_or_else(|| format!("{source}, the address of no node"), |peer| self.node(peer));
+                tracing::warn!("takes nothing from {from}: {why} (datagrams: {datagrams})");
             }
             Event::Twice { peer } => tracing::error!(
                 "two routers send as {}: its address is used twice, or an old router there did not end; end one of them",

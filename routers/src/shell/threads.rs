@@ -50,6 +50,11 @@ impl Shared {
         self.departures.ring();
     }
 
+    /// Wakes the sending thread: it has something to send that nobody published.
+    pub(super) fn ring(&self) {
+        self.departures.ring();
+    }
+
     /// Wakes the sending thread if its time has come. Said again until that sleeps anew: who is about to sleep may not hear it.
     pub(super) fn ring_if_due(&self, now_ns: u64) {
         if self.departures_due_ns.load(Ordering::Acquire) <= now_ns {

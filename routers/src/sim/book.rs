@@ -141,6 +141,8 @@ pub struct Package {
     pub(super) ticket: u64,
     /// Datagrams of lower levels that had left when it was accepted.
     pub(super) lower: u64,
+    /// It was for a node that its router did not know yet, so that others may go before it.
+    pub(super) held: bool,
     /// Whether it came marked as one that was handed out before.
     pub redelivered: bool,
     /// At each delivery, incarnation of the router that sent it and life of the one that delivered.
@@ -234,6 +236,7 @@ impl Book {
             published_ns: 0,
             ticket: 0,
             lower: 0,
+            held: false,
             redelivered: false,
             deliveries: Vec::new(),
         });

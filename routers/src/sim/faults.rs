@@ -4,6 +4,7 @@ use super::chance::Chance;
 use super::clock::Now;
 use super::modules::DATA_MAILBOXES;
 use super::plan::{Fault, MS, mended};
+use super::seals::altered;
 use super::station::Arrived;
 use super::world::{Event, World};
 use crate::frame::{Alive, FrameHead, Kind};
@@ -68,9 +69,12 @@ impl World<'_> {
                     // nothing for long is relied on.
                     let is_same = self.stations[whose].router.as_ref().is_some_and(|router| router.life == life);
                     let to = if is_same && self.chance.percent(80) { whose } else { to };
-                    if to == whose && !is_same {
+                    if to == whose && !is_same && !self.plan.sealed {
                         continue;
                     }
+                    let alters = self.plan.sealed && self.chance.percent(50);
+                    let bytes = if alters { altered(&arrived.bytes, &mut self.chance) } else { arrived.bytes.clone() };
+                    let arrived = Arrived { bytes, ..arrived };
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
                     self.at(at_ns, Event::Arrive { to, arrived });
                 }

@@ -22,6 +22,7 @@ pub mod plan;
 pub mod receiving;
 mod rough;
 pub mod run;
+mod seals;
 pub mod sending;
 pub mod slots;
 pub mod slotted;

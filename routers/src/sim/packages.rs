@@ -4,17 +4,20 @@ use super::book::{Promise, Role};
 use super::clock::Now;
 use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
 use super::plan::{Plan, SYSTEM};
+use super::seals::{PackageSeals, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
+use crate::access::Access;
 use crate::fragment::PARTIAL_MAX;
-use crate::frame::{Frame, FrameHead, NodeIndex};
+use crate::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS, TICK_EVERY_NS};
 use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
+use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, TAG_BYTES};
 use crate::settings::{NodeSettings, Settings};
 use crate::stats::{Cause, Side, Stats};
 use crate::tdma::Permit;
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Kind, Options, Type};
 use std::collections::VecDeque;
 use std::net::{IpAddr, Ipv4Addr};
@@ -29,6 +32,8 @@ pub(super) const DIGEST: u64 = 0x1234_5678;
 const STILL_NS: u64 = 400_000_000;
 /// So long after a datagram came what went before it, and is missing, is counted as lost: at the third tick.
 const SETTLED_NS: u64 = 3 * TICK_EVERY_NS + STILL_NS;
+/// The thread that receives looks around so often, if nothing comes.
+const LISTEN_NS: u64 = 100_000_000;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
@@ -55,6 +60,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
         digest: DIGEST,
         incarnation,
         network: Network {
+            security: if plan.sealed { Security::Keys } else { Security::None },
             datagram_bytes_max: plan.shape.datagram_bytes_max,
             rate_bytes_s: plan.shape.rate_bytes_s,
             quota_bytes: plan.shape.quota_bytes,
@@ -65,6 +71,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
         tdma: plan.slots.as_ref().map(|slots| slots.table.clone()),
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
+        access: Access::default(),
         flows: Vec::new(),
     }
 }
@@ -91,6 +98,7 @@ pub struct Packages {
     lost_before: Option<(u64, u64)>,
     /// What the receiving half wants to be sent.
     refusals: VecDeque<Sent>,
+    seals: Option<PackageSeals>,
     /// Commands that could not be delivered here; their callers are to be told.
     undelivered: Vec<Head>,
 }
@@ -107,6 +115,7 @@ impl Packages {
             in_hand: None,
             lost_before: None,
             refusals: VecDeque::new(),
+            seals: None,
             undelivered: Vec::new(),
             steady_since_ns: now_ns,
             polled_ns: now_ns,
@@ -115,6 +124,12 @@ impl Packages {
             settings: settings.clone(),
             stats,
         }
+    }
+
+    /// The same, sealing what it sends.
+    pub(super) fn sealed(self, all: &Arc<Acquaintances>, incarnation: u64) -> Self {
+        let seals = Some(PackageSeals::new(all, incarnation));
+        Self { outbound: self.outbound.sealed(all.clone()), seals, ..self }
     }
 
     /// Takes all that waits in the transit mailbox.
@@ -126,6 +141,12 @@ impl Packages {
             }
             io.book.accepted(io.life, parcel.number, parcel.published_ns);
             io.book.saw("accepted");
+            let to = self.settings.node_of(parcel.head.to);
+            if let (Some(seals), Some(to)) = (&self.seals, to)
+                && !seals.knows(to)
+            {
+                io.book.held(parcel.number);
+            }
             let alone = io.host.transit.is_empty();
             self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone);
             io.book.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
@@ -149,6 +170,14 @@ impl Packages {
             let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             return self.outbound.unsent(&bytes, &[], &mut watch);
         }
+        let sealed = match &mut self.seals {
+            None => Some(bytes.clone()),
+            Some(seals) => sealed(&mut seals.sealing, &bytes),
+        };
+        let Some(sealed) = sealed else {
+            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+            return self.outbound.unsent(&bytes, &[], &mut watch);
+        };
         io.book.leaves(io.now, io.life, &bytes);
         if io.plan.slots.is_some() {
             io.book.is_strict(io.now, io.life, &bytes);
@@ -156,7 +185,40 @@ impl Packages {
             io.book.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
         }
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
-        io.sent.push(Sent { port: PORT, to: to.into(), bytes });
+        io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed });
+    }
+
+    /// Asks whoever is not known.
+    fn ask(&mut self, io: &mut Io<'_>) {
+        let Some(seals) = &mut self.seals else { return };
+        while let Some(said) = seals.gate.ask(io.now.monotonic_ns, &self.stats, &mut self.buffer) {
+            io.book.saw("asked");
+            self.refusals.push_back(Sent {
+                port: PORT,
+                to: said.to.into(),
+                bytes: Rc::from(&self.buffer[..said.bytes]),
+            });
+        }
+    }
+
+    /// Takes a datagram; what was in it, if that could be read.
+    fn take(&mut self, io: &mut Io<'_>, arrived: &Arrived) -> Rc<[u8]> {
+        let now_ns = io.now.monotonic_ns;
+        let (source, arrived_ns) = (arrived.source.map_or(STRANGER, address), arrived.stamp.monotonic_ns);
+        let came = Some(Came { at_ns: arrived_ns, incarnation: incarnation(&arrived.bytes) });
+        let is_young = self.stats.is_young(now_ns);
+        let mut watch = Watch { io, came, is_out: false, is_young, undelivered: &mut self.undelivered };
+        let Some(seals) = &mut self.seals else {
+            self.inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: &arrived.bytes }, &mut watch);
+            return arrived.bytes.clone();
+        };
+        let came = inbound::Came { source, arrived_ns, bytes: arrived.bytes.len() };
+        let (mut bytes, mut reply) = (arrived.bytes.to_vec(), [0; HELLO_DATAGRAM_BYTES]);
+        let inbound = &mut self.inbound;
+        if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
+            self.refusals.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(&reply[..said.bytes]) });
+        }
+        if bytes.len() < HEAD_BYTES + TAG_BYTES { arrived.bytes.clone() } else { opened(&bytes) }
     }
 
     /// Tells callers on other nodes of commands that were not delivered here.
@@ -189,6 +251,8 @@ impl Packages {
         }
         self.polled_ns = io.now.monotonic_ns;
         let is_young = self.stats.is_young(io.now.monotonic_ns);
+        self.ask(io);
+        let ask_ns = if self.seals.is_some() { io.now.monotonic_ns + LISTEN_NS } else { u64::MAX };
         loop {
             let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
@@ -199,7 +263,7 @@ impl Packages {
                         self.refusals.push_back(Sent { port: PORT, to, bytes: Rc::from(&self.buffer[..bytes]) });
                     }
                 }
-                inbound::Output::Wait { until_ns } => return until_ns,
+                inbound::Output::Wait { until_ns } => return until_ns.min(ask_ns),
             }
         }
     }
@@ -234,10 +298,13 @@ impl Packages {
 
     fn counted(&self, source: Option<usize>) -> (u64, u64, u64) {
         let Some(peer) = source.map(|node| self.stats.peer(node as NodeIndex)) else {
-            return (0, 0, self.stats.foreign.get());
+            let rejected = self.seals.as_ref().map_or(0, |seals| seals.rejected(None));
+            return (0, 0, self.stats.foreign.get() + rejected);
         };
+        let rejected = self.seals.as_ref().map_or(0, |seals| seals.rejected(source.map(|node| node as NodeIndex)));
         let received = &peer.received;
-        let dropped = received.old.get() + received.damaged.get() + received.refused.get() + self.stats.foreign.get();
+        let dropped =
+            rejected + received.old.get() + received.damaged.get() + received.refused.get() + self.stats.foreign.get();
         (received.datagrams.get(), received.copies.get(), dropped)
     }
 
@@ -332,30 +399,27 @@ impl Layer for Packages {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let source = arrived.source.filter(|node| *node != io.node);
         let before = self.counted(source);
-        let datagram = Datagram {
-            source: arrived.source.map_or(STRANGER, address),
-            arrived_ns: arrived.stamp.monotonic_ns,
-            bytes: &arrived.bytes,
-        };
-        let incarnation = FrameHead::parse(&arrived.bytes).map_or(0, |(head, _)| head.incarnation);
-        let came = Some(Came { at_ns: datagram.arrived_ns, incarnation });
-        let is_young = self.stats.is_young(io.now.monotonic_ns);
-        let mut watch = Watch { io, came, is_out: false, is_young, undelivered: &mut self.undelivered };
-        self.inbound.handle(watch.io.now.monotonic_ns, &datagram, &mut watch);
+        let clear = self.take(io, arrived);
         let after = self.counted(source);
         let (taken, copies, dropped) = (after.0 - before.0, after.1 - before.1, after.2 - before.2);
-        io.line(|| format!("from {source:?}: {}, taken {taken}, copies {copies}", shown(&arrived.bytes)));
-        let is_refusal = matches!(Frame::parse(&arrived.bytes), Ok((_, Frame::Refusal(_))));
-        if taken + copies + dropped != 1 && !is_refusal {
+        io.line(|| format!("from {source:?}: {}, taken {taken}, copies {copies}", shown(&clear)));
+        let kind = FrameHead::read(&arrived.bytes).ok().map(|(head, _)| head.kind);
+        let is_answer = match self.seals {
+            None => kind == Some(FrameKind::Refusal),
+            Some(_) => kind == Some(FrameKind::Hello),
+        };
+        if taken + copies + dropped != 1 && !(is_answer && taken + copies + dropped == 0) {
             let text = format!("a datagram was counted as {taken} taken, {copies} copies, {dropped} dropped");
             io.book.broken(io.now, Promise::Accounts, text);
         }
         if taken > 0 {
-            io.book.took(io.now, io.life, &arrived.bytes, DIGEST);
+            io.book.took(io.now, io.life, &clear, DIGEST);
             self.hears(io, source);
         } else if copies > 0 {
             io.book.saw("dropped as a copy");
             io.book.dropped_as_copy(io.now, io.life, &arrived.bytes);
+        } else if dropped > 0 && self.seals.is_some() {
+            io.book.saw("rejected");
         } else {
             io.book.saw("dropped as wrong or old");
         }

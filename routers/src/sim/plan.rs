@@ -233,6 +233,8 @@ pub struct Plan {
     pub masters: Vec<NodeIndex>,
     /// Whether kernels stamp datagrams.
     pub has_stamps: bool,
+    /// Whether routers seal what they send. Then those who send what was recorded also alter it.
+    pub sealed: bool,
     /// Whether damaged datagrams are dropped by the kernel, as UDP's checksum has it; else the routers get them.
     pub checksum: bool,
     /// No data before this, ns.
@@ -281,6 +283,7 @@ impl Plan {
             stepped_ns: 0,
             masters,
             has_stamps: chance.percent(80),
+            sealed: false,
             slots: None,
             nodes,
         };
@@ -307,6 +310,12 @@ impl Plan {
         self.stepped_ns = self.timed_ns + EPOCH_PAUSE_NS;
         self.traffic_end_ns = self.mended_ns + RECOVERY_NS + WELL_NS;
         self.end_ns = (self.traffic_end_ns + DRAIN_NS).max(self.timed_ns + S);
+    }
+
+    /// The same network with datagrams that are sealed.
+    #[must_use]
+    pub fn sealed(self) -> Self {
+        Self { sealed: true, ..self }
     }
 
     /// A network in which nothing goes wrong.

@@ -4,6 +4,7 @@ use super::book::Problem;
 use super::calls::NewGuard;
 use super::packages::{Packages, settings};
 use super::plan::{Flow, Plan};
+use super::seals;
 use super::slotted::Slotted;
 use super::station::Layer;
 use super::ticking::{self, Ticking};
@@ -67,8 +68,12 @@ fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayer
         // Never the same again, and in no order.
         let incarnation = (plan.seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let settings = settings(&plan, node, incarnation);
-        let packages = Packages::new(&settings, now.monotonic_ns);
+        let mut packages = Packages::new(&settings, now.monotonic_ns);
         let mut ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
+        if plan.sealed {
+            let all = seals::acquaintances(&settings);
+            (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all));
+        }
         change(&mut ticking);
         if let Some(slots) = &plan.slots {
             let (own, nodes) = (settings.own, plan.nodes.len() as u8);

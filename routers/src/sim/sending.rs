@@ -64,6 +64,11 @@ impl Book {
         waiting.bytes += usize::from(package.head.len);
     }
 
+    /// A router has accepted a package for a node that it does not know yet.
+    pub fn held(&mut self, number: u32) {
+        self.packages[number as usize].held = true;
+    }
+
     /// A router has done with a package what it does at once: no sender has more waiting than its quota.
     pub fn queued(&mut self, now: Now, life: u32, number: u32, quota_bytes: usize) {
         let module = self.packages[number as usize].head.from.module();
@@ -209,7 +214,7 @@ impl Book {
         let Some(package) = self.packages.get(number as usize) else { return };
         let level = self.level(package.head.priority.0);
         let lower = self.sending.entry(life).or_default().below[level] - package.lower;
-        if package.life == life && lower > 1 {
+        if package.life == life && lower > 1 && !package.held {
             let text = format!("package {number} of level {level} was behind {lower} datagrams of lower levels");
             self.broken(now, Promise::Urgency, text);
         } else if head.priority != package.head.priority {

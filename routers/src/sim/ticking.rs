@@ -3,14 +3,17 @@
 use super::book::Promise;
 use super::clock::Now;
 use super::plan::{Plan, S, SYSTEM};
+use super::seals::TimeSeals;
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::frame::{FrameHead, NodeIndex};
+use crate::security::Acquaintances;
 use crate::tdma::{Permit, Table};
 use crate::time::message::Message;
 use crate::time::{Allowed, Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The socket of time.
@@ -45,13 +48,27 @@ pub struct Ticking {
     /// Which datagrams of this layer are to be stamped, by how many went before.
     awaited: VecDeque<(u64, SentId)>,
     sent: u64,
+    seals: Option<TimeSeals>,
 }
 
 impl Ticking {
     /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
     pub fn new(settings: TimeSettings, now: Now, page: Option<TimeRecord>, has_stamps: bool) -> Self {
         let clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, page);
-        Self { clock, has_stamps, heard: (Term::NONE, 0), was_master: false, awaited: VecDeque::new(), sent: 0 }
+        Self {
+            clock,
+            has_stamps,
+            heard: (Term::NONE, 0),
+            was_master: false,
+            awaited: VecDeque::new(),
+            sent: 0,
+            seals: None,
+        }
+    }
+
+    /// The same, sealing what it sends.
+    pub(super) fn sealed(self, all: &Arc<Acquaintances>) -> Self {
+        Self { seals: Some(TimeSeals::new(all)), ..self }
     }
 
     /// The same with time slots; all of its datagrams leave in windows.
@@ -95,6 +112,11 @@ impl Ticking {
     }
 
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, stamp: Option<SentId>, datagram: &[u8; TIME_BYTES]) {
+        let bytes = match &mut self.seals {
+            None => Some(Rc::from(&datagram[..])),
+            Some(seals) => seals.close(datagram),
+        };
+        let Some(bytes) = bytes else { return io.book.saw("time: nobody known") };
         if let Some(id) = stamp {
             self.awaited.push_back((self.sent, id));
             if self.awaited.len() > AWAITED_MAX {
@@ -102,7 +124,7 @@ impl Ticking {
             }
         }
         self.sent += 1;
-        io.sent.push(Sent { port: PORT, to: to.into(), bytes: Rc::from(*datagram) });
+        io.sent.push(Sent { port: PORT, to: to.into(), bytes });
     }
 
     pub(super) fn stamp(&self, io: &mut Io<'_>, at: Now) -> Stamp {
@@ -126,7 +148,12 @@ impl Ticking {
 impl Layer for Ticking {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let stamp = self.stamp(io, arrived.stamp);
-        let Ok((head, rest)) = FrameHead::parse(&arrived.bytes) else { return io.book.saw("time: no frame") };
+        let opened = match &mut self.seals {
+            None => Some(arrived.bytes.clone()),
+            Some(seals) => seals.open(&arrived.bytes),
+        };
+        let Some(bytes) = opened else { return io.book.saw("time: rejected") };
+        let Ok((head, rest)) = FrameHead::parse(&bytes) else { return io.book.saw("time: no frame") };
         let now_ns = io.now.monotonic_ns;
         let heard_before = self.clock.coarse(now_ns);
         let taken = self.clock.handle(now_ns, stamp, &head, rest);

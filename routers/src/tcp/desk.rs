@@ -25,7 +25,7 @@ impl Answers for Desk {
         let node = Some(holder.unwrap_or(&self.beyond));
         self.faults.write(
             call,
-            &Undelivered { cause, node, mismatch: None, takes_bytes: self.takes_bytes.take() },
+            &Undelivered { cause, node, mismatch: None, takes_bytes: self.takes_bytes.take(), rule: None },
             answer,
         )
     }

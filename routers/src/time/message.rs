@@ -180,7 +180,7 @@ impl Message {
                 sync_by_kernel: has(SYNC_BY_KERNEL),
                 request_by_kernel: has(REQUEST_BY_KERNEL),
             }),
-            Kind::Packages | Kind::Fragment | Kind::Alive | Kind::Refusal => {
+            Kind::Packages | Kind::Fragment | Kind::Alive | Kind::Refusal | Kind::Hello => {
                 return Err(BadFrame::Damaged("no frame of time"));
             }
         };

@@ -1,13 +1,16 @@
 //! Two nodes in one process, each with its router, at addresses of the loopback.
 
-use rohrpost_config::{Network, Route, Tdma, TimeSlot};
+use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::flows::Flow;
+use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::ClockParts;
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered};
 use rohrpost_routers::time::TimeSettings;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::num::NonZeroU8;
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -35,6 +38,10 @@ impl Faults for Words {
         answer.extend_from_slice(why.cause.word().as_bytes());
         true
     }
+}
+
+fn keys() -> KeyRing {
+    KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &[7; KEY_BYTES]), None)
 }
 
 /// A node of two.
@@ -75,6 +82,7 @@ impl Side {
         let there = module(1 - own);
         let nodes = [0, 1].map(|node| NodeSettings { name: format!("node{node}"), address: addresses[node] });
         let network = Network {
+            security: Security::None,
             port: 21_117,
             mtu: 1500,
             datagram_bytes_max: 1472,
@@ -92,6 +100,7 @@ impl Side {
             tdma,
             routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
             senders: vec![vec![module(own)]],
+            access: Access::default(),
             flows: vec![declared(module(own), there)],
         };
         Self { node, settings, socket: None, shell: None }
@@ -104,8 +113,18 @@ impl Side {
         let name = router(self.settings.own);
         let (settings, faults, clock) = (self.settings.clone(), Arc::new(Words), self.clock());
         let socket = self.socket.as_ref().map(|kept| kept.try_clone().unwrap());
+        let is_sealed = settings.is_sealed();
         let parts = Parts { node: &self.node, name, settings, faults, socket, impair: None, clock };
-        self.shell = Some(Shell::start(parts).unwrap());
+        let shell = if is_sealed { Shell::start_sealed(parts, keys()) } else { Shell::start(parts) };
+        self.shell = Some(shell.unwrap());
+    }
+
+    /// From now on its routers seal.
+    #[allow(dead_code, reason = "each test uses a part")]
+    pub(crate) fn seal(&mut self) {
+        self.settings.network.security = Security::Keys;
+        self.settings.network.datagram_bytes_max -= Security::Keys.tag_bytes();
+        self.start();
     }
 
     /// Of the first node's time, where slots need one.

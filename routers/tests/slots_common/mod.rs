@@ -7,11 +7,12 @@ pub(crate) mod process;
 pub(crate) mod relay;
 pub(crate) mod talk;
 
-use rohrpost_config::{Network, Route, Tdma, TimeSlot, Tunnel};
+use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
 use rohrpost_mailbox::{
     HEAD_BYTES, Head, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type,
     monotonic_ns, realtime_ns,
 };
+use rohrpost_routers::access::Access;
 use rohrpost_routers::frame::{Alive, FrameHead, Kind};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Crossing, Lab, LabError, NodeSpec};
@@ -273,6 +274,7 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
         digest: 7,
         incarnation: realtime_ns(),
         network: Network {
+            security: Security::None,
             port: PORT,
             mtu: 1500,
             datagram_bytes_max: 1472,
@@ -283,6 +285,7 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
         tdma: Some(Tdma { tunnel, ..table() }),
         routes: others().map(module).chain(others().map(router)).map(route).collect(),
         senders: vec![vec![module(own)]],
+        access: Access::default(),
         flows: Vec::new(),
     }
 }

@@ -224,6 +224,7 @@ mod tests {
             classes,
             foreign: 0,
             failures: Vec::new(),
+            rejections: Vec::new(),
         }
     }
 

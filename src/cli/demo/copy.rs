@@ -3,7 +3,8 @@
 
 use super::{Arguments, GUI};
 use crate::cli::{Failure, check};
-use rohrpost::config::{Installation, Program};
+use rohrpost::config::{Installation, Keys, Program};
+use rohrpost_routers::security::random;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
 
@@ -12,6 +13,9 @@ const LOG: &str = include_str!("../../../config/demo-log.toml");
 const NODES: &str = include_str!("../../../config/demo-nodes.toml");
 const TDMA: &str = include_str!("../../../config/demo-tdma.toml");
 const BUILDING: &str = include_str!("../../../config/building.map");
+
+/// Folder of the keys, beside the copy.
+const KEYS: &str = "keys";
 
 /// What runs. A copy is written into `temporary`.
 pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<Installation, Failure> {
@@ -29,7 +33,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     if arguments.config.is_some() && !there {
         return Err(format!("{}: no such file", own.display()).into());
     }
-    if there && arguments.log.is_none() && !arguments.no_gui && !arguments.viewer {
+    if there && arguments.log.is_none() && !arguments.no_gui && !arguments.viewer && !arguments.secure {
         return Ok(check::load(&own)?);
     }
     let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
@@ -38,6 +42,9 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     let folder = if there { Some(folder(&shown)?) } else { None };
     let copy = temporary.join(name);
     std::fs::write(temporary.join("building.map"), BUILDING)?;
+    if arguments.secure {
+        Keys::first(random()?).create(&Keys::file(&temporary.join(KEYS)))?;
+    }
     std::fs::write(&copy, rewritten(&text, &shown, folder.as_deref(), arguments)?)?;
     let named = |error: rohrpost::config::Errors| {
         error.to_string().replace(&copy.display().to_string(), &shown.display().to_string())
@@ -58,6 +65,12 @@ fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Argume
     let mut document: DocumentMut = text.parse()?;
     if let (Some(folder), Some(item)) = (folder, document.get_mut("parameters")) {
         start_from(folder, item);
+    }
+    if arguments.secure {
+        let network = document.get_mut("network").and_then(Item::as_table_like_mut).ok_or("no [network]")?;
+        // Also if the file has keys of its own: the demo's are for this run.
+        network.insert("security", value("keys"));
+        network.insert("keys", value(KEYS));
     }
     let modules = document.get_mut("module").and_then(Item::as_array_of_tables_mut).ok_or("no [[module]]")?;
     for (entry, module) in modules.iter_mut().zip(installation.modules.iter().filter(|module| module.is_in_file())) {

@@ -10,7 +10,7 @@ use crate::cli::summary::print_classes;
 use crate::cli::{Failure, say};
 use crate::cli::{flows, slots};
 use rohrpost::common::{GET_DATA, State};
-use rohrpost::config::{Installation, Network};
+use rohrpost::config::Installation;
 use rohrpost::interface::{DataPort, Interface};
 use rohrpost::interfaces::{CartographerInterface, FlowStates, Links, MapCounts, RouterInterface, SlotState};
 use rohrpost::macro_support::{append, from_bytes};
@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     // Before the first thread, of which the speech has two.
     let lab = lab(&installation)?;
     let speech = Speech::begin()?;
-    speech.say(Network::UNPROTECTED);
+    installation.security_text().iter().for_each(|security| speech.say(security));
     let mut nodes = Nodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
     let kill_after = long.map(|long| long / 2).filter(|_| arguments.kill_master);
     let summary = watch(&mut nodes, &installation, long, kill_after).map(|seen| summary(&installation, &seen?));

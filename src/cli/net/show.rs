@@ -7,7 +7,7 @@ use crate::cli::table::{table, time};
 use crate::cli::target::Running;
 use crate::cli::units::{bytes, fine};
 use rohrpost::Class;
-use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink};
+use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
 use std::time::Duration;
 
 /// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
@@ -25,7 +25,15 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
         }
     }
     let slots = all.iter().filter_map(|told| told.slots.as_ref());
-    parts.extend([strangers(all), failures(all), waiting(all), losses(running, all), clocks(all), kept(slots)]);
+    parts.extend([
+        strangers(all),
+        rejections(all),
+        failures(all),
+        waiting(all),
+        losses(running, all),
+        clocks(all),
+        kept(slots),
+    ]);
     parts.push(measured(running, all));
     parts.extend(beyond::text(running, all));
     parts.retain(|part| !part.is_empty());
@@ -101,6 +109,19 @@ fn strangers(all: &[Told]) -> String {
         }
     }
     text
+}
+
+/// Datagrams that were not sealed as they must be, by where they seem to come from.
+fn rejections(all: &[Told]) -> String {
+    let links = all.iter().filter_map(|told| told.links.as_ref());
+    let told = links.flat_map(|links| links.rejections.iter().map(|rejected| (&links.node, rejected)));
+    let rows: Vec<_> = told
+        .map(|(node, Rejected { node: from, cause, datagrams })| {
+            let from = if from.is_empty() { "no node" } else { from };
+            [node.clone(), from.to_owned(), cause.clone(), datagrams.to_string()]
+        })
+        .collect();
+    if rows.is_empty() { String::new() } else { table(["node", "not taken from", "cause", ">datagrams"], rows) }
 }
 
 fn datagrams(count: u64) -> String {

@@ -1,6 +1,7 @@
 //! What a router answers to commands that it cannot deliver: the faults of the modules' crate, which routers do not know.
 
 use rohrpost::Fault;
+use rohrpost::config::Installation;
 use rohrpost_modules::call::CallEnvelope;
 use rohrpost_routers::report::BEGINNING_BYTES;
 use rohrpost_routers::shell::{Faults, Undelivered, difference};
@@ -12,11 +13,13 @@ const _: () = assert!(BEGINNING_BYTES >= CallEnvelope::BYTES, "the answer needs 
 pub(in crate::cli) struct Encoded {
     /// Of this node's configuration.
     digest: u64,
+    /// Its file, as messages name it.
+    file: String,
 }
 
 impl Encoded {
-    pub(in crate::cli) fn new(digest: u64) -> Self {
-        Self { digest }
+    pub(in crate::cli) fn of(installation: &Installation) -> Self {
+        Self { digest: installation.digest().lan(), file: installation.shown.display().to_string() }
     }
 
     fn fault(&self, why: &Undelivered<'_>) -> Option<Fault> {
@@ -34,6 +37,11 @@ impl Encoded {
             Cause::NoMailbox => Fault::NoMailbox,
             Cause::MailboxFull => Fault::MailboxFull,
             Cause::TooLarge => Fault::CommandTooLarge(why.takes_bytes.unwrap_or_default() as u32),
+            Cause::NotAllowed => {
+                Fault::NotAllowed { node: node(), rule: format!("{}:{}", self.file, why.rule.unwrap_or_default()) }
+            }
+            // Who speaks in another's name is not answered.
+            Cause::ForeignName => return None,
             // Of these the caller's next try comes through, or brings another answer.
             Cause::Socket | Cause::Late | Cause::Incomplete => return None,
         })
@@ -54,6 +62,10 @@ mod tests {
     use rohrpost_routers::frame::Reason;
     use rohrpost_routers::report::Mismatch;
 
+    fn encoded() -> Encoded {
+        Encoded { digest: 0x123, file: "robot.toml".into() }
+    }
+
     #[test]
     fn every_cause_of_which_a_caller_should_know_has_a_fault_that_names_a_remedy() {
         let call = CallEnvelope { interface: 1, incarnation: 7, sequence: 9, valid_for_us: 1, age_us: 0 }.to_bytes();
@@ -68,21 +80,22 @@ mod tests {
             (Cause::NoMailbox, "rohrpost start"),
             (Cause::MailboxFull, "too few slots"),
             (Cause::TooLarge, "at most 99 bytes"),
+            (Cause::NotAllowed, "node arm refuses it: robot.toml:41, [access]"),
         ] {
-            let why = Undelivered { cause, node: Some("arm"), mismatch, takes_bytes: Some(99) };
+            let why = Undelivered { cause, node: Some("arm"), rule: Some(41), mismatch, takes_bytes: Some(99) };
             let mut answer = Vec::new();
-            assert!(Encoded::new(0x123).write(&call, &why, &mut answer));
+            assert!(encoded().write(&call, &why, &mut answer));
             let (envelope, fault) = ReplyEnvelope::split(&answer).unwrap();
             assert_eq!(envelope, ReplyEnvelope { incarnation: 7, sequence: 9 });
-            let said = Encoded::new(0x123).fault(&why).unwrap();
+            let said = encoded().fault(&why).unwrap();
             let mut bytes = Vec::new();
             append(&mut bytes, &said).unwrap();
             assert_eq!(fault, bytes, "{said}");
             assert!(said.to_string().contains(words) && said.is_of_this_try(), "{cause:?}: {said}");
         }
-        let why = Undelivered { cause: Cause::NoMailbox, node: None, mismatch: None, takes_bytes: None };
-        assert!(!Encoded::new(0).write(&call[..19], &why, &mut Vec::new()), "no whole command");
+        let why = Undelivered { cause: Cause::NoMailbox, node: None, rule: None, mismatch: None, takes_bytes: None };
+        assert!(!encoded().write(&call[..19], &why, &mut Vec::new()), "no whole command");
         let why = Undelivered { cause: Cause::Incomplete, ..why };
-        assert!(!Encoded::new(0).write(&call, &why, &mut Vec::new()), "nobody is told");
+        assert!(!encoded().write(&call, &why, &mut Vec::new()), "nobody is told");
     }
 }

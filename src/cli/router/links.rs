@@ -1,11 +1,12 @@
 //! A router's counters, as it publishes them.
 
 use rohrpost::interfaces::{
-    Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink, SocketFailure,
+    Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink, Rejected, SocketFailure,
 };
 use rohrpost::mailbox::{Class, Latency, Priority, monotonic_ns};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::link::State;
+use rohrpost_routers::security::{Port, Rejection};
 use rohrpost_routers::shell::{Failure, Shell, difference};
 use rohrpost_routers::stats::{Cause, ClassCounts};
 use std::collections::BTreeMap;
@@ -25,7 +26,23 @@ pub(super) fn of(shell: &Shell) -> Links {
         classes: classes(shell),
         foreign: stats.foreign.get(),
         failures: failures(shell),
+        rejections: rejections(shell),
     }
+}
+
+fn rejections(shell: &Shell) -> Vec<Rejected> {
+    let settings = shell.settings();
+    let sources = settings.peers().map(Some).chain([None]);
+    let all = sources.flat_map(|peer| Rejection::ALL.map(|why| (peer, why)));
+    let told = all.map(|(peer, why)| Rejected {
+        node: peer.map_or_else(String::new, |peer| settings.nodes[usize::from(peer)].name.clone()),
+        cause: why.word().into(),
+        datagrams: [Port::Packages, Port::Time]
+            .into_iter()
+            .filter_map(|port| Some(shell.rejections(port)?.of(peer, why)))
+            .sum(),
+    });
+    told.filter(|rejected| rejected.datagrams > 0).collect()
 }
 
 fn failures(shell: &Shell) -> Vec<SocketFailure> {

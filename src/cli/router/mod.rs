@@ -3,13 +3,12 @@
 mod clock;
 pub(super) mod faults;
 mod flows;
+mod keys;
 mod links;
 mod slots;
 
 use super::Failure;
-use rohrpost::config::Network;
 use rohrpost::interfaces::{Router, RouterInterface};
-use rohrpost::mailbox::realtime_ns;
 use rohrpost::{Context, Module, ModuleError, Start};
 use rohrpost_modules::runtime::{exit, kept, run_started};
 use rohrpost_routers::impair;
@@ -56,16 +55,26 @@ impl Module for RouterModule {
         let installation = context.installation();
         let impair = impairment()?;
         let node = installation.node_of(context.me()).unwrap_or_default();
-        let settings = Settings::new(installation, node, realtime_ns())?;
-        tracing::warn!("{}", Network::UNPROTECTED);
+        let keys = keys::of(installation)?;
+        let settings = Settings::new(installation, node, keys::incarnation(keys.is_some())?)?;
+        if let Some(security) = installation.security_text() {
+            match &keys {
+                Some(_) => tracing::info!("{security}"),
+                None => tracing::warn!("{security}"),
+            }
+        }
         if let Some(impair) = impair {
             tracing::warn!("makes the network worse, as {} says: {impair}", impair::ENVIRONMENT);
         }
-        let faults = Arc::new(faults::Encoded::new(settings.digest));
+        let faults = Arc::new(faults::Encoded::of(&installation));
         let node = context.link().borrow().participant().node().clone();
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
         let (name, socket) = (context.me(), kept());
-        let shell = Shell::start(Parts { node: &node, name, settings, faults, socket, impair, clock })?;
+        let parts = Parts { node: &node, name, settings, faults, socket, impair, clock };
+        let shell = match keys {
+            Some(keys) => Shell::start_sealed(parts, keys)?,
+            None => Shell::start(parts)?,
+        };
         context.set_period(PERIOD);
         Ok(Self { shell })
     }

@@ -55,7 +55,7 @@ impl Module for ClientModule {
             settings,
             hosts: installation.names_on(&node_name),
             beyond: installation.names_beyond(&node_name),
-            faults: Arc::new(Encoded::new(digest.lan())),
+            faults: Arc::new(Encoded::of(&installation)),
             seal,
         })?;
         context.set_period(PERIOD);

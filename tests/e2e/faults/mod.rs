@@ -11,6 +11,7 @@ mod frozen;
 mod killed;
 mod link;
 mod master;
+mod sealed;
 mod strangers;
 mod twice;
 
@@ -219,8 +220,8 @@ fn configure(place: &Place, name: &str, nodes: usize, network: &str, further: &[
         format!("[nodes.{name}]\naddress = \"{address}\"\ntools = {tools}\n")
     };
     let all: String = NODES[..nodes].iter().map(node).collect();
-    let sections =
-        format!("{all}[network]\nsecurity = \"none\"\n{network}\n[time]\nsource = \"master\"\ninterval = \"500 ms\"\n");
+    let security = if network.contains("security") { "" } else { "security = \"none\"\n" };
+    let sections = format!("{all}[network]\n{security}{network}\n[time]\nsource = \"master\"\ninterval = \"500 ms\"\n");
     let on = |(index, (node, ..)): (usize, &(&str, &str, &str))| {
         probe(&format!("probe.{index}"), "rate-hz = 50.0", &format!("node = \"{node}\""))
     };

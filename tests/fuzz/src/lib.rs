@@ -23,6 +23,7 @@ mod names;
 mod parameters;
 mod planted;
 mod routers;
+mod seals;
 mod segments;
 mod split;
 
@@ -36,7 +37,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 13] = [
+pub const TARGETS: [Target; 14] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -49,6 +50,7 @@ pub const TARGETS: [Target; 13] = [
     Target { name: "segments", run: segments::run },
     Target { name: "frames", run: frames::run },
     Target { name: "routers", run: routers::run },
+    Target { name: "seals", run: seals::run },
     Target { name: "impairments", run: impairments::run },
 ];
 

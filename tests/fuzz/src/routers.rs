@@ -3,8 +3,9 @@
 
 use crate::frames::checked;
 use crate::split::Bytes;
-use rohrpost_config::{Network, Route};
+use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::fragment::PARTIAL_MAX;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
@@ -50,6 +51,7 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
         digest: 7,
         incarnation,
         network: Network {
+            security: Security::None,
             port: 21117,
             mtu: 576,
             datagram_bytes_max: DATAGRAM_BYTES,
@@ -60,6 +62,7 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
         tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(u8::MAX), node: other }],
         senders: Vec::new(),
+        access: Access::default(),
         flows: Vec::new(),
     }
 }

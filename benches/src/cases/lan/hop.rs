@@ -12,15 +12,15 @@ use crate::settings::Settings;
 use std::time::Duration;
 
 /// Round trips of a turn, and those before them that do not count.
-const MESSAGES: usize = 10_000;
+pub(super) const MESSAGES: usize = 10_000;
 const MESSAGES_PACED: usize = 1_000;
-const WARM_UP: usize = 1_000;
+pub(super) const WARM_UP: usize = 1_000;
 /// All sleep, so the kernel's fair server stays out.
-const CAP: Duration = Duration::from_secs(2);
+pub(super) const CAP: Duration = Duration::from_secs(2);
 /// A package each so often, as robots send.
 const PACE: Duration = Duration::from_micros(500);
 /// What a network of today has.
-const ETHERNET: u16 = 1_500;
+pub(super) const ETHERNET: u16 = 1_500;
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
@@ -47,7 +47,7 @@ impl Case for Hop {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = Ground::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB" });
+        let ground = Ground::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB", sealed: false });
         let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { MESSAGES });
         let cell = Cell {
             bytes: self.bytes,

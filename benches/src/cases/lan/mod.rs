@@ -3,6 +3,7 @@
 mod clock;
 mod hop;
 mod rates;
+mod sealed;
 mod urgent;
 
 use super::Case;
@@ -14,7 +15,7 @@ use std::cell::Cell as Counter;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [hop::cases(), rates::cases(), urgent::cases(), clock::cases()].into_iter().flatten().collect()
+    [hop::cases(), sealed::cases(), rates::cases(), urgent::cases(), clock::cases()].into_iter().flatten().collect()
 }
 
 /// As large as a datagram can be, so that none is parted.

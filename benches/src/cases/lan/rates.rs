@@ -65,7 +65,7 @@ impl Case for Rate {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
         let mtu = if self.packs { WHOLE } else { u16::try_from(one).unwrap_or(WHOLE) };
-        let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB" });
+        let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB", sealed: false });
         let losses = Losses::default();
         let raw = Flow {
             bytes: self.bytes,

@@ -43,7 +43,7 @@ const CAP: Duration = Duration::from_secs(3);
 /// What an urgent package takes at most; one that takes longer is lost.
 const LOST_AFTER: Duration = Duration::from_secs(1);
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
-const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB" };
+const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB", sealed: false };
 /// As a user gets it who says nothing.
 const USUAL: Network = Network { rate: "100 MiB", ..CARRIED };
 

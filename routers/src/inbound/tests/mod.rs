@@ -1,6 +1,7 @@
 //! Each part of the incoming half; those that a broken variant must fail are in `CHECKS`.
 
 mod lives;
+mod names;
 mod pair;
 mod refusals;
 

@@ -105,7 +105,11 @@ impl ClockService {
     /// # Errors
     /// [`ClockError`]
     pub fn start(parts: ClockParts) -> Result<Self, ClockError> {
-        let works = Works::new(parts)?;
+        Self::of(Works::new(parts)?)
+    }
+
+    /// The same of what was made already.
+    pub(super) fn of(works: Works) -> Result<Self, ClockError> {
         let state = works.state().clone();
         let (ended, ends) = io::pipe().map_err(ClockError::Thread)?;
         let mut worker = Worker { works, ended };

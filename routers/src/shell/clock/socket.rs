@@ -4,6 +4,7 @@
 //! counting.
 
 use crate::frame::{FrameHead, NodeIndex};
+use crate::security::TAG_BYTES;
 use crate::time::{SentId, TIME_BYTES};
 use nix::errno::Errno;
 use nix::sys::socket::{
@@ -19,7 +20,7 @@ use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
 const TRAFFIC_CLASS: u32 = 46 << 2;
 const PRIORITY: u32 = 6;
 /// A datagram that comes back has the heads of lower layers before it.
-const RETURNED_BYTES: usize = TIME_BYTES + 128;
+const RETURNED_BYTES: usize = TIME_BYTES + TAG_BYTES + 128;
 const CONTROL_BYTES: usize = 512;
 
 /// What a socket has.
@@ -28,6 +29,8 @@ pub(super) struct TimeSocket {
     peers: Vec<SockaddrStorage>,
     addresses: Vec<IpAddr>,
     control: Box<[u8]>,
+    /// Of a datagram of time.
+    datagram_bytes: usize,
 }
 
 /// A datagram that came.
@@ -63,7 +66,18 @@ impl TimeSocket {
             peers: peers.iter().copied().map(SockaddrStorage::from).collect(),
             addresses: peers.iter().map(SocketAddr::ip).collect(),
             control: vec![0; CONTROL_BYTES].into(),
+            datagram_bytes: TIME_BYTES,
         })
+    }
+
+    /// From now on its datagrams are sealed.
+    pub(super) fn sealed(self) -> Self {
+        Self { datagram_bytes: TIME_BYTES + TAG_BYTES, ..self }
+    }
+
+    /// The node with an address.
+    pub(super) fn node_at(&self, source: IpAddr) -> Option<NodeIndex> {
+        self.addresses.iter().position(|address| *address == source).map(|node| node as NodeIndex)
     }
 
     /// Whether a datagram of this node comes from its address.
@@ -108,8 +122,9 @@ impl TimeSocket {
             let message =
                 recvmsg::<SockaddrStorage>(self.socket.as_raw_fd(), &mut parts, Some(&mut self.control), flags).ok()?;
             let (bytes, stamp) = (message.bytes, stamp(message.cmsgs().ok()?));
-            let datagram = bytes.checked_sub(TIME_BYTES).map(|heads| &returned[heads..bytes]);
-            if let (Some(realtime_ns), Some(Ok((head, _)))) = (stamp, datagram.map(FrameHead::parse)) {
+            let datagram = bytes.checked_sub(self.datagram_bytes).map(|heads| &returned[heads..bytes]);
+            // Its head can be read also where it is sealed.
+            if let (Some(realtime_ns), Some(Ok((head, _)))) = (stamp, datagram.map(FrameHead::read)) {
                 return Some((SentId { to: head.to, sequence: head.sequence }, realtime_ns));
             }
         }

@@ -5,8 +5,9 @@ use super::local::LocalClock;
 use super::socket::{Came, TimeSocket};
 use super::state::{ClockState, Snapshot};
 use super::{ClockError, ClockParts};
-use crate::frame::{FrameHead, NodeIndex};
+use crate::frame::{BadFrame, FrameHead, NodeIndex};
 use crate::impair::{Impairment, Output};
+use crate::security::{Acquaintances, NotOpened, Opened, Opening, Port, Rejection, Sealing, TAG_BYTES, Tally};
 use crate::time::{Clock, Exchange, InSlots, SentId, Stamp, TIME_BYTES};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, realtime_ns};
 use std::net::{IpAddr, SocketAddr};
@@ -18,6 +19,9 @@ use std::sync::mpsc::SyncSender;
 const BURST: usize = 64;
 /// A record that came too late is made anew, so often.
 const WRITE_TRIES: usize = 8;
+
+/// Room for a datagram of time, and what seals it.
+const SEALED_BYTES: usize = TIME_BYTES + TAG_BYTES;
 
 /// What the impairment keeps besides the bytes.
 #[derive(Clone, Copy)]
@@ -36,8 +40,40 @@ pub(in crate::shell) struct Works {
     written: Option<TimeRecord>,
     impairment: Option<Impairment<Held>>,
     observer: Option<SyncSender<Exchange>>,
+    seals: Option<Seals>,
     state: Arc<ClockState>,
     snapshot: Snapshot,
+}
+
+/// What seals and opens datagrams of time.
+struct Seals {
+    sealing: Sealing,
+    opening: Opening,
+    tally: Tally,
+}
+
+impl Seals {
+    /// What was sealed to this node; all else is counted, and told of once a second at most.
+    fn open<'a>(
+        &mut self,
+        now_ns: u64,
+        source: IpAddr,
+        node: Option<NodeIndex>,
+        datagram: &'a mut [u8],
+    ) -> Option<(FrameHead, &'a [u8])> {
+        let why = match self.opening.open(datagram) {
+            Ok(Opened::Frame(head, text)) => return Some((head, text)),
+            // A hello is for the other port: the one that opens says so.
+            Ok(Opened::Hello(..)) => Rejection::NotOurs,
+            Err(NotOpened::Rejected(why)) => why,
+            Err(NotOpened::Bad(BadFrame::Version(_))) => Rejection::Version,
+            Err(NotOpened::Bad(_)) => return None,
+        };
+        if let Some(datagrams) = self.tally.note(now_ns, node, why) {
+            tracing::warn!("takes no time from {source}: {why} (datagrams: {datagrams})");
+        }
+        None
+    }
 }
 
 impl Works {
@@ -60,9 +96,21 @@ impl Works {
             keeper,
             impairment: impair.map(|impair| Impairment::new(impair, u64::from(own) | 0x7469_6d65_0000)),
             observer,
+            seals: None,
             state: Arc::new(ClockState::new(snapshot)),
             snapshot,
         })
+    }
+
+    /// From now on it seals what it sends, and takes only what is sealed to it, if there is something to seal with.
+    pub(in crate::shell) fn sealed(self, all: Option<&Arc<Acquaintances>>) -> Self {
+        let Some(all) = all else { return self };
+        let seals = Seals {
+            sealing: Sealing::new(all, Port::Time),
+            opening: Opening::new(all, Port::Time),
+            tally: Tally::new(all.rejections(Port::Time)),
+        };
+        Self { socket: self.socket.sealed(), seals: Some(seals), ..self }
     }
 
     /// From now on its clock goes by the rules of time slots.
@@ -86,8 +134,12 @@ impl Works {
     }
 
     /// Hands a datagram of time to the kernel.
-    pub(in crate::shell) fn send(&self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) -> bool {
-        self.socket.send(to, datagram)
+    pub(in crate::shell) fn send(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) -> bool {
+        let Some(seals) = &mut self.seals else { return self.socket.send(to, datagram) };
+        let mut sealed = [0; SEALED_BYTES];
+        sealed[..TIME_BYTES].copy_from_slice(datagram);
+        // Who is not known yet is told later what time it is.
+        seals.sealing.close(&mut sealed).is_ok() && self.socket.send(to, &sealed)
     }
 
     /// Takes what came, without waiting: stamps of what `left`, then datagrams; when the impairment has more. When each left is known before an
@@ -114,7 +166,7 @@ impl Works {
 
     /// Takes what came; when the impairment has more.
     fn take_datagrams(&mut self) -> u64 {
-        let mut datagram = [0; TIME_BYTES];
+        let mut datagram = [0; SEALED_BYTES];
         for _ in 0..BURST {
             let Some(Came { bytes, source, realtime_ns }) = self.socket.receive(&mut datagram) else { break };
             let now_ns = self.local.now_ns();
@@ -123,14 +175,14 @@ impl Works {
                 Some(impairment) => {
                     impairment.push(now_ns, Held { source, stamp, since_ns: now_ns }, &datagram[..bytes])
                 }
-                None => self.hand(now_ns, source, stamp, &datagram[..bytes]),
+                None => self.hand(now_ns, source, stamp, &mut datagram[..bytes]),
             }
         }
         self.take_held(&mut datagram)
     }
 
     /// What the impairment has kept for long enough came so much later.
-    fn take_held(&mut self, datagram: &mut [u8; TIME_BYTES]) -> u64 {
+    fn take_held(&mut self, datagram: &mut [u8; SEALED_BYTES]) -> u64 {
         loop {
             let now_ns = self.local.now_ns();
             let Some(impairment) = &mut self.impairment else { return u64::MAX };
@@ -138,16 +190,20 @@ impl Works {
                 Output::Send { to, datagram } => (to, datagram),
                 Output::Wait { until_ns } => return until_ns,
             };
-            let bytes = held.len().min(TIME_BYTES);
+            let bytes = held.len().min(SEALED_BYTES);
             datagram[..bytes].copy_from_slice(&held[..bytes]);
             let stamp = Stamp { ns: stamp.ns + (now_ns - since_ns), ..stamp };
-            self.hand(now_ns, source, stamp, &datagram[..bytes]);
+            self.hand(now_ns, source, stamp, &mut datagram[..bytes]);
         }
     }
 
-    fn hand(&mut self, now_ns: u64, source: IpAddr, stamp: Stamp, datagram: &[u8]) {
-        let taken = match FrameHead::parse(datagram) {
-            Ok((head, rest)) if self.socket.is_from(head.from, source) => {
+    fn hand(&mut self, now_ns: u64, source: IpAddr, stamp: Stamp, datagram: &mut [u8]) {
+        let opened = match &mut self.seals {
+            None => FrameHead::parse(datagram).ok(),
+            Some(seals) => seals.open(now_ns, source, self.socket.node_at(source), datagram),
+        };
+        let taken = match opened {
+            Some((head, rest)) if self.socket.is_from(head.from, source) => {
                 self.clock.handle(now_ns, stamp, &head, rest).is_ok()
             }
             _ => false,

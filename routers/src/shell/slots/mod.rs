@@ -35,7 +35,6 @@ use intake::Intake;
 use rohrpost_config::Network;
 use rohrpost_config::wire::HAND_OVER;
 use rohrpost_mailbox::{Name, monotonic_ns};
-use std::io::IoSlice;
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -407,11 +406,10 @@ impl Slots {
 
     /// `now_ns`: local; when it was found to fit.
     fn hand_over(&mut self, permit: &mut Permit, now_ns: u64, to: NodeIndex, bytes: usize) {
-        let datagram = &self.datagram[..bytes];
         let handed_ns = monotonic_ns();
-        let sent = self.wire.send(handed_ns, to, &[IoSlice::new(datagram)]);
+        let sent = self.wire.send_made(handed_ns, to, &mut self.datagram, bytes);
         if sent.is_err_and(super::Failure::is_loss) {
-            self.outbound.unsent(datagram, &[], &mut self.answers);
+            self.outbound.unsent(&self.datagram[..bytes], &[], &mut self.answers);
         } else if self.outbound.is_measured() {
             // The usual way to the wire; where the call took longer it was perhaps kept up before that.
             let (usual_ns, _) = self.discipline.lead_ns();

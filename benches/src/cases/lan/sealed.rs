@@ -1,0 +1,49 @@
+//! What it costs that datagrams are sealed: the hop with keys beside the same without, turn by turn.
+
+use super::Ground;
+use super::hop::{CAP, ETHERNET, MESSAGES, WARM_UP};
+use crate::cases::Case;
+use crate::harness::{Cell, Failure, Placement, Scheduling, time_two_processes};
+use crate::lan::ends::Module;
+use crate::lan::nodes::{Network, UNPACED};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    [64, 1024].map(|bytes| Box::new(Sealed { bytes }) as Box<dyn Case>).into()
+}
+
+struct Sealed {
+    bytes: usize,
+}
+
+impl Case for Sealed {
+    fn name(&self) -> String {
+        "hop, sealed".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
+        let [sealed, open] = [true, false].map(|sealed| Ground::new(settings, &Network { sealed, ..network }));
+        let messages = settings.count(MESSAGES);
+        let cell = Cell {
+            bytes: self.bytes,
+            messages,
+            warm_up: WARM_UP.min(messages / 10),
+            placement: Placement::TwoCores,
+            scheduling: Scheduling::Fifo,
+            pace: None,
+            cap: CAP,
+        };
+        let time = |ground: &Ground| {
+            let (nodes, turn) = ground.turn()?;
+            time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, self.bytes, meetings))
+        };
+        let contenders =
+            [Contender::sampled("rohrpost", || time(&sealed)), Contender::sampled("not sealed", || time(&open))];
+        let versus = [Versus { name: "not sealed", p50: Some(Target::AtMost(1.25)), p99: None }];
+        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
+        Ok(compare(settings, &subject, &contenders, &versus))
+    }
+}

@@ -1,0 +1,136 @@
+//! What stands before the incoming half of a router that seals: it opens what comes before anything else is done with it, and asks
+//! those who are not known.
+
+use super::acquaintances::{Acquaintances, Port};
+use super::greeter::Greeter;
+use super::opening::{NotOpened, Opened, Opening, Rejection};
+use super::tally::Tally;
+use crate::frame::{BadFrame, NodeIndex};
+use crate::inbound::{Came, Inbound};
+use crate::link::SILENT_AFTER_NS;
+use crate::report::{Deliver, Event};
+use crate::stats::Stats;
+use std::sync::Arc;
+
+/// Who is not known, or silent, is asked so often.
+pub const ASK_EVERY_NS: u64 = 100_000_000;
+/// A peer that says something of another life than the one that is known is asked so often at most.
+const DOUBT_EVERY_NS: u64 = 20_000_000;
+
+/// Who is to be asked is looked for so often at most, however many datagrams come.
+const LOOK_EVERY_NS: u64 = 10_000_000;
+
+/// A hello in the buffer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Said {
+    /// For whom.
+    pub to: NodeIndex,
+    /// How long it is.
+    pub bytes: usize,
+}
+
+/// One, in the thread that receives packages.
+pub struct Gate {
+    all: Arc<Acquaintances>,
+    opening: Opening,
+    greeter: Greeter,
+    tally: Tally,
+    peers: Box<[Asked]>,
+    /// Nobody is to be asked before this, ns.
+    look_ns: u64,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Asked {
+    /// When it was asked last, ns; none: never.
+    at_ns: Option<u64>,
+    /// When its present life began, ns.
+    began_ns: u64,
+}
+
+impl Gate {
+    /// `seed` comes from a source of random numbers that is fit for keys; each life has another.
+    pub fn new(all: &Arc<Acquaintances>, seed: [u8; 32]) -> Self {
+        Self {
+            opening: Opening::new(all, Port::Packages),
+            greeter: Greeter::new(all, seed),
+            tally: Tally::new(all.rejections(Port::Packages)),
+            peers: vec![Asked::default(); all.who.nodes.into()].into(),
+            all: all.clone(),
+            look_ns: 0,
+        }
+    }
+
+    /// Takes a datagram, whatever it is. `reply` has room for a hello ([`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES)), if one is to
+    /// be sent back.
+    pub fn take(
+        &mut self,
+        now_ns: u64,
+        came: &Came,
+        datagram: &mut [u8],
+        inbound: &mut Inbound,
+        deliver: &mut impl Deliver,
+        reply: &mut [u8],
+    ) -> Option<Said> {
+        match self.opening.open(datagram) {
+            Ok(Opened::Frame(head, text)) => inbound.handle_opened(now_ns, came, (&head, text), deliver),
+            Ok(Opened::Hello(head, greeting)) => {
+                if inbound.may_greet(now_ns, came.source, &head, deliver) {
+                    let greeted = self.greeter.greet(now_ns, &head, &greeting, reply);
+                    if greeted.began {
+                        self.peers[usize::from(head.from)].began_ns = now_ns;
+                    }
+                    return greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes });
+                }
+            }
+            Err(NotOpened::Bad(why @ (BadFrame::Foreign | BadFrame::Damaged(_) | BadFrame::Sealed))) => {
+                inbound.bad(came.source, why);
+            }
+            Err(why @ NotOpened::Bad(BadFrame::Version(_))) => {
+                self.reject(now_ns, came, Rejection::Version, why, inbound, deliver);
+            }
+            Err(why @ NotOpened::Rejected(rejection)) => self.reject(now_ns, came, rejection, why, inbound, deliver),
+        }
+        None
+    }
+
+    /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
+    pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
+        if now_ns < self.look_ns {
+            return None;
+        }
+        let Some(to) = (0..self.all.who.nodes).find(|peer| self.is_to_be_asked(*peer, now_ns, stats)) else {
+            self.look_ns = now_ns + LOOK_EVERY_NS;
+            return None;
+        };
+        self.peers[usize::from(to)].at_ns = Some(now_ns);
+        self.all.doubted(to);
+        self.all.ask(to, datagram).map(|bytes| Said { to, bytes })
+    }
+
+    fn is_to_be_asked(&self, peer: NodeIndex, now_ns: u64, stats: &Stats) -> bool {
+        let Asked { at_ns, began_ns } = self.peers[usize::from(peer)];
+        let is_over = |every_ns| at_ns.is_none_or(|at_ns| at_ns + every_ns <= now_ns);
+        if !self.all.is_peer(peer) || !is_over(DOUBT_EVERY_NS) {
+            return false;
+        }
+        let heard_ns = stats.peer(peer).link.heard_ns.get().max(began_ns);
+        let is_missed = self.all.known() & 1 << peer == 0 || heard_ns + SILENT_AFTER_NS <= now_ns;
+        self.all.doubts(peer) || (is_missed && is_over(ASK_EVERY_NS))
+    }
+
+    fn reject(
+        &mut self,
+        now_ns: u64,
+        came: &Came,
+        rejection: Rejection,
+        why: NotOpened,
+        inbound: &Inbound,
+        deliver: &mut impl Deliver,
+    ) {
+        let (source, peer) = (came.source, inbound.peer_at(came.source));
+        if let Some(datagrams) = self.tally.note(now_ns, peer, rejection) {
+            deliver.event(Event::Rejected { source, peer, why, datagrams });
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! What a hello says: 32 bytes behind the head.
+//!
+//! ```text
+//!            challenge   answer
+//!  question     a          0       do you live?
+//!  answer       b          a       I do; do you?
+//!  last word    0          b       I do
+//! ```
+
+/// Bytes of it.
+pub const HELLO_BYTES: usize = 32;
+
+/// "This life of mine asks whether you live", the answer to that, or the last word.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Hello {
+    /// Whoever answers it shows that it lives now; 0: no answer is wanted.
+    pub challenge: u64,
+    /// The challenge that this answers; 0: it is a question.
+    pub answer: u64,
+    /// From which sequence on the receiver is to take what this life sends it: of packages, and of time.
+    pub next: [u64; 2],
+}
+
+impl Hello {
+    pub(super) fn to_bytes(self) -> [u8; HELLO_BYTES] {
+        let mut bytes = [0; HELLO_BYTES];
+        let words = [self.challenge, self.answer, self.next[0], self.next[1]];
+        for (place, word) in bytes.chunks_exact_mut(8).zip(words) {
+            place.copy_from_slice(&word.to_le_bytes());
+        }
+        bytes
+    }
+
+    pub(super) fn parse(bytes: &[u8]) -> Option<Self> {
+        let bytes: &[u8; HELLO_BYTES] = bytes.try_into().ok()?;
+        let (words, _) = bytes.as_chunks::<8>();
+        let [challenge, answer, packages, time] = [0, 1, 2, 3].map(|at| u64::from_le_bytes(words[at]));
+        let is_sound = (challenge, answer) != (0, 0) && packages.max(time) <= crate::frame::SEQUENCE_MAX;
+        is_sound.then_some(Self { challenge, answer, next: [packages, time] })
+    }
+}

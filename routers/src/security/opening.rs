@@ -1,0 +1,166 @@
+//! The half that opens: one for each port, in the thread that receives there.
+
+use super::acquaintances::{Acquaintances, Known, Port};
+use super::hello::Hello;
+use super::keys::End;
+use super::seal::{self, Seal};
+use crate::broken::broken;
+use crate::frame::{BadFrame, FrameHead, Kind, NodeIndex};
+use crate::inbound::window::{Arrival, Window};
+use std::sync::Arc;
+
+/// A datagram whose seal was right.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Opened<'a> {
+    /// Of the peer's present life to our present one, and not opened before: its head and what was sealed.
+    Frame(FrameHead, &'a [u8]),
+    /// Of some life of the peer, perhaps long ago: for the [`Greeter`](super::Greeter) alone.
+    Hello(FrameHead, Greeting),
+}
+
+/// A hello as it came.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Greeting {
+    /// What it says.
+    pub hello: Hello,
+    /// Place of its key.
+    pub(super) key: usize,
+}
+
+/// Why a datagram is not taken, in the order in which it is found out.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
+#[repr(usize)]
+pub enum Rejection {
+    /// It is not sealed.
+    #[error("it is not sealed; does that node's configuration say `security = \"keys\"`?")]
+    Unsealed,
+    /// Sealed with a key that is not ours.
+    #[error("it is sealed with a key of an id that we have not; all nodes need the same key file")]
+    OtherKey,
+    /// Not from another node of ours to this one.
+    #[error("it is not from one of our nodes to this one")]
+    NotOurs,
+    /// Of a life of its node, or to one of ours, that is over or has not begun.
+    #[error("it is of another life of that node")]
+    OtherLife,
+    /// It came before, or is so old that it cannot be told.
+    #[error("it came before")]
+    Replay,
+    /// Its seal is not right: made with another key, or altered.
+    #[error("its seal is not right: another key with this id, or someone altered it; all nodes need the same key file")]
+    Forged,
+    /// Of another wire format: nothing more can be told of it.
+    #[error("it is of another wire format; run the same version of Rohrpost on all nodes")]
+    Version,
+}
+
+impl Rejection {
+    /// All, in their order.
+    pub const ALL: [Self; 7] =
+        [Self::Unsealed, Self::OtherKey, Self::NotOurs, Self::OtherLife, Self::Replay, Self::Forged, Self::Version];
+
+    /// A word for people and programs.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Unsealed => "unsealed",
+            Self::OtherKey => "other-key",
+            Self::NotOurs => "not-ours",
+            Self::OtherLife => "other-life",
+            Self::Replay => "replay",
+            Self::Forged => "forged",
+            Self::Version => "version",
+        }
+    }
+}
+
+/// Why a datagram was not opened. Nothing has changed by it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum NotOpened {
+    /// No datagram of a router of our version.
+    #[error(transparent)]
+    Bad(#[from] BadFrame),
+    /// Not for us to take.
+    #[error(transparent)]
+    Rejected(#[from] Rejection),
+}
+
+/// Opens datagrams of one port.
+pub struct Opening {
+    all: Arc<Acquaintances>,
+    port: Port,
+    peers: Box<[Known<Heard>]>,
+}
+
+/// A peer's present life as it is heard.
+struct Heard {
+    incarnation: u64,
+    /// By the place of the key: which of two the peer seals with is its choice.
+    seals: Vec<Seal>,
+    window: Window,
+}
+
+impl Opening {
+    /// For a port; there is one.
+    pub fn new(all: &Arc<Acquaintances>, port: Port) -> Self {
+        Self { peers: (0..all.who.nodes).map(|_| Known::default()).collect(), all: all.clone(), port }
+    }
+
+    /// Opens a datagram where it lies. Its head can be believed then, but not before.
+    ///
+    /// # Errors
+    /// [`NotOpened`]; nothing has changed, and no key was derived.
+    pub fn open<'a>(&mut self, datagram: &'a mut [u8]) -> Result<Opened<'a>, NotOpened> {
+        let (head, key_id) = FrameHead::read(datagram)?;
+        let all = &self.all;
+        if key_id == 0 {
+            return Err(Rejection::Unsealed.into());
+        }
+        let key = all.keys.place(key_id).ok_or(Rejection::OtherKey)?;
+        let is_ours = all.is_peer(head.from) && head.to == all.who.own && head.system == all.who.system;
+        if !is_ours {
+            return Err(Rejection::NotOurs.into());
+        }
+        if head.kind == Kind::Hello {
+            return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));
+        }
+        let heard = Self::heard(&mut self.peers, all, self.port, head.from);
+        let heard = heard.filter(|heard| heard.incarnation == head.incarnation).ok_or_else(|| {
+            all.doubt(head.from);
+            Rejection::OtherLife
+        })?;
+        if heard.window.is_copy(head.sequence) && !broken!(OpensTwice) {
+            return Err(Rejection::Replay.into());
+        }
+        let text = heard.seals[key].open(seal::of_sequence(head.sequence), datagram).ok_or(Rejection::Forged)?;
+        // What the network lost is another's to count.
+        let arrival = heard.window.arrive(head.sequence, &mut 0);
+        debug_assert!(arrival != Arrival::Copy || broken!(OpensTwice));
+        Ok(Opened::Frame(head, text))
+    }
+
+    fn hello(&self, head: &FrameHead, key: usize, datagram: &mut [u8]) -> Result<Greeting, Rejection> {
+        if self.port != Port::Packages {
+            return Err(Rejection::NotOurs);
+        }
+        let number = u32::try_from(head.sequence).map_err(|_| Rejection::Forged)?;
+        let seal = self.all.hello_from(head.from, key);
+        let text = seal.open(seal::of_hello(head.incarnation, number), datagram).ok_or(Rejection::Forged)?;
+        Ok(Greeting { hello: Hello::parse(text).ok_or(Rejection::Forged)?, key })
+    }
+
+    fn heard<'a>(
+        peers: &'a mut [Known<Heard>],
+        all: &Acquaintances,
+        port: Port,
+        from: NodeIndex,
+    ) -> Option<&'a mut Heard> {
+        peers[usize::from(from)].of(all, from, |life| {
+            let peer = End { node: from, incarnation: life.incarnation };
+            Heard {
+                incarnation: life.incarnation,
+                seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
+                window: Window::going_on(life.next[port as usize]),
+            }
+        })
+    }
+}

@@ -1,0 +1,66 @@
+//! What was not taken, counted by cause; told once a second at most.
+
+use super::opening::Rejection;
+use crate::frame::NodeIndex;
+use crate::stats::Count;
+use std::sync::Arc;
+
+/// Of each node something is told so often at most, ns; of all addresses that no node has together, too.
+pub const TELL_EVERY_NS: u64 = 1_000_000_000;
+
+/// Counts of one port: by the node whose address it came from, which anybody can write on a datagram.
+#[derive(Debug)]
+pub struct Rejections {
+    /// By node, then those of addresses that no node has.
+    sources: Box<[[Count; Rejection::ALL.len()]]>,
+}
+
+impl Rejections {
+    pub(super) fn new(nodes: NodeIndex) -> Self {
+        Self { sources: (0..=nodes).map(|_| Default::default()).collect() }
+    }
+
+    /// Datagrams that were not taken. `peer`: none for addresses that no node has.
+    pub fn of(&self, peer: Option<NodeIndex>, why: Rejection) -> u64 {
+        self.sources[self.place(peer)][why as usize].get()
+    }
+
+    fn place(&self, peer: Option<NodeIndex>) -> usize {
+        peer.map_or(self.sources.len() - 1, usize::from)
+    }
+}
+
+/// Counts, in the thread of a port, and says when to tell.
+#[derive(Debug)]
+pub struct Tally {
+    counts: Arc<Rejections>,
+    told: Box<[Told]>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    /// Not before this time again, ns.
+    not_before_ns: u64,
+    since: u64,
+}
+
+impl Tally {
+    /// For a port; there is one.
+    pub fn new(counts: &Arc<Rejections>) -> Self {
+        Self { told: vec![Told::default(); counts.sources.len()].into(), counts: counts.clone() }
+    }
+
+    /// Counts a datagram; if it is to be told, how many were not taken since that was done last, with this one.
+    pub fn note(&mut self, now_ns: u64, peer: Option<NodeIndex>, why: Rejection) -> Option<u64> {
+        let place = self.counts.place(peer);
+        self.counts.sources[place][why as usize].add(1);
+        let told = &mut self.told[place];
+        told.since += 1;
+        if now_ns < told.not_before_ns {
+            return None;
+        }
+        let since = told.since;
+        *told = Told { not_before_ns: now_ns + TELL_EVERY_NS, since: 0 };
+        Some(since)
+    }
+}

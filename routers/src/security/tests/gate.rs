@@ -1,0 +1,66 @@
+//! The gate asks as often as it must, and no more often.
+
+use super::*;
+use crate::harness::{End, MS, START, address};
+use crate::inbound::Came;
+use crate::report::Event;
+use rohrpost_config::Security;
+
+struct Router {
+    gate: Gate,
+    all: Arc<Acquaintances>,
+    end: End,
+}
+
+impl Router {
+    fn new(own: u8) -> Self {
+        let end = End::new(own, |settings| settings.network.security = Security::Keys);
+        let all = Acquaintances::new(Who::of(&end.settings), ring(&[1]));
+        Self { gate: Gate::new(&all, [own; 32]), all, end }
+    }
+
+    fn ask(&mut self, now_ns: u64) -> Vec<(u8, Vec<u8>)> {
+        let mut datagram = [0; HELLO_DATAGRAM_BYTES];
+        let Self { gate, end, .. } = self;
+        let mut all = Vec::new();
+        while let Some(said) = gate.ask(now_ns, &end.stats, &mut datagram) {
+            all.push((said.to, datagram[..said.bytes].to_vec()));
+        }
+        all
+    }
+
+    fn take(&mut self, now_ns: u64, from: u8, datagram: &[u8]) -> Option<Vec<u8>> {
+        let (mut bytes, mut reply) = (datagram.to_vec(), [0; HELLO_DATAGRAM_BYTES]);
+        let came = Came { source: address(from), arrived_ns: now_ns, bytes: bytes.len() };
+        let Self { gate, end: End { inbound, log, .. }, .. } = self;
+        let said = gate.take(now_ns, &came, &mut bytes, inbound, log, &mut reply);
+        said.map(|said| reply[..said.bytes].to_vec())
+    }
+}
+
+#[test]
+fn who_is_not_known_is_asked_again_and_again_and_who_speaks_of_another_life_soon() {
+    let (mut a, mut b) = (Router::new(0), Router::new(1));
+    let asked = a.ask(START);
+    assert_eq!(asked.iter().map(|(to, _)| *to).collect::<Vec<_>>(), [1, 2]);
+    assert_eq!(a.ask(START + ASK_EVERY_NS - MS), []);
+    assert_eq!(a.ask(START + ASK_EVERY_NS).len(), 2, "nobody has answered");
+    let answer = b.take(START, 0, &asked[0].1).unwrap();
+    let last = a.take(START, 1, &answer).unwrap();
+    assert!(b.take(START, 0, &last).is_none());
+    assert_eq!((a.all.known(), b.all.known()), (0b10, 0b01));
+    let now_ns = START + 2 * ASK_EVERY_NS;
+    assert_eq!(a.ask(now_ns).iter().map(|(to, _)| *to).collect::<Vec<_>>(), [2], "the other is known");
+    // b begins anew, and a does not know it.
+    let mut sealing = Sealing::new(&a.all, Port::Packages);
+    let mut datagram = [0; 80];
+    let head = FrameHead { kind: Kind::Alive, system: 1, from: 0, to: 1, digest: 7, incarnation: 100, sequence: 0 };
+    sealing.seal(&head, &mut datagram).unwrap();
+    let mut again = Router::new(1);
+    again.ask(now_ns);
+    assert!(again.take(now_ns, 0, &datagram).is_none());
+    assert_eq!(again.all.rejections(Port::Packages).of(Some(0), Rejection::OtherLife), 1);
+    assert_eq!(again.ask(now_ns + 20 * MS).len(), 1, "sooner than who says nothing");
+    let told = again.end.log.events.iter().filter(|event| matches!(event, Event::Rejected { .. })).count();
+    assert_eq!(told, 1);
+}

@@ -1,0 +1,221 @@
+//! Nodes that seal what they send: what can be read of it, who takes no part, and how keys are changed.
+
+use super::{Field, LOG, configure, lines};
+use crate::harness::{OUTPUT, signal, wait};
+use crate::process::Said;
+use nix::sys::signal::Signal;
+use rohrpost::CallError;
+use rohrpost::interfaces::LinkState;
+use std::path::PathBuf;
+use std::time::Duration;
+
+const KEYS: &str = "security = \"keys\"";
+/// Longer than a datagram, and nowhere else.
+const SECRET: &str = "the combination of the safe is 4711. ";
+
+impl Field {
+    /// So many nodes that seal, with keys in the folder `keys`.
+    fn sealed(nodes: usize) -> Option<Self> {
+        let field = Self::new(nodes, KEYS)?;
+        field.keys("new", "keys");
+        Some(field)
+    }
+
+    /// Makes or changes the keys in a folder.
+    fn keys(&self, step: &str, folder: &str) -> String {
+        self.place.say(&["keys", step, self.place.path(folder).to_str().unwrap()]).ok()
+    }
+
+    /// The field's configuration, but with keys in this folder; or with this said of security.
+    fn with(&self, name: &str, security: &str) -> PathBuf {
+        let text = std::fs::read_to_string(&self.config).unwrap();
+        let other = self.place.path(&format!("{name}.toml"));
+        std::fs::write(&other, text.replace(KEYS, security)).unwrap();
+        other
+    }
+
+    fn say_at(&self, node: &str, arguments: &[&str]) -> Said {
+        self.place.say_at(&self.config, node, arguments)
+    }
+
+    /// A configuration of two nodes with this said of security, in which the collector of lines is on the other node.
+    fn collects_on_arm(&self, security: &str) -> PathBuf {
+        let log = LOG.replace("robot.log", "arm.log");
+        let other = configure(&self.place, "other", 2, security, &[&format!("{OUTPUT}node = \"arm\"\n"), &log]);
+        // One installation, as far as shared memory knows.
+        let text = std::fs::read_to_string(&other).unwrap();
+        std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
+        other
+    }
+
+    /// Each of the two has said why it takes nothing from the other.
+    fn wait_apart(&self, base: &[&str], arm: &[&str]) {
+        self.wait_told("router.0", base, 1);
+        let log = self.place.path("arm.log");
+        wait(format!("arm says {arm:?}"), || (!lines(&log, "router.1", arm).is_empty()).then_some(()));
+    }
+}
+
+#[test]
+fn sealed_nodes_exchange_calls_and_data_and_nothing_of_it_can_be_read() {
+    let Some(mut field) = Field::sealed(3) else { return };
+    let mut capture = field.lab.capture().unwrap();
+    field.launch(&["base", "arm", "desk"], &[]);
+    let (mut datagrams, mut unsealed, mut readable) = (0, 0, 0);
+    let mut look = || {
+        capture.drain(|crossing| {
+            datagrams += 1;
+            unsealed += usize::from(crossing.datagram[7] == 0);
+            let has = |word: &str| crossing.datagram.windows(word.len()).any(|bytes| bytes == word.as_bytes());
+            readable += usize::from(has(&SECRET[..16]) || has("probe"));
+        });
+    };
+    for (number, (node, to)) in (1..).zip([("base", "probe.1"), ("arm", "probe.2"), ("desk", "probe.0")]) {
+        field.wait_counted(node, to, number);
+        let word = SECRET.repeat(20);
+        let told = field.say_at(node, &["call", to, "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
+        assert!(told.contains(&word), "{told}");
+        look();
+    }
+    let data = field.say_at("base", &["echo", "probe.1", "beat", "--count", "3"]).ok();
+    assert_eq!(data.lines().count(), 3, "{data}");
+    // Time too: all have that of one master.
+    for (node, master) in [("arm", "base"), ("desk", "base")] {
+        wait(format!("{node} has the time of {master}"), || {
+            let clock = field.said(node, rohrpost::interfaces::RouterInterface::CLOCK);
+            (clock.master == master && clock.error_ns.is_some()).then_some(())
+        });
+    }
+    look();
+    assert!(datagrams > 100, "only {datagrams} datagrams were seen");
+    assert_eq!((unsealed, readable), (0, 0), "of {datagrams} datagrams");
+    field.stop();
+}
+
+#[test]
+fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
+    let Some(mut field) = Field::sealed(2) else { return };
+    field.keys("new", "others");
+    field.keys("new", "second");
+    field.keys("rotate", "second");
+    field.keys("finish", "second");
+    let config = field.config.clone();
+    field.launch_from(&config, &["base"], &[]);
+    let (from_arm, from_base) = ("takes nothing from node arm (10.78.0.2)", "takes nothing from node base (10.78.0.1)");
+    for (name, security, cause, base, arm) in [
+        (
+            "others",
+            "security = \"keys\"\nkeys = \"others\"",
+            "forged",
+            "its seal is not right",
+            "its seal is not right",
+        ),
+        (
+            "second",
+            "security = \"keys\"\nkeys = \"second\"",
+            "other-key",
+            "an id that we have not",
+            "an id that we have not",
+        ),
+        ("none", "security = \"none\"", "unsealed", "it is not sealed", "one of both seals"),
+    ] {
+        let other = field.collects_on_arm(security);
+        field.launch_from(&other, &["arm"], &[]);
+        field.wait_apart(&[from_arm, base], &[from_base, arm]);
+        let peer = field.peer("base", "arm");
+        assert_eq!((peer.received.datagrams, peer.received.packages), (0, 0), "{name}: nothing of it was taken");
+        // Routers publish what they count twice a second.
+        let rejects = || {
+            field
+                .links("base")
+                .rejections
+                .into_iter()
+                .find(|rejected| rejected.node == "arm" && rejected.cause == cause)
+        };
+        let rejected = wait(format!("{name}: base counts"), rejects);
+        assert!(rejected.datagrams > 0, "{rejected:?}");
+        assert!(field.count("base", "probe.1", super::NEVER, Duration::from_secs(1)).is_err(), "{name}");
+        field.halt_node("arm");
+        std::fs::remove_file(field.place.path("arm.log")).unwrap();
+    }
+    // Without the file a node is not even launched.
+    let other = field.with("arm", "security = \"keys\"\nkeys = \"nowhere\"");
+    let said = field.place.say(&["launch", other.to_str().unwrap(), "--node", "arm"]).fails();
+    assert!(said.contains("nowhere/udp.keys") && said.contains("rohrpost keys new"), "{said}");
+    // With the right one it takes part.
+    field.launch(&["arm"], &[]);
+    field.wait_counted("base", "probe.1", 1);
+    field.stop();
+}
+
+#[test]
+fn sealed_nodes_with_different_configurations_both_say_why() {
+    let Some(mut field) = Field::sealed(2) else { return };
+    let other = field.collects_on_arm(KEYS);
+    let config = field.config.clone();
+    field.launch_from(&config, &["base"], &[]);
+    field.launch_from(&other, &["arm"], &[]);
+    let words = "its configuration has the digest";
+    field.wait_apart(&["takes nothing from node arm", words], &["takes nothing from node base", words]);
+    for (node, peer) in [("base", "arm"), ("arm", "base")] {
+        field.wait_for_state(node, peer, LinkState::Refused);
+    }
+    field.stop();
+}
+
+#[test]
+fn keys_are_changed_node_by_node_while_calls_go_on() {
+    let Some(mut field) = Field::new(3, KEYS) else { return };
+    let nodes = ["base", "arm", "desk"];
+    field.keys("new", "keys");
+    // Each node has a folder of its own, as a computer has.
+    let copy = |field: &Field, node: &str| {
+        let folder = field.place.path(node);
+        let _ = std::fs::create_dir(&folder);
+        std::fs::copy(field.place.path("keys/udp.keys"), folder.join("udp.keys")).unwrap();
+    };
+    for node in nodes {
+        copy(&field, node);
+        let config = field.with(node, &format!("{KEYS}\nkeys = \"{node}\""));
+        field.launch_from(&config, &[node], &[]);
+    }
+    let mut number = 0;
+    let mut all_reach_all = |field: &Field| {
+        for (node, module) in [("base", "probe.1"), ("arm", "probe.2"), ("desk", "probe.0"), ("base", "probe.2")] {
+            number += 1;
+            field.wait_counted(node, module, number);
+        }
+    };
+    all_reach_all(&field);
+    for step in ["rotate", "finish"] {
+        let said = field.keys(step, "keys");
+        assert_eq!(said.lines().count(), if step == "rotate" { 2 } else { 1 }, "{said}");
+        for node in nodes {
+            let old = field.router(node);
+            copy(&field, node);
+            signal(old, Signal::SIGKILL);
+            field.robot(node).wait_restarted(&super::router_of(node), old);
+            all_reach_all(&field);
+        }
+    }
+    field.stop();
+}
+
+#[test]
+fn a_command_of_a_class_that_is_not_listed_is_answered_with_the_rule() {
+    let Some(mut field) = Field::sealed(2) else { return };
+    let text = std::fs::read_to_string(&field.config).unwrap();
+    std::fs::write(&field.config, format!("{text}\n[access]\nprobe = [\"probe\"]\n")).unwrap();
+    field.launch(&["base", "arm"], &[]);
+    let fault = wait("a fault", || match field.count("base", "probe.1", super::NEVER, Duration::from_secs(2)) {
+        Err(CallError::Fault(_, fault)) => Some(fault.to_string()),
+        // A router that has just begun answers nothing.
+        _ => None,
+    });
+    let line = text.lines().count() + 3;
+    assert!(fault.contains(&format!("test.toml:{line}, [access]")) && fault.contains("node arm refuses it"), "{fault}");
+    assert_eq!(field.counted("probe.1"), [0; 0]);
+    // On one node all trust each other.
+    field.wait_counted("arm", "probe.1", 1);
+    field.stop();
+}

@@ -1,0 +1,186 @@
+//! Two routers that seal, and a wire that keeps all and does anything: what opens was sealed by the present life of the one for the present
+//! life of the other, is as it was, and opens once; and a life begins only by what was said since the last one did.
+
+use crate::frames::checked;
+use crate::split::Bytes;
+use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use rohrpost_routers::security::{
+    Acquaintances, Greeter, HELLO_DATAGRAM_BYTES, InstallationKey, KeyId, KeyRing, Opened, Opening, Port, Sealing,
+    TAG_BYTES, Who,
+};
+use std::num::NonZeroU8;
+use std::sync::Arc;
+
+/// Steps of one program.
+const STEPS_MAX: usize = 300;
+const PORTS: [Port; 2] = [Port::Packages, Port::Time];
+
+pub(crate) fn run(data: &[u8]) {
+    let mut bytes = Bytes(data);
+    let mut world = World { routers: [0, 1].map(|own| Router::new(own, 1, 0)), wire: Vec::new(), step: 0 };
+    while !bytes.is_empty() && world.step < STEPS_MAX {
+        world.step += 1;
+        world.step(&mut bytes);
+    }
+}
+
+/// One life of a router.
+struct Router {
+    own: NodeIndex,
+    incarnation: u64,
+    all: Arc<Acquaintances>,
+    greeter: Greeter,
+    sealing: [Sealing; 2],
+    opening: [Opening; 2],
+    next: [u64; 2],
+    /// The step at which the peer's last life began: the challenge is no older.
+    drawn: usize,
+    /// Places on the wire of what it has opened.
+    opened: Vec<usize>,
+}
+
+impl Router {
+    fn new(own: NodeIndex, life: u64, step: usize) -> Self {
+        let incarnation = life << 8 | u64::from(own);
+        let who = Who { system: 1, own, nodes: 2, digest: 7, incarnation };
+        let key = |id| InstallationKey::new(KeyId(NonZeroU8::MIN.saturating_add(id)), &[id; 32]);
+        let all = Acquaintances::new(who, KeyRing::new(key(1), Some(key(0))));
+        let mut seed = [0; 32];
+        seed[..8].copy_from_slice(&incarnation.to_le_bytes());
+        Self {
+            own,
+            incarnation,
+            greeter: Greeter::new(&all, seed),
+            sealing: PORTS.map(|port| Sealing::new(&all, port)),
+            opening: PORTS.map(|port| Opening::new(&all, port)),
+            all,
+            next: [0; 2],
+            drawn: step,
+            opened: Vec::new(),
+        }
+    }
+}
+
+/// What was on the wire, and who meant it for whom.
+struct Sent {
+    datagram: Vec<u8>,
+    from: NodeIndex,
+    port: usize,
+    /// Incarnations of the sender, and of the life that it sealed to; of a hello 0.
+    lives: (u64, u64),
+    text: Vec<u8>,
+    step: usize,
+}
+
+struct World {
+    routers: [Router; 2],
+    wire: Vec<Sent>,
+    step: usize,
+}
+
+impl World {
+    fn step(&mut self, bytes: &mut Bytes<'_>) {
+        match bytes.byte() % 8 {
+            0 => self.ask(bytes.byte() % 2),
+            1 | 2 => self.seal(bytes),
+            3 => self.arrive(self.wire.len().wrapping_sub(1)),
+            4 => self.arrive(bytes.half().into()),
+            5 => {
+                let own = bytes.byte() % 2;
+                let life = (self.routers[usize::from(own)].incarnation >> 8) + 1;
+                self.routers[usize::from(own)] = Router::new(own, life, self.step);
+            }
+            6 => self.alter(bytes),
+            _ => {
+                let forged = bytes.take(200).to_vec();
+                [0, 1].into_iter().for_each(|to| self.strange(to, &forged));
+            }
+        }
+    }
+
+    fn ask(&mut self, own: NodeIndex) {
+        let mut room = [0; HELLO_DATAGRAM_BYTES];
+        let said = self.routers[usize::from(own)].sealing[0].ask(1 - own, &mut room);
+        self.hello(own, &room[..said.unwrap_or_default()]);
+    }
+
+    fn hello(&mut self, from: NodeIndex, datagram: &[u8]) {
+        let lives = (self.routers[usize::from(from)].incarnation, 0);
+        self.wire.push(Sent { datagram: datagram.to_vec(), from, port: 0, lives, text: Vec::new(), step: self.step });
+    }
+
+    fn seal(&mut self, bytes: &mut Bytes<'_>) {
+        let (from, port, len) = (bytes.byte() % 2, usize::from(bytes.byte() % 2), usize::from(bytes.byte()));
+        let router = &mut self.routers[usize::from(from)];
+        let kind = [Kind::Packages, Kind::Sync][port];
+        let (incarnation, sequence) = (router.incarnation, router.next[port]);
+        let head = FrameHead { kind, system: 1, from, to: 1 - from, digest: 7, incarnation, sequence };
+        let text = vec![bytes.byte(); len];
+        let mut datagram = [&[0; HEAD_BYTES], &text[..], &[0; TAG_BYTES]].concat();
+        // Gaps, too.
+        router.next[port] += 1 + u64::from(bytes.byte() / 64) * 400;
+        let known = router.all.incarnation(1 - from);
+        assert_eq!(router.sealing[port].seal(&head, &mut datagram).is_ok(), known.is_some());
+        if let Some(to) = known {
+            let lives = (router.incarnation, to);
+            self.wire.push(Sent { datagram, from, port, lives, text, step: self.step });
+        }
+    }
+
+    /// What was on the wire arrives, perhaps once more.
+    fn arrive(&mut self, place: usize) {
+        let Some(sent) = self.wire.get(place) else { return };
+        let router = &mut self.routers[usize::from(1 - sent.from)];
+        let known = router.all.incarnation(sent.from);
+        let mut datagram = sent.datagram.clone();
+        let mut room = [0; HELLO_DATAGRAM_BYTES];
+        let answer = match router.opening[sent.port].open(&mut datagram) {
+            Ok(Opened::Frame(head, text)) => {
+                assert_eq!(sent.lives, (head.incarnation, router.incarnation), "of life to life");
+                assert_eq!((known, text), (Some(head.incarnation), &sent.text[..]));
+                assert!(!router.opened.contains(&place), "it was opened before");
+                router.opened.push(place);
+                None
+            }
+            Ok(Opened::Hello(head, greeting)) => {
+                let greeted = router.greeter.greet(0, &head, &greeting, &mut room);
+                if greeted.began {
+                    assert!(sent.step >= router.drawn, "a life began by what was said before");
+                    router.drawn = self.step;
+                }
+                greeted.reply_bytes
+            }
+            Err(_) => None,
+        };
+        let own = router.own;
+        if let Some(bytes) = answer {
+            self.hello(own, &room[..bytes]);
+        }
+    }
+
+    fn alter(&mut self, bytes: &mut Bytes<'_>) {
+        let Some(sent) = self.wire.get(usize::from(bytes.half())) else { return };
+        let (mut datagram, to) = (sent.datagram.clone(), 1 - sent.from);
+        let (at, change) = (usize::from(bytes.half()) % datagram.len().max(1), bytes.byte().max(1));
+        // The check alone is no part of what is signed.
+        if (HEAD_BYTES - 4..HEAD_BYTES).contains(&at) {
+            return;
+        }
+        if let Some(byte) = datagram.get_mut(at) {
+            *byte ^= change;
+            self.strange(to, &datagram);
+        }
+    }
+
+    /// What nobody sealed as it is opens nowhere.
+    fn strange(&mut self, to: NodeIndex, datagram: &[u8]) {
+        let Some((head, rest)) = datagram.split_first_chunk::<HEAD_BYTES>() else { return };
+        let datagram = [&checked(head, rest)[..], rest].concat();
+        if self.wire.iter().any(|sent| sent.datagram == datagram) {
+            return;
+        }
+        for opening in &mut self.routers[usize::from(to)].opening {
+            assert!(opening.open(&mut datagram.clone()).is_err());
+        }
+    }
+}
