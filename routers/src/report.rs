@@ -28,7 +28,7 @@ pub trait Deliver: Report {
     fn event(&mut self, event: Event);
 }
 
-/// Why a mailbox did not take a package.
+/// Why a package is not in its mailbox.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum NotDelivered {
     /// Nobody has it open.
@@ -40,6 +40,9 @@ pub enum NotDelivered {
     /// Its slots are smaller.
     #[error("larger than the mailbox's slots")]
     TooLarge,
+    /// Who sent it may not command it.
+    #[error("its class takes no commands of this class")]
+    NotAllowed,
 }
 
 impl From<SendError> for NotDelivered {

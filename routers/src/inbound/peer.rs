@@ -209,6 +209,7 @@ impl Way<'_> {
             Err(NotDelivered::NoMailbox) => self.lose(head, body, Cause::NoMailbox, deliver),
             Err(NotDelivered::MailboxFull) => self.lose(head, body, Cause::MailboxFull, deliver),
             Err(NotDelivered::TooLarge) => self.lose(head, body, Cause::TooLarge, deliver),
+            Err(NotDelivered::NotAllowed) => self.lose(head, body, Cause::NotAllowed, deliver),
         }
     }
 

@@ -28,11 +28,13 @@ pub enum Cause {
     MailboxFull,
     /// Its mailbox has smaller slots.
     TooLarge,
+    /// Who sent it may not command it.
+    NotAllowed,
 }
 
 impl Cause {
     /// All, in their order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::NoRoute,
         Self::Full,
         Self::Stale,
@@ -43,6 +45,7 @@ impl Cause {
         Self::NoMailbox,
         Self::MailboxFull,
         Self::TooLarge,
+        Self::NotAllowed,
     ];
 
     /// A word for people and programs.
@@ -58,6 +61,7 @@ impl Cause {
             Self::NoMailbox => "no-mailbox",
             Self::MailboxFull => "mailbox-full",
             Self::TooLarge => "too-large",
+            Self::NotAllowed => "not-allowed",
         }
     }
 
@@ -72,6 +76,7 @@ impl Cause {
             Self::NoMailbox => stats::Cause::NoMailbox,
             Self::MailboxFull => stats::Cause::MailboxFull,
             Self::TooLarge => stats::Cause::TooLarge,
+            Self::NotAllowed => stats::Cause::NotAllowed,
         })
     }
 }
@@ -82,6 +87,7 @@ impl From<NotDelivered> for Cause {
             NotDelivered::NoMailbox => Self::NoMailbox,
             NotDelivered::MailboxFull => Self::MailboxFull,
             NotDelivered::TooLarge => Self::TooLarge,
+            NotDelivered::NotAllowed => Self::NotAllowed,
         }
     }
 }

@@ -10,6 +10,7 @@ use super::desk::Desk;
 use super::seal::ClientSeal;
 use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
+use crate::access::Access;
 use crate::report::NotDelivered;
 use crate::session::client::{Client, ClientSettings, Event, Host, Output, Package};
 use crate::session::frame::{Carried, Range};
@@ -66,6 +67,8 @@ pub struct ClientParts<'a> {
     pub beyond: Vec<(Name, Name)>,
     /// How commands are answered that cannot be carried.
     pub faults: Arc<dyn Faults>,
+    /// Which commands of others the node's modules take.
+    pub access: Access,
     /// Its certificates; none: nothing is sealed.
     pub seal: Option<ClientSeal>,
 }
@@ -90,7 +93,7 @@ impl ClientShell {
     /// # Errors
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
-        let ClientParts { node, name, server, settings, hosts, beyond, faults, seal } = parts;
+        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal } = parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
@@ -106,6 +109,7 @@ impl ClientShell {
                 server,
                 ways: Ways::new(&participant, Reach::Here),
                 desk: Desk::new(faults, format!("beyond the TCP router at {server}")),
+                access,
                 why: String::new(),
                 by_server: false,
             },
@@ -147,6 +151,7 @@ struct Voice {
     server: SocketAddr,
     ways: Ways,
     desk: Desk,
+    access: Access,
     /// Why it takes no part, as it was last told; empty if it does.
     why: String,
     /// The server has said that, or what it said is why.
@@ -180,6 +185,10 @@ impl Answers for Voice {
 
 impl Host for Voice {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
+        if !self.access.allows(&carried.head) {
+            self.desk.rule = self.access.line(carried.head.to.class());
+            return Err(NotDelivered::NotAllowed);
+        }
         self.ways.send(&carried.head, carried.body).map_err(|error| {
             if let SendError::TooLarge { max, .. } = error {
                 self.desk.takes_bytes = Some(max);

@@ -11,11 +11,13 @@ pub(super) struct Desk {
     beyond: String,
     /// Bytes that the mailbox takes which refused the last package.
     pub(super) takes_bytes: Option<usize>,
+    /// Line of the rule that refused the last package.
+    pub(super) rule: Option<usize>,
 }
 
 impl Desk {
     pub(super) fn new(faults: Arc<dyn Faults>, beyond: String) -> Self {
-        Self { faults, beyond, takes_bytes: None }
+        Self { faults, beyond, takes_bytes: None, rule: None }
     }
 }
 
@@ -25,7 +27,7 @@ impl Answers for Desk {
         let node = Some(holder.unwrap_or(&self.beyond));
         self.faults.write(
             call,
-            &Undelivered { cause, node, mismatch: None, takes_bytes: self.takes_bytes.take(), rule: None },
+            &Undelivered { cause, node, mismatch: None, takes_bytes: self.takes_bytes.take(), rule: self.rule.take() },
             answer,
         )
     }

@@ -1,6 +1,7 @@
 //! A TCP router and systems of one node each, in this process.
 
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type, local, monotonic_ns};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::session::client::ClientSettings;
 use rohrpost_routers::session::server::ServerSettings;
 use rohrpost_routers::shell::{Faults, Undelivered};
@@ -26,12 +27,15 @@ pub(crate) fn wait<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-/// Says the cause's word.
+/// Says the cause's word, and the rule's line if one refused.
 pub(crate) struct Words;
 
 impl Faults for Words {
     fn write(&self, _: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool {
         answer.extend_from_slice(why.cause.word().as_bytes());
+        if let Some(line) = why.rule {
+            answer.extend_from_slice(format!(", line {line}").as_bytes());
+        }
         true
     }
 }
@@ -90,6 +94,10 @@ impl System {
     }
 
     pub(crate) fn sealed(id: u8, name: &str, server: SocketAddr, seal: Option<ClientSeal>) -> Self {
+        Self::guarded(id, name, server, seal, Access::default())
+    }
+
+    pub(crate) fn guarded(id: u8, name: &str, server: SocketAddr, seal: Option<ClientSeal>, access: Access) -> Self {
         let (folder, node) = node();
         let settings = ClientSettings {
             name: name.into(),
@@ -105,7 +113,8 @@ impl System {
         let [before, after] = [own.0.raw() - 1, own.1.raw() + 1].map(Name::from_raw);
         let beyond = vec![(Name::new(1, 1, 0, 0), before), (after, Name::from_raw(u32::MAX))];
         let (tcp, faults) = (Name::new(id, 64, 0, 0), Arc::new(Words));
-        let parts = ClientParts { node: &node, name: tcp, server, settings, hosts: vec![own], beyond, faults, seal };
+        let parts =
+            ClientParts { node: &node, name: tcp, server, settings, hosts: vec![own], beyond, faults, access, seal };
         let client = ClientShell::start(parts).unwrap();
         let participant = Participant::join(&node, module(id)).unwrap();
         let shape = Shape { slots: 64, body_bytes_max: 1024, ..Shape::default() };

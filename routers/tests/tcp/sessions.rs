@@ -1,7 +1,9 @@
 //! What crosses, what a dead server costs, and who holds up whom.
 
 use crate::ground::{COMMON, System, address, module, node, start, wait};
-use rohrpost_mailbox::{ALL_SYSTEMS, Head, Priority, Type};
+use rohrpost_config as config;
+use rohrpost_mailbox::{ALL_SYSTEMS, Class, Head, Priority, Type};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
 use rohrpost_routers::tcp::{Link, LinkState};
 use std::io::{Read, Write};
@@ -84,6 +86,22 @@ fn packages_cross_from_system_to_system_and_what_is_not_there_is_answered() {
     one.say(&mut absent, 9);
     let answer = wait("an answer", || one.replies.try_receive().map(|package| package.body().to_vec()));
     assert_eq!(String::from_utf8_lossy(&answer), "no-mailbox");
+}
+
+#[test]
+fn a_node_takes_commands_from_beyond_only_as_its_configuration_allows() {
+    let (address, (_folder, own)) = (address(), node());
+    let _server = start(address, &own, 1).unwrap();
+    let mut one = System::new(1, "one", address);
+    let only_others = config::Access { class: module(2).class(), callers: vec![Class(101)], line: 12 };
+    let mut two = System::guarded(2, "two", address, None, Access::new(&[only_others]));
+    one.wait_up();
+    two.wait_up();
+    let mut sender = one.sender(2);
+    one.say(&mut sender, 1);
+    let answer = wait("an answer", || one.replies.try_receive().map(|package| package.body().to_vec()));
+    assert_eq!(String::from_utf8_lossy(&answer), "not-allowed, line 12");
+    assert_eq!(two.hear(), None);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use rohrpost::config::Tcp as Configured;
 use rohrpost::interfaces::{BeyondLink, BeyondState, Tcp, TcpInterface};
 use rohrpost::mailbox::realtime_ns;
 use rohrpost::{Context, Module, ModuleError};
+use rohrpost_routers::access::Access;
 use rohrpost_routers::session::client::ClientSettings;
 use rohrpost_routers::tcp::{ClientParts, ClientSeal, ClientShell, Holder, LinkState};
 use std::net::SocketAddr;
@@ -56,6 +57,7 @@ impl Module for ClientModule {
             hosts: installation.names_on(&node_name),
             beyond: installation.names_beyond(&node_name),
             faults: Arc::new(Encoded::of(&installation)),
+            access: Access::new(&installation.access),
             seal,
         })?;
         context.set_period(PERIOD);
