@@ -253,9 +253,10 @@ impl Election {
     /// begin a time has waited so much less.
     pub(super) fn awakes(&mut self, stood_since_ns: u64, now_ns: u64) {
         self.awake_since_ns = now_ns;
-        let later = |since_ns: u64| since_ns.saturating_add(now_ns.saturating_sub(stood_since_ns)).min(now_ns);
-        self.quiet_since_ns = later(self.quiet_since_ns);
-        self.timed_heard_ns = self.timed_heard_ns.map(later);
+        let stood_ns = now_ns.saturating_sub(stood_since_ns);
+        for since_ns in std::iter::once(&mut self.quiet_since_ns).chain(&mut self.timed_heard_ns) {
+            *since_ns = since_ns.saturating_add(stood_ns).min(now_ns);
+        }
     }
 
     /// Somebody that has time sent in the place of the master.
