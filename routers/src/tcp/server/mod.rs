@@ -2,13 +2,14 @@
 //!
 //! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the client's own queue.
 
+mod voice;
+
 use super::desk::Desk;
 use super::seal::{Holder, ServerSeal};
 use super::seen::{Class, Member, Members, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
-use crate::session::frame::Reason;
-use crate::session::server::{Event, Host, Output, Server, ServerSettings};
-use crate::session::{Answers, Cause, ClientIndex};
+use crate::session::ClientIndex;
+use crate::session::server::{Output, Server, ServerSettings, View};
 use crate::shell::Faults;
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
@@ -19,6 +20,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use voice::Voice;
 
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
@@ -107,7 +109,7 @@ impl ServerShell {
         let work = Work {
             shared: shared.clone(),
             server: Server::new(settings),
-            host: Voice { desk, left: 0, refused: 0, refusal: String::new() },
+            host: Voice::new(desk),
             seal,
             parting: Vec::new(),
             listener,
@@ -159,60 +161,6 @@ fn listen(address: SocketAddr) -> Result<TcpListener, ServerError> {
         io::ErrorKind::AddrNotAvailable => ServerError::NotHere(address),
         _ => ServerError::Io(address, "a socket", error),
     })
-}
-
-/// Says what happens, and answers for who is not reached.
-struct Voice {
-    desk: Desk,
-    left: u64,
-    refused: u64,
-    /// The last of them, in words.
-    refusal: String,
-}
-
-impl Voice {
-    fn refuses(&mut self, refusal: String) {
-        tracing::warn!("{refusal}");
-        self.refused += 1;
-        self.refusal = refusal;
-    }
-}
-
-impl Answers for Voice {
-    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
-        self.desk.answer(call, why, holder, answer)
-    }
-}
-
-impl Host for Voice {
-    fn event(&mut self, event: Event<'_>) {
-        match event {
-            Event::Joined { name } => tracing::info!("{name} takes part"),
-            Event::Left { name, why: None } => {
-                self.left += 1;
-                tracing::info!("{name} takes part no more: its connection is closed");
-            }
-            Event::Left { name, why: Some(Reason::Ending) } => {
-                self.left += 1;
-                tracing::debug!("{name} is told that the TCP router ends");
-            }
-            Event::Left { name, why: Some(why) } => {
-                self.left += 1;
-                tracing::warn!("{name} takes part no more: {}", why.word());
-            }
-            Event::Refused { reason: Reason::Ending, .. } => {}
-            Event::Refused { name, reason, digests: (theirs, ours), text } => self.refuses(match reason {
-                Reason::Common | Reason::System => format!(
-                    "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
-                     (`rohrpost check`, on both)",
-                    reason.word()
-                ),
-                _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),
-                _ => format!("{name} may not take part: {}: {text}", reason.word()),
-            }),
-            Event::Objected { name, verdict } => tracing::warn!("{name} may not host what it says: {verdict}"),
-        }
-    }
 }
 
 struct Connection {
@@ -437,7 +385,7 @@ impl Work {
     }
 
     fn say(&self, now_ns: u64) {
-        let member = |client: crate::session::server::View<'_>| Member {
+        let member = |client: View<'_>| Member {
             name: client.name.to_owned(),
             peer: self
                 .connections
