@@ -30,6 +30,15 @@ const SYSTEMS: [&str; 2] = [NODES[0].0, NODES[1].0];
 const OPEN: &str = "security = \"none\"";
 const SEALED: &str = "security = \"tls\"\ncertificates = \"certificates\"";
 
+/// Connects with a version of TLS that is too old.
+const OLD_TLS: &str = "
+import socket, ssl
+context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+context.maximum_version = ssl.TLSVersion.TLSv1_2
+context.wrap_socket(socket.create_connection(('ADDRESS', 21119), timeout=10))
+";
+
 /// Two systems of one installation.
 struct Systems {
     // Dropped in this order: processes, what they left, their network.
@@ -104,10 +113,17 @@ impl Systems {
     /// A program that is no node, at `south`'s computer, in a system of its own.
     fn foreign(&self, system: u8, order: &str, certificates: &[&str]) -> Running {
         let common = format!("{:x}", self.robot("north").installation.digest().common);
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/foreign.py");
+        let system = system.to_string();
+        let arguments = [page, NODES[0].1, "21119", &common, &system, order, "1.96.0.0"];
+        self.python(&[&arguments, certificates].concat())
+    }
+
+    /// Python at `south`'s computer.
+    fn python(&self, arguments: &[&str]) -> Running {
         let mut command = Command::new("python3");
-        command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/foreign.py"));
-        command.args([NODES[0].1, "21119", &common, &system.to_string(), order, "1.96.0.0"]).args(certificates);
-        command.current_dir(self.place.path("")).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.args(arguments).current_dir(self.place.path(""));
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let _inside = self.lab.enter("south").unwrap();
         Running::start(command)
     }
@@ -198,6 +214,11 @@ fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
 fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     let Some(mut systems) = Systems::launched(SEALED) else { return };
     check_crossing(&systems);
+    let said = systems.python(&["-c", &OLD_TLS.replace("ADDRESS", NODES[0].1)]).said();
+    assert!(said.err.contains("PROTOCOL_VERSION"), "{said:?}");
+    wait("the TCP router says why", || {
+        systems.says("north", &["net"]).out.contains("an older TLS than 1.3").then_some(())
+    });
     // South's certificates are made anew, by another authority.
     let (_, mut south, robot) = systems.nodes.pop().unwrap();
     drop(robot);

@@ -13,6 +13,7 @@ use crate::session::server::{Output, Server, ServerSettings, View};
 use crate::shell::Faults;
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
+use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
 use socket2::{Domain, Protocol, Socket, Type};
 use std::io;
@@ -29,6 +30,8 @@ const ACCEPTS: usize = 64;
 /// Connections that the kernel keeps until they are accepted.
 const BACKLOG: i32 = 1024;
 const EVENTS: usize = 256;
+/// What a process has open besides its connections, at most.
+const DESCRIPTORS_BESIDE: u64 = 256;
 /// What is no client's place.
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
@@ -95,6 +98,7 @@ impl ServerShell {
     pub fn start(parts: ServerParts<'_>) -> Result<Self, ServerError> {
         let ServerParts { address, settings, faults, seal, node } = parts;
         let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
+        raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.greetings_max) + DESCRIPTORS_BESIDE);
         let listener = listen(address)?;
         let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|errno| io("epoll")(errno.into()))?;
         let bell = EventFd::from_flags(EfdFlags::EFD_CLOEXEC | EfdFlags::EFD_NONBLOCK)
@@ -143,6 +147,15 @@ impl Drop for ServerShell {
             // One that panicked has said so.
             let _ = thread.join();
         }
+    }
+}
+
+/// Each connection takes a descriptor. If the system does not grant so many, that is told when there is none left.
+fn raise_descriptors(wanted: u64) {
+    if let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_NOFILE)
+        && soft < wanted
+    {
+        let _ = setrlimit(Resource::RLIMIT_NOFILE, wanted.min(hard).max(soft), hard);
     }
 }
 
