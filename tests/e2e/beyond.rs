@@ -1,6 +1,7 @@
-//! Systems that meet at a TCP router, each in a network namespace of its own: `north` (system 1) runs it, `south` (system 2) reaches it.
+//! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south` (system 2) reaches it.
+//! Where system 1 has a LAN, `arm` is on it.
 
-use crate::harness::{Place, Robot, probe, signal, skipped, wait};
+use crate::harness::{NETWORK, Place, Robot, probe, signal, skipped, wait};
 use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
@@ -23,15 +24,25 @@ tool = { id = 16 }
 real-time-from = 256
 "#;
 
-/// Nodes, which are systems too, and their addresses.
-const NODES: [(&str, &str); 2] = [("north", "10.79.0.1"), ("south", "10.79.0.2")];
+/// Nodes, the first two of which are systems, and their addresses.
+const NODES: [(&str, &str); 3] = [("north", "10.79.0.1"), ("south", "10.79.0.2"), ("arm", "10.79.0.3")];
+const SYSTEMS: [&str; 2] = [NODES[0].0, NODES[1].0];
 const OPEN: &str = "security = \"none\"";
 const SEALED: &str = "security = \"tls\"\ncertificates = \"certificates\"";
 
-/// Two systems of one installation, each of one node.
+/// Connects with a version of TLS that is too old.
+const OLD_TLS: &str = "
+import socket, ssl
+context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+context.maximum_version = ssl.TLSVersion.TLSv1_2
+context.wrap_socket(socket.create_connection(('ADDRESS', 21119), timeout=10))
+";
+
+/// Two systems of one installation.
 struct Systems {
     // Dropped in this order: processes, what they left, their network.
-    nodes: Vec<(Running, Robot)>,
+    nodes: Vec<(&'static str, Running, Robot)>,
     place: Place,
     lab: Lab,
 }
@@ -49,8 +60,8 @@ impl Systems {
             Err(error) => panic!("{error}"),
         };
         let place = Place::new();
-        for ((node, _), id) in NODES.into_iter().zip(1..) {
-            std::fs::write(place.path(&format!("{node}.toml")), configured(node, id, security)).unwrap();
+        for (system, id) in SYSTEMS.into_iter().zip(1..) {
+            std::fs::write(place.path(&format!("{system}.toml")), configured(system, id, security)).unwrap();
         }
         Some(Self { nodes: Vec::new(), place, lab })
     }
@@ -58,28 +69,29 @@ impl Systems {
     fn launched(security: &str) -> Option<Self> {
         let mut systems = Self::new(security)?;
         if security == SEALED {
-            for (node, _) in NODES {
+            for node in SYSTEMS {
                 systems.place.say(&["certificates", systems.config(node).to_str().unwrap()]).ok();
             }
         }
-        NODES.into_iter().for_each(|(node, _)| systems.launch(node));
-        NODES.into_iter().for_each(|(node, _)| systems.wait_up(node));
+        SYSTEMS.into_iter().for_each(|node| systems.launch(node));
+        SYSTEMS.into_iter().for_each(|node| systems.wait_up(node));
         Some(systems)
     }
 
     fn config(&self, node: &str) -> PathBuf {
-        self.place.path(&format!("{node}.toml"))
+        let system = if node == "arm" { "north" } else { node };
+        self.place.path(&format!("{system}.toml"))
     }
 
-    fn launch(&mut self, node: &str) {
-        let command = self.place.command(&["launch", self.config(node).to_str().unwrap()]);
+    fn launch(&mut self, node: &'static str) {
+        let command = self.place.command(&["launch", self.config(node).to_str().unwrap(), "--node", node]);
         let mut launch = {
             let _inside = self.lab.enter(node).unwrap();
             Running::start(command)
         };
         let robot = self.place.robot(&self.config(node), node, &mut launch);
         robot.wait_on(&mut launch);
-        self.nodes.push((launch, robot));
+        self.nodes.push((node, launch, robot));
     }
 
     /// What `net` says of a node's client of the TCP router.
@@ -101,16 +113,23 @@ impl Systems {
     /// A program that is no node, at `south`'s computer, in a system of its own.
     fn foreign(&self, system: u8, order: &str, certificates: &[&str]) -> Running {
         let common = format!("{:x}", self.robot("north").installation.digest().common);
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/foreign.py");
+        let system = system.to_string();
+        let arguments = [page, NODES[0].1, "21119", &common, &system, order, "1.96.0.0"];
+        self.python(&[&arguments, certificates].concat())
+    }
+
+    /// Python at `south`'s computer.
+    fn python(&self, arguments: &[&str]) -> Running {
         let mut command = Command::new("python3");
-        command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/foreign.py"));
-        command.args([NODES[0].1, "21119", &common, &system.to_string(), order, "1.96.0.0"]).args(certificates);
-        command.current_dir(self.place.path("")).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.args(arguments).current_dir(self.place.path(""));
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let _inside = self.lab.enter("south").unwrap();
         Running::start(command)
     }
 
     fn robot(&self, node: &str) -> &Robot {
-        &self.nodes[NODES.iter().position(|(known, _)| *known == node).unwrap()].1
+        &self.nodes.iter().find(|(known, ..)| *known == node).unwrap().2
     }
 
     /// What counting at `south` brings, called from `north`.
@@ -125,7 +144,7 @@ impl Systems {
     }
 
     fn stop(mut self) {
-        for (mut launch, robot) in self.nodes.drain(..) {
+        for (_, mut launch, robot) in self.nodes.drain(..) {
             drop(robot);
             launch.stop();
         }
@@ -175,7 +194,7 @@ fn calls_and_data_cross_from_system_to_system() {
 #[test]
 fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
     let Some(systems) = Systems::launched(OPEN) else { return };
-    let clients = || NODES.map(|(node, _)| systems.robot(node).pid("tcp.0"));
+    let clients = || SYSTEMS.map(|node| systems.robot(node).pid("tcp.0"));
     let before = clients();
     let mut last = 0;
     for number in 0..3 {
@@ -195,8 +214,13 @@ fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
 fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     let Some(mut systems) = Systems::launched(SEALED) else { return };
     check_crossing(&systems);
+    let said = systems.python(&["-c", &OLD_TLS.replace("ADDRESS", NODES[0].1)]).said();
+    assert!(said.err.contains("PROTOCOL_VERSION"), "{said:?}");
+    wait("the TCP router says why", || {
+        systems.says("north", &["net"]).out.contains("an older TLS than 1.3").then_some(())
+    });
     // South's certificates are made anew, by another authority.
-    let (mut south, robot) = systems.nodes.pop().unwrap();
+    let (_, mut south, robot) = systems.nodes.pop().unwrap();
     drop(robot);
     south.stop();
     let config = systems.config("south");
@@ -210,7 +234,7 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     });
     assert!(why.contains("ca.pem"), "{why}");
     let shown = systems.says("north", &["net"]).ok();
-    assert!(shown.contains("its certificate is foreign"), "the TCP router says it, too:\n{shown}");
+    assert!(shown.contains("refuses this end's certificate as foreign"), "the TCP router says it, too:\n{shown}");
     systems.stop();
 }
 
@@ -238,5 +262,34 @@ fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
     std::fs::write(&file, configured("python", 5, SEALED)).unwrap();
     systems.place.say(&["certificates", file.to_str().unwrap()]).ok();
     check_foreign(&systems, 5, "big", &["certificates", "python.system-5"]);
+    systems.stop();
+}
+
+#[test]
+fn each_node_of_a_lan_is_reached_from_beyond_and_the_lan_goes_on_without_the_tcp_router() {
+    let Some(mut systems) = Systems::new(OPEN) else { return };
+    let config = systems.config("north");
+    let text = std::fs::read_to_string(&config).unwrap();
+    let [(_, north), _, (_, arm)] = NODES;
+    let nodes = format!(
+        "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}[tcp]"
+    );
+    let text =
+        text.replace("[nodes.north]\n[tcp]", &nodes) + "node = \"north\"\n" + &probe("probe.1", "", "node = \"arm\"");
+    std::fs::write(&config, text).unwrap();
+    for node in ["north", "arm", "south"] {
+        systems.launch(node);
+    }
+    for node in ["north", "arm", "south"] {
+        wait(format!("{node} takes part"), || (systems.client(node)["state"] == "up").then_some(()));
+    }
+    assert_eq!(systems.says("south", &["call", "1.probe.1.0", "count", "1"]).ok(), "1\n", "on the arm");
+    assert_eq!(systems.says("south", &["call", "1.probe.0.0", "count", "2"]).ok(), "1\n");
+    assert_eq!(systems.says("arm", &["call", "2.probe.0.0", "count", "3"]).ok(), "1\n");
+    systems.says("north", &["stop", "tcp.255"]).ok();
+    wait("the arm has noticed", || (systems.client("arm")["state"] != "up").then_some(()));
+    wait("a call over the LAN", || {
+        (systems.says("north", &["call", "probe.1", "count", "4"]).code == Some(0)).then_some(())
+    });
     systems.stop();
 }

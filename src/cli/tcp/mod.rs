@@ -21,8 +21,8 @@ const NAME_BYTES_MAX: usize = rohrpost_routers::session::frame::NAME_BYTES_MAX;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Launch starts the TCP router on the node that `server` of [tcp] names, and a client of it on every node; by hand they are \
-of use where modules are started by hand: rohrpost tcp-router --config robot.toml --name tcp.255"
+    after_help = "Example, on the node that `server` of [tcp] names: rohrpost tcp-router --config robot.toml --name tcp.255
+Launch starts both by itself, the client on every node; by hand they are of use where modules are started by hand."
 )]
 pub(super) struct Arguments {
     /// What every module takes: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the clients of the nodes.

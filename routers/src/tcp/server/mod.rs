@@ -2,16 +2,18 @@
 //!
 //! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the client's own queue.
 
+mod voice;
+
 use super::desk::Desk;
 use super::seal::{Holder, ServerSeal};
 use super::seen::{Class, Member, Members, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
-use crate::session::frame::Reason;
-use crate::session::server::{Event, Host, Output, Server, ServerSettings};
-use crate::session::{Answers, Cause, ClientIndex};
+use crate::session::ClientIndex;
+use crate::session::server::{Output, Server, ServerSettings, View};
 use crate::shell::Faults;
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
+use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
 use socket2::{Domain, Protocol, Socket, Type};
 use std::io;
@@ -19,6 +21,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use voice::Voice;
 
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
@@ -27,6 +30,8 @@ const ACCEPTS: usize = 64;
 /// Connections that the kernel keeps until they are accepted.
 const BACKLOG: i32 = 1024;
 const EVENTS: usize = 256;
+/// What a process has open besides its connections, at most.
+const DESCRIPTORS_BESIDE: u64 = 256;
 /// What is no client's place.
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
@@ -93,6 +98,7 @@ impl ServerShell {
     pub fn start(parts: ServerParts<'_>) -> Result<Self, ServerError> {
         let ServerParts { address, settings, faults, seal, node } = parts;
         let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
+        raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.greetings_max) + DESCRIPTORS_BESIDE);
         let listener = listen(address)?;
         let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|errno| io("epoll")(errno.into()))?;
         let bell = EventFd::from_flags(EfdFlags::EFD_CLOEXEC | EfdFlags::EFD_NONBLOCK)
@@ -107,7 +113,7 @@ impl ServerShell {
         let work = Work {
             shared: shared.clone(),
             server: Server::new(settings),
-            host: Voice { desk, left: 0, refused: 0, refusal: String::new() },
+            host: Voice::new(desk),
             seal,
             parting: Vec::new(),
             listener,
@@ -144,6 +150,15 @@ impl Drop for ServerShell {
     }
 }
 
+/// Each connection takes a descriptor. If the system does not grant so many, that is told when there is none left.
+fn raise_descriptors(wanted: u64) {
+    if let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_NOFILE)
+        && soft < wanted
+    {
+        let _ = setrlimit(Resource::RLIMIT_NOFILE, wanted.min(hard).max(soft), hard);
+    }
+}
+
 fn listen(address: SocketAddr) -> Result<TcpListener, ServerError> {
     let listen = || {
         let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
@@ -159,60 +174,6 @@ fn listen(address: SocketAddr) -> Result<TcpListener, ServerError> {
         io::ErrorKind::AddrNotAvailable => ServerError::NotHere(address),
         _ => ServerError::Io(address, "a socket", error),
     })
-}
-
-/// Says what happens, and answers for who is not reached.
-struct Voice {
-    desk: Desk,
-    left: u64,
-    refused: u64,
-    /// The last of them, in words.
-    refusal: String,
-}
-
-impl Voice {
-    fn refuses(&mut self, refusal: String) {
-        tracing::warn!("{refusal}");
-        self.refused += 1;
-        self.refusal = refusal;
-    }
-}
-
-impl Answers for Voice {
-    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
-        self.desk.answer(call, why, holder, answer)
-    }
-}
-
-impl Host for Voice {
-    fn event(&mut self, event: Event<'_>) {
-        match event {
-            Event::Joined { name } => tracing::info!("{name} takes part"),
-            Event::Left { name, why: None } => {
-                self.left += 1;
-                tracing::info!("{name} takes part no more: its connection is closed");
-            }
-            Event::Left { name, why: Some(Reason::Ending) } => {
-                self.left += 1;
-                tracing::debug!("{name} is told that the TCP router ends");
-            }
-            Event::Left { name, why: Some(why) } => {
-                self.left += 1;
-                tracing::warn!("{name} takes part no more: {}", why.word());
-            }
-            Event::Refused { reason: Reason::Ending, .. } => {}
-            Event::Refused { name, reason, digests: (theirs, ours), text } => self.refuses(match reason {
-                Reason::Common | Reason::System => format!(
-                    "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
-                     (`rohrpost check`, on both)",
-                    reason.word()
-                ),
-                _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),
-                _ => format!("{name} may not take part: {}: {text}", reason.word()),
-            }),
-            Event::Objected { name, verdict } => tracing::warn!("{name} may not host what it says: {verdict}"),
-        }
-    }
 }
 
 struct Connection {
@@ -437,7 +398,7 @@ impl Work {
     }
 
     fn say(&self, now_ns: u64) {
-        let member = |client: crate::session::server::View<'_>| Member {
+        let member = |client: View<'_>| Member {
             name: client.name.to_owned(),
             peer: self
                 .connections

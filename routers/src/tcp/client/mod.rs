@@ -6,20 +6,21 @@
 //!                   └ sleep ─┘      └──┘  deliver ─▶ mailboxes
 //! ```
 
+mod voice;
+
 use super::desk::Desk;
 use super::seal::ClientSeal;
 use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::access::Access;
-use crate::report::NotDelivered;
-use crate::session::client::{Client, ClientSettings, Event, Host, Output, Package};
-use crate::session::frame::{Carried, Range};
-use crate::session::{Answers, Cause, in_system};
+use crate::session::client::{Client, ClientSettings, Output, Package};
+use crate::session::frame::Range;
+use crate::session::in_system;
 use crate::shell::Faults;
 use crate::shell::transit;
 use crate::shell::ways::{Reach, Ways};
 use rohrpost_mailbox::{
-    ALL_SYSTEMS, CreateError, Head, Interest, Name, Node, NodeError, Participant, Receiver, SendError, Watch, Watches,
+    ALL_SYSTEMS, CreateError, Head, Interest, Name, Node, NodeError, Participant, Receiver, Watch, Watches,
     monotonic_ns,
 };
 use std::io;
@@ -28,6 +29,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use voice::Voice;
 
 /// Packages taken from the mailbox before the socket has its turn.
 const BURST: usize = 64;
@@ -105,14 +107,12 @@ impl ClientShell {
             shared: shared.clone(),
             server,
             client: Client::new(settings, ranges, monotonic_ns()),
-            voice: Voice {
+            voice: Voice::new(
                 server,
-                ways: Ways::new(&participant, Reach::Here),
-                desk: Desk::new(faults, format!("beyond the TCP router at {server}")),
+                Ways::new(&participant, Reach::Here),
+                Desk::new(faults, format!("beyond the TCP router at {server}")),
                 access,
-                why: String::new(),
-                by_server: false,
-            },
+            ),
             system,
             seal,
             mailbox,
@@ -146,80 +146,10 @@ impl Drop for ClientShell {
     }
 }
 
-/// Delivers, answers, and says what happens.
-struct Voice {
-    server: SocketAddr,
-    ways: Ways,
-    desk: Desk,
-    access: Access,
-    /// Why it takes no part, as it was last told; empty if it does.
-    why: String,
-    /// The server has said that, or what it said is why.
-    by_server: bool,
-}
-
-impl Voice {
-    /// Says once why the server is not there.
-    fn unreached(&mut self, why: &str) {
-        let why = format!(
-            "the TCP router at {} is not reached: {why}; does it run, and is it reached from here?",
-            self.server
-        );
-        // What it said itself is better than that its connection then ended.
-        if !self.by_server && self.why != why {
-            self.says(why, false);
-        }
-    }
-
-    fn says(&mut self, why: String, by_server: bool) {
-        tracing::warn!("{why}");
-        (self.why, self.by_server) = (why, by_server);
-    }
-}
-
-impl Answers for Voice {
-    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
-        self.desk.answer(call, why, holder, answer)
-    }
-}
-
-impl Host for Voice {
-    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
-        if !self.access.allows(&carried.head) {
-            self.desk.rule = self.access.line(carried.head.to.class());
-            return Err(NotDelivered::NotAllowed);
-        }
-        self.ways.send(&carried.head, carried.body).map_err(|error| {
-            if let SendError::TooLarge { max, .. } = error {
-                self.desk.takes_bytes = Some(max);
-            }
-            error.into()
-        })
-    }
-
-    fn event(&mut self, event: Event<'_>) {
-        let server = self.server;
-        match event {
-            Event::Up => {
-                self.why.clear();
-                tracing::info!("takes part at the TCP router at {server}");
-            }
-            Event::Down => {
-                self.says(format!("takes part at the TCP router at {server} no more; it tries again"), false)
-            }
-            Event::Refused(refusal) => {
-                self.says(format!("may not take part at the TCP router at {server}: {refusal}"), true);
-            }
-            Event::Objected(verdict) => {
-                self.says(format!("may not host its names at the TCP router at {server}: {verdict}"), true);
-            }
-            Event::Damaged(bad) => {
-                self.says(format!("cannot read what came from the TCP router at {server}: {bad}"), true);
-            }
-        }
-    }
-}
-
+                Ways::new(&participant, Reach::Here),
+                Desk::new(faults, format!("beyond the TCP router at {server}")),
+                access,
+            ),
 struct Connection {
     stream: Stream,
     watch: Watch,

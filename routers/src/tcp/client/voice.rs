@@ -1,0 +1,89 @@
+//! What a client does for its session: it delivers, answers, and says what happens.
+
+use crate::access::Access;
+use crate::report::NotDelivered;
+use crate::session::client::{Event, Host};
+use crate::session::frame::Carried;
+use crate::session::{Answers, Cause};
+use crate::shell::ways::Ways;
+use crate::tcp::desk::Desk;
+use rohrpost_mailbox::SendError;
+use std::net::SocketAddr;
+
+/// Delivers, answers, and says what happens.
+pub(super) struct Voice {
+    server: SocketAddr,
+    pub(super) ways: Ways,
+    desk: Desk,
+    access: Access,
+    /// Why it takes no part, as it was last told; empty if it does.
+    pub(super) why: String,
+    /// The server has said that, or what it said is why.
+    by_server: bool,
+}
+
+impl Voice {
+    pub(super) fn new(server: SocketAddr, ways: Ways, desk: Desk, access: Access) -> Self {
+        Self { server, ways, desk, access, why: String::new(), by_server: false }
+    }
+
+    /// Says once why the server is not there.
+    pub(super) fn unreached(&mut self, why: &str) {
+        let why = format!(
+            "the TCP router at {} is not reached: {why}; does it run, and is it reached from here?",
+            self.server
+        );
+        // What it said itself is better than that its connection then ended.
+        if !self.by_server && self.why != why {
+            self.says(why, false);
+        }
+    }
+
+    fn says(&mut self, why: String, by_server: bool) {
+        tracing::warn!("{why}");
+        (self.why, self.by_server) = (why, by_server);
+    }
+}
+
+impl Answers for Voice {
+    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
+        self.desk.answer(call, why, holder, answer)
+    }
+}
+
+impl Host for Voice {
+    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
+        if !self.access.allows(&carried.head) {
+            self.desk.rule = self.access.line(carried.head.to.class());
+            return Err(NotDelivered::NotAllowed);
+        }
+        self.ways.send(&carried.head, carried.body).map_err(|error| {
+            if let SendError::TooLarge { max, .. } = error {
+                self.desk.takes_bytes = Some(max);
+            }
+            error.into()
+        })
+    }
+
+    fn event(&mut self, event: Event<'_>) {
+        let server = self.server;
+        match event {
+            Event::Up => {
+                self.why.clear();
+                tracing::info!("takes part at the TCP router at {server}");
+            }
+            Event::Down => {
+                self.says(format!("takes part at the TCP router at {server} no more; it tries again"), false)
+            }
+            Event::Refused(refusal) => {
+                self.says(format!("may not take part at the TCP router at {server}: {refusal}"), true);
+            }
+            Event::Objected(verdict) => {
+                self.says(format!("may not host its names at the TCP router at {server}: {verdict}"), true);
+            }
+            Event::Damaged(bad) => {
+                self.says(format!("cannot read what came from the TCP router at {server}: {bad}"), true);
+            }
+        }
+    }
+}
