@@ -72,7 +72,8 @@ impl World<'_> {
                         continue;
                     }
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
-                    self.at(at_ns, Event::Arrive { to, arrived });
+                    let life = (to == whose).then_some(life);
+                    self.at(at_ns, Event::Again { to, life, arrived });
                 }
             }
         }
