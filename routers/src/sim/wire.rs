@@ -125,11 +125,11 @@ impl Wire {
         let Says { basis, term, .. } = self.says[node];
         let master = slots.master(term);
         let own = Transmission { node, basis, term, master, begin_ns, end_ns };
-        let meets = self.recent.iter().filter(|other| other.node != node && own.meets(other));
+        let mut meets = self.recent.iter().filter(|other| other.node != node && own.meets(other));
         let began_ns = |term| self.first_ns.get(&term).copied().unwrap_or(0);
         let is_blamed =
             |other: &&Transmission| !slots.divisions.excuse(&own, other, began_ns(term).min(began_ns(other.term)));
-        if let Some(other) = { meets }.find(is_blamed) {
+        if let Some(other) = meets.find(is_blamed) {
             let text = format!("{own:?} and {other:?} at once");
             problems.push(Problem { promise: Promise::Exclusive, at_ns: begin_ns, text });
         }
