@@ -149,6 +149,16 @@ mod variants {
         SyncInForeignWindow,
         /// Time slots: whoever yields to another master goes on by its own time.
         KeepsOwnTime,
+        /// Time slots: whoever starts begins a time at once, and does not listen first.
+        BeginsAtOnce,
+        /// Time slots: whoever begins a time says nothing else for ever.
+        BeginsForEver,
+        /// Time slots: what a node knows of the time is never off.
+        TrustsItself,
+        /// Time slots: who goes by what it has heard only asks before its slot begins.
+        AsksTooSoon,
+        /// Time: a master does not care who is too far off to follow it.
+        NeverBeginsEpoch,
     }
 
     impl Broken {

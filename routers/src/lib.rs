@@ -22,6 +22,7 @@ pub mod frame;
 mod harness;
 pub mod impair;
 pub mod inbound;
+pub mod intake;
 pub mod lab;
 pub mod latencies;
 pub mod link;

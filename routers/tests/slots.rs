@@ -123,6 +123,8 @@ fn compare(plan: &Plan) -> (Installation, Vec<Compared>) {
     let installation = installation(plan);
     let outcome = run(plan.clone(), |_| Box::new(NoCalls), false);
     assert!(outcome.problems.is_empty(), "seed {}: {:?}", plan.seed, outcome.problems[0]);
+    let silent = declared(plan).zip(&outcome.slowest_ns).find(|(_, slowest_ns)| **slowest_ns == 0);
+    assert!(silent.is_none(), "seed {}: nothing of {silent:?} was delivered", plan.seed);
     let link = Duration::from_nanos(plan.quality.delay_ns + plan.quality.jitter_ns);
     let bounds = bounds(&installation);
     let compared = declared(plan).zip(&outcome.slowest_ns).enumerate().map(|(index, (flow, took_ns))| Compared {

@@ -12,7 +12,8 @@ use std::time::Duration;
 
 /// Clocks of two Linux computers that ask each other all the time are known to half of it.
 const GUARD_MIN: Duration = Duration::from_micros(40);
-/// The part of the guard within which a node that joins takes frames of time to arrive.
+/// A node that joins takes frames of time to arrive within half of the guard: this part of it for the links, as much for the computers. It is off
+/// by as much at most, earlier or later.
 const ARRIVES_WITHIN: u32 = 4;
 /// Peers take a node of which nothing came for a second for silent: it has two chances in that time to say that it is there.
 const SLOT_WITHIN: Duration = Duration::from_millis(500);
@@ -79,8 +80,8 @@ impl Judge<'_> {
         } else {
             let way = duration_decimal(round_up(way));
             format!(
-                "is too short for such a link: who joins takes it that a frame of time arrives within a quarter of it, and over two links it \
-                 takes {way}"
+                "is too short for such a link: who joins takes it that a frame of time passes two links within a quarter of it, and that takes \
+                 {way}"
             )
         };
         let (guard, least) = (duration_decimal(guard), duration_decimal(least));
@@ -124,8 +125,8 @@ impl Judge<'_> {
         }
     }
 
-    /// Who joins knows the time by a Sync alone, so that it may be off by the quarter of the guard within which that came, and by what its
-    /// clock has drifted since: it must be sure to half of the guard until its slot ends, or it never asks for more.
+    /// Who joins knows the time by a Sync alone, so that it may be off by a quarter of the guard, and by what its clock has drifted since: it
+    /// must be sure to half of the guard until its slot ends, or it never asks for more.
     fn joining(&self) {
         let guard = self.tdma.guard;
         for slot in &self.tdma.slots {

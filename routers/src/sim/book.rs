@@ -63,17 +63,14 @@ pub enum Promise {
     /// One master in a term, and one master a while after the last fault; who sends in its place does so only when it was not heard, and
     /// nobody goes by it.
     OneMaster,
-    /// With time slots no two nodes transmit at once, unless a fault has divided them for longer than [`HOLDOVER_NS`], or the
-    /// router of one began meanwhile, or both times by which they go, and until [`HEALED_CYCLES`] cycles after it. Of two that just began a
-    /// time the Syncs that say so may meet.
+    /// With time slots no two nodes transmit at once, unless a fault parts them: see [`Divisions::excuse`].
     ///
-    /// [`HOLDOVER_NS`]: super::slots::HOLDOVER_NS
-    /// [`HEALED_CYCLES`]: super::slots::HEALED_CYCLES
+    /// [`Divisions::excuse`]: super::divided::Divisions::excuse
     Exclusive,
     /// With time slots each datagram is on the wire in a window of its sender, before its guard, as the sender reckons, and none is sent
     /// in a window whose wake-up came too late.
     InWindow,
-    /// With time slots nobody sends while its own bound is greater than what is allowed.
+    /// With time slots nobody sends while its own bound is greater than what is allowed, or while it is further off in truth.
     SilentWhenUnsure,
 }
 

@@ -1,6 +1,7 @@
 //! Networks with time slots in which nothing goes wrong, and flows are as they were declared: no package may be later than was computed.
 
 use super::chance::Chance;
+use super::divided::Divisions;
 use super::plan::{DRAIN_NS, Flow, MS, Plan, S};
 use super::slots::node_bytes_s;
 use rohrpost_mailbox::{HEAD_BYTES, Name, local};
@@ -30,11 +31,13 @@ impl Plan {
         plan.draw_declared(&mut chance);
         plan.draw_floods(&mut chance);
         plan.traffic_begin_ns = BEGIN_NS;
-        (plan.mended_ns, plan.timed_ns) = (BEGIN_NS + TRAFFIC_NS, BEGIN_NS);
-        plan.traffic_end_ns = BEGIN_NS + TRAFFIC_NS;
+        // Each flow publishes something.
+        let longest_ns = plan.flows.iter().map(|flow| flow.period_ns).max().unwrap_or(0);
+        plan.traffic_end_ns = BEGIN_NS + TRAFFIC_NS.max(longest_ns);
+        (plan.mended_ns, plan.timed_ns, plan.stepped_ns) = (plan.traffic_end_ns, BEGIN_NS, BEGIN_NS);
         plan.end_ns = plan.traffic_end_ns + DRAIN_NS;
         if let Some(slots) = &mut plan.slots {
-            (slots.late_ppm, slots.divided) = (0, Vec::new());
+            (slots.late_ppm, slots.divisions) = (0, Divisions::default());
         }
         plan
     }

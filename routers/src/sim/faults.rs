@@ -76,7 +76,8 @@ impl World<'_> {
                     let bytes = if alters { altered(&arrived.bytes, &mut self.chance) } else { arrived.bytes.clone() };
                     let arrived = Arrived { bytes, ..arrived };
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
-                    self.at(at_ns, Event::Arrive { to, arrived });
+                    let life = (to == whose).then_some(life);
+                    self.at(at_ns, Event::Again { to, life, arrived });
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! What a computer has besides its router: the router's transit mailbox, and the mailboxes of its modules. A router's death
 //! touches none of it.
 
-use rohrpost_mailbox::{Head, Name, Options};
+use rohrpost_mailbox::{Head, Name, Options, Priority};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -54,6 +54,11 @@ impl Transit {
         let first =
             self.waiting.iter().enumerate().max_by_key(|(at, parcel)| (parcel.head.priority.0, usize::MAX - at));
         first.map(|(at, _)| at).map(|at| self.waiting.remove(at))
+    }
+
+    /// How many packages wait, and how important the first is.
+    pub fn waits(&self) -> (usize, Option<Priority>) {
+        (self.waiting.len(), self.waiting.iter().map(|parcel| parcel.head.priority).max_by_key(|priority| priority.0))
     }
 
     /// The router died with this one in its hand: it comes again, once.
@@ -125,7 +130,6 @@ impl Host {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost_mailbox::Priority;
 
     fn parcel(number: u32, priority: u8) -> Parcel {
         let head = Head { priority: Priority(priority), ..Head::default() };

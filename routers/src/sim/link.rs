@@ -22,6 +22,15 @@ pub struct Quality {
     pub rate_bytes_s: u64,
 }
 
+impl Quality {
+    /// What comes out at all has been on its way for so long at most, ns.
+    pub fn way_ns_max(&self) -> u64 {
+        let way_ns = self.delay_ns + self.jitter_ns;
+        let overtaken_ns = if self.reorder_ppm > 0 { (11 * way_ns).min(WIRE_NS_MAX / 2) } else { 0 };
+        way_ns.max(overtaken_ns) + if self.rate_bytes_s > 0 { WAIT_NS_MAX } else { 0 }
+    }
+}
+
 /// Before a link with a rate a datagram waits so long at most; else it is lost.
 const WAIT_NS_MAX: u64 = WIRE_NS_MAX / 2;
 

@@ -13,6 +13,7 @@ pub mod calls;
 pub mod chance;
 pub mod clock;
 pub mod declared;
+pub mod divided;
 mod faults;
 pub mod host;
 pub mod link;

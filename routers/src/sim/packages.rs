@@ -2,7 +2,7 @@
 
 use super::book::{Promise, Role};
 use super::clock::Now;
-use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
+use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS, TRANSIT_SLOTS};
 use super::plan::{Plan, SYSTEM};
 use super::seals::{PackageSeals, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
@@ -10,6 +10,7 @@ use crate::access::Access;
 use crate::fragment::PARTIAL_MAX;
 use crate::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS, TICK_EVERY_NS};
+use crate::intake::{Intake, Transit};
 use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
@@ -18,7 +19,7 @@ use crate::settings::{NodeSettings, Settings};
 use crate::stats::{Cause, Side, Stats};
 use crate::tdma::Permit;
 use rohrpost_config::{Network, Route, Security};
-use rohrpost_mailbox::{Head, Kind, Options, Type};
+use rohrpost_mailbox::{Head, Kind, Options, Priority, Type};
 use std::collections::VecDeque;
 use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
@@ -134,35 +135,43 @@ impl Packages {
 
     /// Takes all that waits in the transit mailbox.
     fn take_in(&mut self, io: &mut Io<'_>) {
-        while let Some(parcel) = io.host.transit.take() {
-            if io.now.monotonic_ns.saturating_sub(parcel.published_ns) > TRANSIT_AGE_MAX_NS {
-                io.book.saw("too old in the transit mailbox");
-                continue;
-            }
-            io.book.accepted(io.life, parcel.number, parcel.published_ns);
-            io.book.saw("accepted");
-            let to = self.settings.node_of(parcel.head.to);
-            if let (Some(seals), Some(to)) = (&self.seals, to)
-                && !seals.knows(to)
-            {
-                io.book.held(parcel.number);
-            }
-            let alone = io.host.transit.is_empty();
-            self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone);
-            io.book.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
-            self.in_hand = Some(parcel);
-        }
+        while self.take_one(io).is_some() {}
     }
 
-    fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) {
+    /// Takes the most important package from the transit mailbox.
+    fn take_one(&mut self, io: &mut Io<'_>) -> Option<(Head, Accepted)> {
+        let parcel = loop {
+            let parcel = io.host.transit.take()?;
+            if io.now.monotonic_ns.saturating_sub(parcel.published_ns) <= TRANSIT_AGE_MAX_NS {
+                break parcel;
+            }
+            io.book.saw("too old in the transit mailbox");
+        };
+        io.book.accepted(io.life, parcel.number, parcel.published_ns);
+        io.book.saw("accepted");
+        let to = self.settings.node_of(parcel.head.to);
+        if let (Some(seals), Some(to)) = (&self.seals, to)
+            && !seals.knows(to)
+        {
+            io.book.held(parcel.number);
+        }
+        let alone = io.host.transit.is_empty() && io.plan.slots.is_none();
+        let accepted = self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone);
+        io.book.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
+        let head = parcel.head;
+        self.in_hand = Some(parcel);
+        Some((head, accepted))
+    }
+
+    fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) -> Accepted {
         let package = Package { head, published_ns, body };
         let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
-        if let Accepted::Send { to, head } =
-            self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch)
-        {
+        let accepted = self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch);
+        if let Accepted::Send { to, head } = &accepted {
             io.book.saw("sent at once");
-            self.send(io, to, Rc::from([&head, body].concat()));
+            self.send(io, *to, Rc::from([&head[..], body].concat()));
         }
+        accepted
     }
 
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
@@ -269,14 +278,15 @@ impl Packages {
     }
 
     /// With time slots: sends in one what must be said, and then what is most important, as long as it fits.
-    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, permit: &mut Permit) {
+    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, intake: &mut Intake, permit: &mut Permit) {
         let now_ns = io.now.monotonic_ns;
         while let Some(refusal) = self.refusals.pop_front_if(|refusal| permit.fits(now_ns, refusal.bytes.len())) {
             permit.takes(now_ns, refusal.bytes.len());
             io.sent.push(refusal);
         }
-        self.take_in(io);
-        while let Some(room_bytes) = permit.room_bytes(now_ns) {
+        loop {
+            intake.take_on(&mut Hands { packages: self, io });
+            let Some(room_bytes) = permit.room_bytes(now_ns) else { break };
             let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             let Some((to, bytes)) = self.outbound.poll_slot(now_ns, room_bytes, &mut self.buffer, &mut watch) else {
                 break;
@@ -467,6 +477,30 @@ impl Layer for Packages {
     fn close(&mut self, io: &mut Io<'_>) {
         io.book.close_receipts(io.now, io.life);
         self.check_losses(io);
+    }
+}
+
+/// What a package goes through when it is taken from the transit mailbox.
+pub(super) struct Hands<'a, 'b> {
+    pub(super) packages: &'a mut Packages,
+    pub(super) io: &'a mut Io<'b>,
+}
+
+impl Transit for Hands<'_, '_> {
+    fn waits(&mut self) -> (usize, Option<Priority>) {
+        self.io.host.transit.waits()
+    }
+
+    fn slots(&self) -> usize {
+        TRANSIT_SLOTS
+    }
+
+    fn has_queued(&self) -> bool {
+        self.packages.outbound.waits()
+    }
+
+    fn take(&mut self) -> Option<(Head, Accepted)> {
+        self.packages.take_one(self.io)
     }
 }
 

@@ -1,12 +1,12 @@
-//! Networks with time slots: their tables, drawn from a seed, how late their timing threads wake, and when two nodes may not be
-//! blamed for transmitting at once.
+//! Networks with time slots: their tables, drawn from a seed, and how late their timing threads wake.
 
 use super::chance::Chance;
+use super::divided::Divisions;
 use super::host::COMMAND_SLOTS;
 use super::link::Quality;
-use super::plan::{Fault, MS, Plan, Planned, S, US};
+use super::plan::{DRAIN_NS, EPOCH_PAUSE_NS, MS, Plan, RECOVERY_NS, S, US, WELL_NS};
 use crate::frame::NodeIndex;
-use crate::time::{JOINING_SYNCS, TIME_BYTES};
+use crate::time::{JOINING_SYNCS, TIME_BYTES, Term};
 use rohrpost_config::wire::HAND_OVER;
 use rohrpost_config::{Tdma, TimeSlot};
 use std::ops::Range;
@@ -14,10 +14,6 @@ use std::time::Duration;
 
 /// What Ethernet, IPv4 and UDP put around each datagram, bytes.
 pub const AROUND_BYTES: usize = 8 + 14 + 4 + 12 + 20 + 8;
-/// A fault that divides the network for longer than this may leave it with two times: two masters that do not hear each other.
-pub const HOLDOVER_NS: u64 = 100 * MS;
-/// So many cycles after such a fault no two nodes transmit at once any more.
-pub const HEALED_CYCLES: u32 = 16;
 /// A cycle is so long at most.
 const CYCLE_NS_MAX: u64 = 20 * MS;
 /// A master is given so long at least to answer.
@@ -38,8 +34,8 @@ pub struct Slots {
     pub masters: Vec<NodeIndex>,
     /// Wake-ups beyond what the late gate lets through, of a million.
     pub late_ppm: u32,
-    /// When faults divide the network, and until it has healed, true ns.
-    pub divided: Vec<Range<u64>>,
+    /// The faults that divide the network.
+    pub divisions: Divisions,
 }
 
 impl Slots {
@@ -48,11 +44,9 @@ impl Slots {
         takes_ns(bytes + AROUND_BYTES, self.table.link_bytes_s)
     }
 
-    /// Whether two nodes of different terms may transmit at once, whose routers began then: the network has been divided for so long that
-    /// it may have two times, or one of them began to live in a part of it, or does not know better yet than what it hears.
-    pub fn is_excused(&self, true_ns: u64, began_ns: u64) -> bool {
-        let divided = self.divided.iter().find(|range| range.contains(&true_ns));
-        divided.is_some_and(|range| range.start + HOLDOVER_NS <= true_ns || range.contains(&began_ns))
+    /// The master of a term.
+    pub fn master(&self, term: Term) -> Option<usize> {
+        self.masters.get(usize::from(term.rank())).map(|master| usize::from(*master)).filter(|_| !term.is_none())
     }
 
     /// The window of a node in which a moment of system time is, from its beginning to its guard, system ns.
@@ -72,13 +66,22 @@ impl Slots {
     }
 
     /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late nor so often
-    /// that others take over from a master.
-    pub fn late_ns(&self, mended: bool, chance: &mut Chance) -> u64 {
+    /// that others take over from a master: not again before it `has_rested`.
+    pub fn late_ns(&self, mended: bool, has_rested: bool, chance: &mut Chance) -> u64 {
         if chance.per_million(if mended { self.late_ppm.min(LATE_PPM) } else { self.late_ppm }) {
             let late_ns = chance.scale(50 * US, LATE_NS_MAX);
-            return if mended { late_ns.min(self.table.cycle.as_nanos() as u64) } else { late_ns };
+            match mended {
+                false => return late_ns,
+                true if has_rested => return late_ns.min(self.table.cycle.as_nanos() as u64),
+                true => {}
+            }
         }
         if chance.percent(5) { chance.below(45 * US) } else { chance.below(3 * US) }
+    }
+
+    /// A thread that woke too late does so again no sooner than after this, when the faults are over: a master then misses one Sync of four.
+    pub fn rest_ns(&self) -> u64 {
+        4 * self.table.cycle.as_nanos() as u64
     }
 }
 
@@ -101,11 +104,9 @@ impl Plan {
         plan.shape.interval_ns = table.cycle.as_nanos() as u64;
         plan.shape.rate_bytes_s = (0..plan.nodes.len()).map(|node| node_bytes_s(&table, node)).min().unwrap_or(0);
         plan.mended_ns = chance.between(2 * S, 4 * S);
-        plan.slots = Some(Slots { table, masters: plan.masters.clone(), late_ppm: LATE_PPM, divided: Vec::new() });
-        plan.time();
-        // Who joins hears some Syncs before it asks, and so long a master is given to answer.
-        plan.timed_ns += 2 * u64::from(JOINING_SYNCS) * plan.shape.interval_ns + DEAF_NS;
-        plan.end_ns = plan.end_ns.max(plan.timed_ns + S);
+        plan.slots =
+            Some(Slots { table, masters: plan.masters.clone(), late_ppm: LATE_PPM, divisions: Divisions::default() });
+        plan.time_slots();
         plan.draw_all(chance);
         plan.fit_traffic();
         plan.divide();
@@ -120,8 +121,19 @@ impl Plan {
         plan.calls.clear();
         plan.divide();
         plan.mended_ns = S + cycles * plan.shape.interval_ns;
-        plan.time();
+        plan.time_slots();
         plan
+    }
+
+    /// When all must be well, and when it ends. Nobody is let off: the run goes on until who needs an epoch has had it, and then all must be well.
+    fn time_slots(&mut self) {
+        self.time();
+        // Who joins hears some Syncs before it asks, and so long a master is given to answer.
+        let joins_ns = 2 * u64::from(JOINING_SYNCS) * self.shape.interval_ns + DEAF_NS;
+        self.timed_ns += joins_ns;
+        self.stepped_ns = self.timed_ns + EPOCH_PAUSE_NS + joins_ns;
+        self.traffic_end_ns = self.stepped_ns + RECOVERY_NS + WELL_NS;
+        self.end_ns = self.traffic_end_ns + DRAIN_NS;
     }
 
     /// What slots carry well: a large package is through long before it is too old. Commands that wait behind it come all at once: no more
@@ -143,23 +155,11 @@ impl Plan {
         }
     }
 
-    /// When faults divide the network.
+    /// Notes which faults divide the network.
     pub(super) fn divide(&mut self) {
-        let healed_ns = u64::from(HEALED_CYCLES) * self.shape.interval_ns;
-        let divides =
-            |planned: &&Planned| matches!(planned.fault, Fault::Cut { .. } | Fault::Split { .. } | Fault::Bad { .. });
-        let mut faults: Vec<_> =
-            self.faults.iter().filter(divides).map(|planned| planned.from_ns..planned.until_ns + healed_ns).collect();
-        faults.sort_unstable_by_key(|range| range.start);
-        let mut merged: Vec<Range<u64>> = Vec::new();
-        for range in faults {
-            match merged.last_mut().filter(|last| range.start <= last.end) {
-                Some(last) => last.end = last.end.max(range.end),
-                None => merged.push(range),
-            }
-        }
+        let divisions = Divisions::of(self);
         if let Some(slots) = &mut self.slots {
-            slots.divided = merged;
+            slots.divisions = divisions;
         }
     }
 }
@@ -181,7 +181,8 @@ fn table(plan: &Plan, link_bytes_s: u64, chance: &mut Chance) -> Tdma {
     let others = plan.nodes.len() as u64 - 1;
     let datagram_ns = takes_ns(plan.shape.datagram_bytes_max + AROUND_BYTES, link_bytes_s);
     let time_ns = takes_ns(TIME_WIRE_BYTES, link_bytes_s).max(HAND_OVER.as_nanos() as u64);
-    let guard_ns = chance.between(100, 250) * US;
+    // What `check` accepts: over two links a frame of time is on its way for a quarter of the guard at most.
+    let guard_ns = (chance.between(100, 250) * US).max(8 * takes_ns(TIME_WIRE_BYTES, link_bytes_s));
     // For each slave a synchronisation; or a warm-up, too; or a reply, too. Without it replies go in the slots of the master.
     let frames = chance.pick(&[1, 2, 3, 3]) * others;
     let frames_in_slot = others.max(2).max(plan.masters.len() as u64);

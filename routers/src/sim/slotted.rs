@@ -2,13 +2,14 @@
 
 use super::book::Promise;
 use super::clock::Now;
-use super::packages::Packages;
+use super::packages::{Hands, Packages};
 use super::plan::{Plan, RECOVERY_NS};
 use super::station::{Arrived, Io, Layer, PORTS, Port, Sent};
 use super::ticking::{self, Ticking};
+use super::wire::{Basis, Says};
 use crate::frame::{FrameHead, Kind};
-use crate::tdma::{Carries, Discipline, Next, Permit, Planned, Table, Verdict};
-use crate::time::Term;
+use crate::intake::Intake;
+use crate::tdma::{Carries, Discipline, Kind as WindowKind, Next, Permit, Planned, Table, Verdict};
 use std::collections::VecDeque;
 
 /// The thread wakes so long before its call, to spin.
@@ -19,9 +20,12 @@ const AWAITED_MAX: usize = 16;
 /// One life of a router's timing thread.
 pub struct Slotted {
     packages: Packages,
+    intake: Intake,
     time: Ticking,
     discipline: Discipline,
     planned: Option<Planned>,
+    /// Whether it is awake for the planned window.
+    is_open: bool,
     /// Datagrams that left each socket.
     sent: [u64; PORTS],
     /// First datagrams of windows: socket, how many went before, and when they were handed over.
@@ -30,9 +34,29 @@ pub struct Slotted {
 
 impl Slotted {
     /// A life that begins now, of these two.
-    pub fn new(packages: Packages, time: Ticking, table: Table) -> Self {
+    pub fn new(packages: Packages, time: Ticking, table: Table, now: Now) -> Self {
+        let intake = Intake::new(now.monotonic_ns);
         let (time, discipline) = (time.in_slots(&table), Discipline::new(table, SPIN_NS));
-        Self { packages, time, discipline, planned: None, sent: [0; PORTS], firsts: VecDeque::new() }
+        Self {
+            packages,
+            intake,
+            time,
+            discipline,
+            planned: None,
+            is_open: false,
+            sent: [0; PORTS],
+            firsts: VecDeque::new(),
+        }
+    }
+
+    /// Awake for a slot, it takes from the mailbox what that has room for.
+    fn open(&mut self, now_ns: u64) {
+        let Some(planned) = self.planned.filter(|planned| planned.wake_ns <= now_ns && !self.is_open) else { return };
+        self.is_open = true;
+        if let (WindowKind::Slot { .. }, None) = (planned.window.kind, self.discipline.silent()) {
+            let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
+            self.intake.open(now_ns, self.discipline.table().wire().bytes_in(sends_ns));
+        }
     }
 
     /// It is time for a window.
@@ -45,18 +69,19 @@ impl Slotted {
             Verdict::Silent(_) => io.book.saw("window silent"),
             Verdict::Early | Verdict::Idle => {}
         }
+        self.intake.close();
     }
 
     /// Sends what there is, time first.
     fn send(&mut self, io: &mut Io<'_>, mut permit: Permit) {
         let before = io.sent.len();
-        let is_sure = self.is_sure(io);
-        let clock = self.time.clock();
-        let term = if is_sure { clock.reading(io.now.monotonic_ns).term } else { Term::NONE };
-        io.book.wire.goes_by(io.now, io.node, term, clock.reckoning().filter(|_| is_sure), clock.is_beginning());
+        let says = self.says(io);
+        let is_sure = !matches!(says.basis, Basis::Heard { .. });
+        self.watch(io, &says);
+        io.book.wire.goes_by(io.now, io.node, says);
         self.time.poll_in(io, Some(&mut permit));
         if permit.carries == Carries::All {
-            self.packages.poll_in(io, &mut permit);
+            self.packages.poll_in(io, &mut self.intake, &mut permit);
         }
         self.discipline.close(&permit);
         if let Some(first) = io.sent.get(before) {
@@ -77,11 +102,33 @@ impl Slotted {
         }
     }
 
-    /// Whether this node may be off by half of the guard at most, as it says.
-    fn is_sure(&mut self, io: &Io<'_>) -> bool {
-        let now_ns = io.now.monotonic_ns;
-        let allowed_ns = allowance_ns(io.plan);
-        self.time.clock().reckoning().is_some_and(|reckoning| reckoning.bound_ns(now_ns) <= allowed_ns)
+    /// By what this node sends now: by its own time if that may be off by half of the guard at most, as it says; else by what it heard.
+    fn says(&mut self, io: &Io<'_>) -> Says {
+        let (now_ns, allowed_ns) = (io.now.monotonic_ns, allowance_ns(io.plan));
+        let clock = self.time.clock();
+        let own = clock.reckoning().filter(|own| own.bound_ns(now_ns) <= allowed_ns);
+        match own {
+            Some(own) if clock.is_beginning() => {
+                Says { basis: Basis::Begins { since_ns: io.now.true_ns }, term: clock.term(), reckoning: Some(own) }
+            }
+            Some(own) => Says { basis: Basis::Own, term: clock.reading(now_ns).term, reckoning: Some(own) },
+            None => {
+                let reckoning = clock.coarse(now_ns);
+                let is_misled = self.time.is_misled(io.now, allowed_ns);
+                Says { basis: Basis::Heard { is_misled }, term: self.time.told_term(), reckoning }
+            }
+        }
+    }
+
+    /// Whoever sends is off the time of its master by half of the guard at most, whatever it says itself.
+    fn watch(&self, io: &mut Io<'_>, says: &Says) {
+        let Some(reckoning) = says.reckoning else { return };
+        let Some(masters_ns) = io.book.times.of_term_ns(io.now, says.term) else { return };
+        let off_ns = reckoning.system_ns(io.now.monotonic_ns).abs_diff(masters_ns);
+        if off_ns > allowance_ns(io.plan) && says.basis != (Basis::Heard { is_misled: true }) {
+            let text = format!("node {} is {off_ns} ns off the time of its master, and sends: {says:?}", io.node);
+            io.book.broken(io.now, Promise::SilentWhenUnsure, text);
+        }
     }
 }
 
@@ -106,19 +153,25 @@ impl Layer for Slotted {
     }
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
-        let idle_ns = self.packages.tidy(io).min(self.time.poll_in(io, None));
         let now_ns = io.now.monotonic_ns;
+        let left_ns = self.planned.map_or(u64::MAX, |planned| planned.wake_ns.saturating_sub(now_ns));
+        let idle_ns = self.packages.tidy(io).min(self.time.poll_in(io, None));
+        self.intake.relieve(now_ns, &mut Hands { packages: &mut self.packages, io }, || left_ns);
         let until_ns = loop {
             // Once awake for a window, the thread spins until its call.
+            self.open(now_ns);
             match self.planned.filter(|planned| planned.wake_ns <= now_ns) {
-                Some(planned) if now_ns < planned.call_ns => break planned.call_ns,
+                Some(planned) if now_ns < planned.call_ns => {
+                    while self.intake.take_one(&mut Hands { packages: &mut self.packages, io }) {}
+                    break planned.call_ns;
+                }
                 Some(planned) => {
-                    self.planned = None;
+                    (self.planned, self.is_open) = (None, false);
                     self.window(io, &planned);
                 }
                 None => match self.discipline.next(now_ns, self.time.clock()) {
                     Next::Silent { until_ns, .. } => {
-                        self.planned = None;
+                        (self.planned, self.is_open) = (None, false);
                         break until_ns;
                     }
                     Next::Window(planned) => {
@@ -149,6 +202,11 @@ impl Layer for Slotted {
         if waits && io.now.true_ns < io.plan.stepped_ns {
             io.book.saw("waits for an epoch");
             io.book.well_ns = io.book.well_ns.max(io.now.true_ns + RECOVERY_NS);
+        }
+        if io.now.true_ns >= io.plan.stepped_ns
+            && let Some(why) = self.discipline.silent()
+        {
+            io.book.broken(io.now, Promise::Recovery, format!("node {} is silent: {why}", io.node));
         }
         self.time.check(io, well);
         self.packages.check(io, well);

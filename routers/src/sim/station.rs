@@ -127,6 +127,8 @@ pub struct Station {
     pub frozen: u32,
     /// How many faults keep its modules from running.
     pub asleep: u32,
+    /// When its timing thread last went to sleep to wake too late, true ns.
+    pub late_at_ns: u64,
     /// What came in while the router did not run, by port.
     pub sockets: [VecDeque<Arrived>; PORTS],
     /// When it is to be woken, true ns; none: not.
@@ -144,6 +146,7 @@ impl Station {
             down: 0,
             frozen: 0,
             asleep: 0,
+            late_at_ns: 0,
             sockets: Default::default(),
             wake_ns: None,
         }

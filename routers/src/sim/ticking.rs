@@ -9,7 +9,9 @@ use crate::frame::{FrameHead, NodeIndex};
 use crate::security::Acquaintances;
 use crate::tdma::{Permit, Table};
 use crate::time::message::Message;
-use crate::time::{Allowed, Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
+use crate::time::{
+    Allowed, Clock, JOINING_SYNCS, RATE_MAX_PPB, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings,
+};
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -38,6 +40,16 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> TimeSettings {
     }
 }
 
+/// A frame that told the time.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    term: Term,
+    /// How long it was on its way, from where it was handed over, ns.
+    way_ns: u64,
+    /// When it came, true ns.
+    came_ns: u64,
+}
+
 /// One life of a router's time.
 pub struct Ticking {
     clock: Clock,
@@ -45,6 +57,8 @@ pub struct Ticking {
     /// Term and cycle of the Sync that was heard last.
     heard: (Term, u64),
     was_master: bool,
+    /// The last frames that told the time, newest last.
+    told: VecDeque<Told>,
     /// Which datagrams of this layer are to be stamped, by how many went before.
     awaited: VecDeque<(u64, SentId)>,
     sent: u64,
@@ -60,6 +74,7 @@ impl Ticking {
             has_stamps,
             heard: (Term::NONE, 0),
             was_master: false,
+            told: VecDeque::new(),
             awaited: VecDeque::new(),
             sent: 0,
             seals: None,
@@ -111,6 +126,36 @@ impl Ticking {
         }
     }
 
+    /// The term of which this node heard the time last.
+    pub(super) fn told_term(&self) -> Term {
+        self.told.back().map_or(Term::NONE, |told| told.term)
+    }
+
+    /// Whether all of the last frames that told the time were on their way for longer than `way_ns`, with what clocks may have drifted since:
+    /// who asks relies on one that was not.
+    pub(super) fn is_misled(&self, now: Now, way_ns: u64) -> bool {
+        let drifted_ns = |told: &Told| (now.true_ns - told.came_ns) * 2 * RATE_MAX_PPB.unsigned_abs() / S;
+        self.told.iter().all(|told| told.way_ns + drifted_ns(told) > way_ns)
+    }
+
+    fn is_told(&mut self, io: &Io<'_>, arrived: &Arrived, message: &Message) {
+        let (term, sent_ns) = match message {
+            Message::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
+            // Who hears a master does not go by others.
+            Message::Request(hello) if hello.id == 0 && hello.timed && self.clock.role() == Role::Listening => {
+                (hello.term, hello.sent_ns)
+            }
+            _ => return,
+        };
+        let Some(now_ns) = io.book.times.of_term_ns(io.now, term) else { return };
+        let came_ns = arrived.stamp.true_ns;
+        let way_ns = now_ns.saturating_sub(sent_ns).saturating_sub(io.now.true_ns - came_ns);
+        self.told.push_back(Told { term, way_ns, came_ns });
+        if self.told.len() > usize::from(JOINING_SYNCS) {
+            self.told.pop_front();
+        }
+    }
+
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, stamp: Option<SentId>, datagram: &[u8; TIME_BYTES]) {
         let bytes = match &mut self.seals {
             None => Some(Rc::from(&datagram[..])),
@@ -159,7 +204,11 @@ impl Layer for Ticking {
         let taken = self.clock.handle(now_ns, stamp, &head, rest);
         io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));
         io.book.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
-        if let (Ok(()), Ok(Message::Sync(sync))) = (taken, Message::parse(head.kind, rest)) {
+        let message = Message::parse(head.kind, rest);
+        if let (Ok(()), Ok(message)) = (taken, &message) {
+            self.is_told(io, arrived, message);
+        }
+        if let (Ok(()), Ok(Message::Sync(sync))) = (taken, message) {
             self.heard = if sync.replacement { self.heard } else { (sync.term, sync.cycle) };
             if sync.replacement && self.clock.coarse(now_ns) != heard_before {
                 let text = format!("node {} goes by what {} says in the place of the master", io.node, head.from);

@@ -56,6 +56,12 @@ impl Times {
         u64::try_from(off_ns.unsigned_abs()).ok()
     }
 
+    /// What time it is by the master of a term, ns; none if nobody began that.
+    pub fn of_term_ns(&self, now: Now, term: Term) -> Option<u64> {
+        let line = self.lines.get(&term.0)?;
+        Some(line.record.at(self.clocks[line.node].at(now.true_ns).monotonic_ns).ns)
+    }
+
     /// Looks at a node after its layer of time did anything: its reign, and what its page says from now on.
     pub fn look(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
         if core.role() == Role::Master {

@@ -15,15 +15,46 @@ const SLACK_NS: u64 = US;
 /// Transmissions that one which begins now may still meet.
 const RECENT_MAX: usize = 64;
 
+/// By what a node finds its windows.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub enum Basis {
+    /// Time that it has measured, or its own as a master.
+    #[default]
+    Own,
+    /// What it has heard only: it asks what time it is.
+    Heard {
+        /// All that it heard was on its way for too long.
+        is_misled: bool,
+    },
+    /// A time that it began: it only says so.
+    Begins {
+        /// Since when, true ns.
+        since_ns: u64,
+    },
+}
+
+/// By what a node sends, and by whose time.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Says {
+    /// By what it finds its windows.
+    pub basis: Basis,
+    /// The term whose time that is, as far as it knows.
+    pub term: Term,
+    /// The line by which it reckons.
+    pub reckoning: Option<Reckoning>,
+}
+
 /// A datagram that is being transmitted.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmission {
     /// Who does.
     pub node: usize,
-    /// The term whose time it keeps; none: it asks what time it is.
+    /// By what.
+    pub basis: Basis,
+    /// The term whose time it keeps.
     pub term: Term,
-    /// It only says that it began a time.
-    pub begins: bool,
+    /// The master of that term.
+    pub master: Option<usize>,
     /// First and last bit, true ns.
     pub begin_ns: u64,
     /// See `begin_ns`.
@@ -35,16 +66,10 @@ pub struct Transmission {
 pub struct Wire {
     /// When each node's interface is free again, true ns.
     free_ns: Vec<u64>,
-    /// When the router of each began, true ns.
-    began_ns: Vec<u64>,
-    /// The term that each goes by.
-    terms: Vec<Term>,
+    /// By what each sends.
+    says: Vec<Says>,
     /// When somebody first sent by a term, true ns.
     first_ns: BTreeMap<Term, u64>,
-    /// Whether each only says that it began a time.
-    begins: Vec<bool>,
-    /// What each reckons by.
-    reckonings: Vec<Option<Reckoning>>,
     recent: VecDeque<Transmission>,
 }
 
@@ -53,29 +78,25 @@ impl Wire {
     pub fn new(nodes: usize) -> Self {
         Self {
             free_ns: vec![0; nodes],
-            began_ns: vec![0; nodes],
-            terms: vec![Term::NONE; nodes],
+            says: vec![Says::default(); nodes],
             first_ns: BTreeMap::new(),
-            begins: vec![false; nodes],
-            reckonings: vec![None; nodes],
             recent: VecDeque::with_capacity(RECENT_MAX),
         }
     }
 
-    /// The router of a node begins.
-    pub fn begins(&mut self, node: usize, true_ns: u64) {
-        (self.began_ns[node], self.terms[node]) = (true_ns, Term::NONE);
-    }
-
-    /// From now on a node sends by the time of this term; none: by what it has heard only. `begins`: it sends only to say that it began one.
-    pub fn goes_by(&mut self, now: Now, node: usize, term: Term, reckoning: Option<Reckoning>, begins: bool) {
-        self.first_ns.entry(term).or_insert(now.true_ns);
-        (self.terms[node], self.reckonings[node], self.begins[node]) = (term, reckoning, begins);
+    /// From now on a node sends by this. It may have begun a time before.
+    pub fn goes_by(&mut self, now: Now, node: usize, says: Says) {
+        self.first_ns.entry(says.term).or_insert(now.true_ns);
+        let before = self.says[node].basis;
+        let goes_on = matches!((before, says.basis), (Basis::Begins { .. }, Basis::Begins { .. }));
+        self.says[node] = Says { basis: if goes_on { before } else { says.basis }, ..says };
     }
 
     /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its node.
     pub fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 3]) -> Option<String> {
-        let reckoning = self.reckonings[node]?;
+        let Some(reckoning) = self.says[node].reckoning else {
+            return Some(format!("node {node}, {bytes} bytes, by no time"));
+        };
         let [called_ns, begin_ns, end_ns] = local_ns.map(|local_ns| reckoning.system_ns(local_ns));
         let window = slots.window(node, called_ns + LEAD_NS.1);
         let is_well = window.as_ref().is_some_and(|window| {
@@ -101,24 +122,16 @@ impl Wire {
         let begin_ns = at_ns.max(self.free_ns[node]);
         let end_ns = begin_ns + slots.takes_ns(bytes);
         self.free_ns[node] = end_ns;
-        let term = self.terms[node];
-        let own = Transmission { node, term, begins: self.begins[node], begin_ns, end_ns };
-        // Of two that begin a time neither can know of the other before it has heard its first frame.
-        let counts = |other: &&Transmission| other.node != node && !(own.begins && other.begins);
-        let meets = self.recent.iter().filter(counts).find(|other| own.meets(other));
-        if let Some(other) = meets {
-            // Who goes by what it hears relies on links that are as good as they should be.
-            let is_coarse = term.is_none() || other.term.is_none();
-            let began_ns = self.began_ns[node].max(self.began_ns[other.node]);
-            let began_ns = if is_coarse { begin_ns } else { began_ns };
-            let same = term == other.term && !term.is_none();
-            // Of two that begin a time in parts of a divided network neither can ever hear.
-            let first_ns = |term| self.first_ns.get(&term).copied().unwrap_or(0);
-            let elder_ns = first_ns(term).min(first_ns(other.term));
-            if same || !(slots.is_excused(begin_ns, began_ns) || slots.is_excused(begin_ns, elder_ns)) {
-                let text = format!("{own:?} and {other:?} at once");
-                problems.push(Problem { promise: Promise::Exclusive, at_ns: begin_ns, text });
-            }
+        let Says { basis, term, .. } = self.says[node];
+        let master = slots.master(term);
+        let own = Transmission { node, basis, term, master, begin_ns, end_ns };
+        let mut meets = self.recent.iter().filter(|other| other.node != node && own.meets(other));
+        let began_ns = |term| self.first_ns.get(&term).copied().unwrap_or(0);
+        let is_blamed =
+            |other: &&Transmission| !slots.divisions.excuse(&own, other, began_ns(term).min(began_ns(other.term)));
+        if let Some(other) = meets.find(is_blamed) {
+            let text = format!("{own:?} and {other:?} at once");
+            problems.push(Problem { promise: Promise::Exclusive, at_ns: begin_ns, text });
         }
         if self.recent.len() == RECENT_MAX {
             self.recent.pop_front();

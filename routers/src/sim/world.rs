@@ -13,6 +13,7 @@ use super::station::{Arrived, Io, Layer, Port, Router, Sent, Station};
 use super::times::Times;
 use super::trace::Trace;
 use super::wire::{LEAD_NS, Wire};
+use crate::tdma::LATE_NS;
 use rohrpost_mailbox::{Name, TimeRecord, local};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, BinaryHeap};
@@ -27,6 +28,8 @@ pub(super) enum Event {
     Wake { node: usize },
     /// A datagram comes out of a link.
     Arrive { to: usize, arrived: Arrived },
+    /// An old one comes once more; if it is for that life, not to another.
+    Again { to: usize, life: Option<u32>, arrived: Arrived },
     /// The kernel says when a datagram left.
     Left { node: usize, life: u32, port: Port, index: u64 },
     /// A router starts if nothing keeps it down.
@@ -202,6 +205,11 @@ impl<'a> World<'a> {
             // There was another, earlier one.
             Event::Wake { .. } => {}
             Event::Arrive { to, arrived } => self.arrive(to, arrived),
+            Event::Again { to, life, arrived } => {
+                if life.is_none_or(|life| self.living[to] == life) {
+                    self.arrive(to, arrived);
+                }
+            }
             Event::Left { node, life, port, index } => {
                 let stamp = self.now(node);
                 self.with_router(node, life, |router, io| {
@@ -361,7 +369,13 @@ impl<'a> World<'a> {
             // Threads wake a little late, and seldom much.
             None if self.chance.below(500) == 0 => self.chance.below(5 * MS),
             None => self.chance.below(60 * US),
-            Some(slots) => slots.late_ns(self.now_ns >= self.plan.mended_ns, &mut self.chance),
+            Some(slots) => {
+                let station = &mut self.stations[node];
+                let has_rested = self.now_ns >= station.late_at_ns + slots.rest_ns();
+                let late_ns = slots.late_ns(self.now_ns >= self.plan.mended_ns, has_rested, &mut self.chance);
+                station.late_at_ns = if late_ns > LATE_NS { self.now_ns } else { station.late_at_ns };
+                late_ns
+            }
         };
         let at_ns = self.stations[node].clock.when(until_ns, self.now_ns).max(self.now_ns + 1).saturating_add(late_ns);
         self.wake_at(node, at_ns);
@@ -385,7 +399,6 @@ impl<'a> World<'a> {
         self.lives += 1;
         let life = self.lives;
         self.living[node] = life;
-        self.book.wire.begins(node, self.now_ns);
         let now = self.now(node);
         let layers = (self.new_layers)(node, life, now, self.book.times.page(node));
         self.stations[node].router = Some(Router { life, layers, sent: Default::default() });

@@ -173,7 +173,7 @@ impl Discipline {
         let planned = sure.and_then(|(reckoning, carries)| {
             let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
             let window = self.next_window(from_ns, clock, carries);
-            window.and_then(|window| self.plan(window, &reckoning)).ok_or(Silent::NoSlot)
+            window.and_then(|window| self.plan(window, &reckoning, carries)).ok_or(Silent::NoSlot)
         });
         match planned {
             Ok(planned) => Next::Window(planned),
@@ -275,8 +275,10 @@ impl Discipline {
         }
     }
 
-    fn plan(&self, window: Window, reckoning: &Reckoning) -> Option<Planned> {
-        let begin_ns = reckoning.first_ns(window.begin_ns)?;
+    fn plan(&self, window: Window, reckoning: &Reckoning, carries: Carries) -> Option<Planned> {
+        let is_soon = broken!(AsksTooSoon) && carries == Carries::Time;
+        let soon_ns = if is_soon { self.table.allowance_ns() } else { 0 };
+        let begin_ns = reckoning.first_ns(window.begin_ns - soon_ns)?;
         let end_ns = reckoning.last_ns(window.end_ns)?;
         let call_ns = begin_ns.saturating_sub(self.lead.ns());
         Some(Planned { window, wake_ns: call_ns.saturating_sub(self.spin_ns), call_ns, begin_ns, end_ns })
@@ -288,7 +290,7 @@ impl Discipline {
             Err(why) => return Verdict::Silent(why),
         };
         // No such window after an epoch began in another time.
-        let Some(planned) = self.plan(window, &reckoning) else { return Verdict::Late };
+        let Some(planned) = self.plan(window, &reckoning, carries) else { return Verdict::Late };
         if now_ns < planned.call_ns {
             return Verdict::Early;
         }

@@ -14,7 +14,7 @@
 //! # What is assumed
 //! That frames are sent in the order and at the time in which they are handed over, save for the *lead*, which is measured; that
 //! [`Tdma::link_bytes_s`](rohrpost_config::Tdma::link_bytes_s) is true of all links; and of coarse time that the quickest of
-//! the last eight Syncs took no longer than a quarter of the guard.
+//! the last eight Syncs took no longer than half of the guard.
 //!
 //! A bound is about the time of the master that a node follows. For the few cycles in which a new master is measured, some nodes may still go
 //! by the time of the one before: two of them are then as far apart as their bounds and that of the new master together.

@@ -185,7 +185,7 @@ impl Table {
         InSlots {
             warm_ups: self.share.warm_ups,
             replies_in_synchronisation: self.share.replies_in_synchronisation,
-            delay_max_ns: self.guard_ns / 4,
+            delay_max_ns: self.guard_ns / 2,
             allowance_ns: self.allowance_ns(),
         }
     }

@@ -57,20 +57,21 @@ impl Coarse {
         self.syncs[..usize::from(self.count)].iter().max_by_key(|came| came.score(now_ns))
     }
 
-    /// The way is taken to last from nothing to `delay_max_ns`: that is an assumption. What the sender may be off is not in it: who becomes master
+    /// The way is taken to last from nothing to `delay_max_ns`: that is an assumption. So half of it is the best guess, and half how far that
+    /// is off at most. What the sender may be off is not in it: who becomes master
     /// by this makes it the time of all, and a network whose slaves are less sure than that would have none until they fall silent.
     pub(super) fn reckoning(&self, now_ns: u64, delay_max_ns: u64) -> Option<Reckoning> {
         if self.count < JOINING_SYNCS {
             return None;
         }
-        let best = self.best(now_ns)?;
+        let (best, half_ns) = (self.best(now_ns)?, delay_max_ns / 2);
         Some(Reckoning::new(TimeRecord {
             epoch: self.epoch,
             source: TimeSource::Master,
             monotonic_ns: best.local_ns,
-            system_ns: best.system_ns,
+            system_ns: best.system_ns.saturating_add(half_ns),
             pace_ppb: EVEN_PPB,
-            error_ns: delay_max_ns,
+            error_ns: half_ns,
             drift_ns_s: RATE_MAX_PPB.unsigned_abs(),
         }))
     }

@@ -2,6 +2,7 @@
 
 use super::message::{Request, Sync};
 use super::{TAKEOVER_HALF_INTERVALS, Term};
+use crate::broken::broken;
 use crate::frame::NodeIndex;
 
 /// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
@@ -236,12 +237,18 @@ impl Election {
         }
     }
 
-    /// Somebody that hears no master. A master whose term is not the latest begins another, so that all take it for the latest.
+    /// Somebody that hears no master.
     pub(super) fn hello(&mut self, request: &Request, received_ns: u64) {
-        self.speaks_of(request.term, request.epoch);
+        self.is_told(request);
         if request.timed {
             self.timed_heard_ns = Some(received_ns);
         }
+    }
+
+    /// Somebody asks, and says by which term it goes. A master whose term is not the latest begins another, so that all take it for the
+    /// latest.
+    pub(super) fn is_told(&mut self, request: &Request) {
+        self.speaks_of(request.term, request.epoch);
         if let (State::Master(own), Some(rank)) = (self.state, self.rank())
             && request.term > own
         {
@@ -319,6 +326,9 @@ impl Election {
     /// When it is this node's turn. A master that is heard, but answers nobody, hears nobody: it has to be replaced as well.
     fn takeover_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
         self.rank()?;
+        if broken!(BeginsAtOnce) && (origin, self.state) == (Origin::New, State::Listening) {
+            return Some(now_ns);
+        }
         let (since_ns, patience_ns, last) = match self.state {
             State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
             State::Slave(master) => (master.answered_ns, self.silence_ns().max(self.deaf_ns), Some(master.node)),

@@ -66,7 +66,7 @@ impl Module for RouterModule {
         if let Some(impair) = impair {
             tracing::warn!("makes the network worse, as {} says: {impair}", impair::ENVIRONMENT);
         }
-        let faults = Arc::new(faults::Encoded::of(&installation));
+        let faults = Arc::new(faults::Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
         let (name, socket) = (context.me(), kept());

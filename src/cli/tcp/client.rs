@@ -56,7 +56,7 @@ impl Module for ClientModule {
             settings,
             hosts: installation.names_on(&node_name),
             beyond: installation.names_beyond(&node_name),
-            faults: Arc::new(Encoded::of(&installation)),
+            faults: Arc::new(Encoded::of(installation)),
             access: Access::new(&installation.access),
             seal,
         })?;

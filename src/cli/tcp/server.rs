@@ -45,7 +45,7 @@ impl Module for ServerModule {
             levels: levels(tcp),
         };
         let address = tcp.address;
-        let faults = Arc::new(Encoded::of(&installation));
+        let faults = Arc::new(Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
         let shell = ServerShell::start(ServerParts { address, settings, faults, seal, node: &node })?;
         context.set_period(PERIOD);

@@ -1,127 +1,82 @@
-//! What the thread of the time slots takes from the router's mailbox, and when.
-//!
-//! ```text
-//!  between slots                             shortly before the call              in the slot, a few before each datagram
-//!  all stays in the mailbox; if that has     as much as the slot has room for,    what still has room, or is more important
-//!  more than half of its slots full: ─▶      the most important first: ─▶         than what was taken, or too much: ─▶   queue
-//! ```
-//!
-//! The mailbox outlives a router that is killed, the queue does not: so what waits for a slot waits in the mailbox. A flood is taken out of it,
-//! since quotas hold in the queue. So is all, if no slot came for long: what cannot leave must be told so to its sender.
+//! The router's mailbox in the hands of the thread of the time slots: [`intake`](crate::intake) says what to take when.
 
+use crate::intake::{self, Transit};
 use crate::outbound::{Accepted, Outbound, Package};
 use crate::report::Report;
-use rohrpost_mailbox::{HEAD_BYTES, Head, Kind, Priority, Receiver, monotonic_ns};
-
-/// If no slot came for so long, what waits is taken: whether its peer is there, and whether it is too old, is found in the queue. A third of
-/// the time after which packages are dropped.
-const UNTAKEN_NS_MAX: u64 = crate::outbound::WAIT_MAX_NS / 3;
-/// Packages taken at a time: all that the mailbox may hold.
-const BURST: usize = 64;
-/// Before each datagram of a slot at most so many, since it is to be handed over at once: the rest has its turn before the next. Bounds
-/// count on one only, for they give each package a datagram of its own.
-const FEW: usize = 4;
-/// Nothing more is taken between slots with less than this until the thread has to wake up: to take one lasts for some ten microseconds.
-const LEFT_NS_MIN: u64 = 50_000;
+use rohrpost_mailbox::{Head, Priority, Receiver, monotonic_ns};
 
 /// The router's mailbox, and what the coming slot still wants of it.
 pub(super) struct Intake {
     transit: Receiver,
-    /// What was taken for the slot leaves room for so many bytes.
-    room_bytes: usize,
-    /// The least important of what was taken for the slot.
-    least: Priority,
-    /// When there was a slot, or all was taken, ns.
-    taken_ns: u64,
+    wants: intake::Intake,
 }
 
 impl Intake {
     pub(super) fn new(transit: Receiver) -> Self {
-        Self { transit, room_bytes: 0, least: Priority(u8::MAX), taken_ns: monotonic_ns() }
+        Self { transit, wants: intake::Intake::new(monotonic_ns()) }
     }
 
     /// A slot comes that carries at most so many bytes.
     pub(super) fn open(&mut self, room_bytes: usize) {
-        (self.room_bytes, self.least, self.taken_ns) = (room_bytes, Priority(u8::MAX), monotonic_ns());
+        self.wants.open(monotonic_ns(), room_bytes);
     }
 
-    /// It is over: what waits now waits for the next.
+    /// It is over.
     pub(super) fn close(&mut self) {
-        (self.room_bytes, self.least) = (0, Priority(u8::MAX));
+        self.wants.close();
     }
 
-    /// Before the call: takes the next package, if the slot wants it.
+    /// Before the call.
     pub(super) fn take_one(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
-        if self.room_bytes > 0 || self.outranks() {
-            self.take(outbound, report);
-        }
+        self.wants.take_one(&mut Hands { transit: &mut self.transit, outbound, report });
     }
 
-    /// In the slot, before each datagram: takes a few, and more only while there is nothing to send.
+    /// In the slot, before each datagram.
     pub(super) fn take_on(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
-        for taken in 0..BURST {
-            let has_enough = taken >= FEW && outbound.waits();
-            let wants = self.room_bytes > 0 || self.outranks() || self.is_full();
-            if has_enough || !wants || !self.take(outbound, report) {
-                return;
-            }
-        }
+        self.wants.take_on(&mut Hands { transit: &mut self.transit, outbound, report });
     }
 
-    /// Between slots: takes all if it is much, or if there was no slot for long. `left_ns` says how long it may last.
-    pub(super) fn relieve(
-        &mut self,
-        outbound: &mut Outbound,
-        report: &mut impl Report,
-        mut left_ns: impl FnMut() -> u64,
-    ) {
-        let now_ns = monotonic_ns();
-        if self.is_full() || now_ns.saturating_sub(self.taken_ns) > UNTAKEN_NS_MAX {
-            self.taken_ns = now_ns;
-            let mut taken = 0;
-            while taken < BURST && left_ns() > LEFT_NS_MIN && self.take(outbound, report) {
-                taken += 1;
-            }
-        }
-    }
-
-    /// Whether the mailbox may have no room for a burst soon.
-    fn is_full(&mut self) -> bool {
-        2 * self.transit.waits().0 > usize::from(self.transit.shape().slots)
-    }
-
-    /// Whether something waits that is more important than what was taken.
-    fn outranks(&mut self) -> bool {
-        self.transit.waits().1.is_some_and(|first| first.outranks(self.least))
-    }
-
-    /// Takes the most important package; whether there was one.
-    fn take(&mut self, outbound: &mut Outbound, report: &mut impl Report) -> bool {
-        let Some(waiting) = self.transit.try_receive() else { return false };
-        let head = *waiting.head();
-        let package = Package { head, published_ns: waiting.published_ns(), body: waiting.body() };
-        let accepted = outbound.accept(monotonic_ns(), &package, false, report);
-        drop(waiting);
-        // What is lost takes no room; and who hurries more than it may stands further behind in the queue.
-        if accepted == Accepted::Waits && !hurries(&head) {
-            self.room_bytes = self.room_bytes.saturating_sub(HEAD_BYTES + usize::from(head.len));
-            self.least = self.least.at_most(head.priority);
-        }
-        true
+    /// Between slots. `left_ns` says how long it may last.
+    pub(super) fn relieve(&mut self, outbound: &mut Outbound, report: &mut impl Report, left_ns: impl FnMut() -> u64) {
+        self.wants.relieve(monotonic_ns(), &mut Hands { transit: &mut self.transit, outbound, report }, left_ns);
     }
 }
 
-/// Whether a package stands further ahead in the mailbox than its sender may have it in the queue, see [`Outbound::accept`].
-fn hurries(head: &Head) -> bool {
-    matches!(head.kind.kind(), Kind::Command(_)) && head.priority.outranks(head.from.class().priority())
+/// What a package goes through when it is taken.
+struct Hands<'a, R> {
+    transit: &'a mut Receiver,
+    outbound: &'a mut Outbound,
+    report: &'a mut R,
+}
+
+impl<R: Report> Transit for Hands<'_, R> {
+    fn waits(&mut self) -> (usize, Option<Priority>) {
+        self.transit.waits()
+    }
+
+    fn slots(&self) -> usize {
+        self.transit.shape().slots.into()
+    }
+
+    fn has_queued(&self) -> bool {
+        self.outbound.waits()
+    }
+
+    fn take(&mut self) -> Option<(Head, Accepted)> {
+        let waiting = self.transit.try_receive()?;
+        let head = *waiting.head();
+        let package = Package { head, published_ns: waiting.published_ns(), body: waiting.body() };
+        Some((head, self.outbound.accept(monotonic_ns(), &package, false, self.report)))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::harness::{End, S, module};
+    use crate::intake::{FEW, LEFT_NS_MIN, UNTAKEN_NS_MAX};
     use crate::stats::Cause;
-    use rohrpost_mailbox::{Label, Name, Node, Participant, Sender, Shape, Type};
+    use rohrpost_mailbox::{HEAD_BYTES, Label, Name, Node, Participant, Sender, Shape, Type};
 
     /// A package of this body takes 50 bytes of a slot.
     const BODY: [u8; 50 - HEAD_BYTES] = [7; 50 - HEAD_BYTES];
@@ -259,7 +214,7 @@ mod tests {
         ground.data(&[50]);
         ground.between_slots();
         assert_eq!(ground.waiting(), (1, 9));
-        ground.intake.taken_ns -= UNTAKEN_NS_MAX;
+        ground.intake.wants = intake::Intake::new(monotonic_ns() - UNTAKEN_NS_MAX);
         ground.between_slots();
         assert_eq!(ground.waiting(), (0, 10), "no slot came for long");
     }

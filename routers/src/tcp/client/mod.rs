@@ -146,10 +146,6 @@ impl Drop for ClientShell {
     }
 }
 
-                Ways::new(&participant, Reach::Here),
-                Desk::new(faults, format!("beyond the TCP router at {server}")),
-                access,
-            ),
 struct Connection {
     stream: Stream,
     watch: Watch,

@@ -1,6 +1,7 @@
 //! A clock as a master: it says what time it is, and when the frames left and came; others ask.
 
 use super::{Clock, Draft, Left, Slave};
+use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::election::{Origin, State};
 use crate::time::line::EVEN_PPB;
@@ -24,16 +25,19 @@ impl Clock {
             }
             return Ok(());
         }
-        let State::Master(own) = self.election.state() else { return Err(Ignored::Unasked) };
-        let slave = &mut self.slaves[usize::from(from)];
-        if !slave.syncs.iter().any(|left| left.id == request.id) {
+        let is_asked = self.slaves[usize::from(from)].syncs.iter().any(|left| left.id == request.id);
+        if !is_asked || !matches!(self.election.state(), State::Master(_)) {
             return Err(Ignored::Unasked);
         }
+        // It may come from a part of the network that had a later term, and a time that it must not go back from.
+        self.election.is_told(request);
+        self.keep_term();
+        let slave = &mut self.slaves[usize::from(from)];
         if slave.answered_ns.is_none() || (request.eager && !slave.eager) {
             slave.next_ns = 0;
         }
         (slave.answered_ns, slave.eager) = (Some(received.ns), request.eager);
-        if request.far && request.term.round() <= own.round() {
+        if request.far && !broken!(NeverBeginsEpoch) {
             self.begin_epoch(received.ns, request.epoch);
         }
         let reply = Draft::Reply { id: request.id, came: received };

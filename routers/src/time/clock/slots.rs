@@ -166,7 +166,7 @@ impl Clock {
             let is_master = self.is_master();
             let slots = self.slots.as_mut()?;
             (slots.synced_cycle, slots.next, slots.is_warm) = (cycle, 0, false);
-            slots.beginning = slots.beginning.saturating_sub(1);
+            slots.beginning = slots.beginning.saturating_sub(u8::from(!broken!(BeginsForEver)));
             *(if is_master { &mut slots.counts.sent } else { &mut slots.counts.replacements_sent }) += 1;
         }
         let is_master = self.is_master();
@@ -301,6 +301,9 @@ impl Clock {
         let slots = self.slots.as_ref().filter(|slots| !slots.unsure && self.line.is_synchronised())?;
         let record = *self.line.record();
         let error_ns = record.error_ns.saturating_sub(slots.master_error_ns);
+        if broken!(TrustsItself) {
+            return Some(Reckoning::new(TimeRecord { error_ns: 0, drift_ns_s: 0, ..record }));
+        }
         Some(Reckoning::new(TimeRecord { error_ns, ..record }))
     }
 

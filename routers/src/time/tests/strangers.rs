@@ -144,3 +144,26 @@ fn a_reply_to_another_question_changes_nothing() {
     assert!(!tell(10_500_000, Message::Request(Request { id: 3, ..Request::default() })), "it is no master");
     assert_eq!(MESSAGE_BYTES, 72);
 }
+
+#[test]
+fn who_is_too_far_off_gets_an_epoch_though_it_followed_a_later_term() {
+    let mut clock = Clock::new(settings(), 0, 0, None);
+    let mut datagram = [0; TIME_BYTES];
+    // It hears nobody, and becomes master.
+    let syncs = (1..100).map(|n| n * 10_000_000).find_map(|now_ns| {
+        while let Step::Send { to, .. } = clock.poll(now_ns, &mut datagram) {
+            let (head, rest) = FrameHead::parse(&datagram).unwrap();
+            if let (2, Ok(Message::Sync(sync))) = (to, Message::parse(head.kind, rest)) {
+                return Some((now_ns, sync));
+            }
+        }
+        None
+    });
+    let (now_ns, sync) = syncs.unwrap();
+    let later = Term::new(sync.term.round() + 3, 0);
+    let request = Request { id: sync.id, epoch: sync.epoch, term: later, far: true, ..Request::default() };
+    let message = Message::Request(request);
+    clock.handle(now_ns, Stamp::by_us(now_ns), &head(message.kind(), 2), &message.to_bytes()).unwrap();
+    assert!(clock.term() > later, "all take it for the latest");
+    assert_eq!(clock.record().epoch, sync.epoch + 1);
+}
