@@ -10,7 +10,7 @@ use super::ways::Ways;
 use crate::frame::NodeIndex;
 use crate::inbound::{Came, Datagram, Inbound, Output, SOCKET_MAX_NS};
 use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::security::{Acquaintances, Gate, Said};
+use crate::security::{Acquaintances, Gate, HELLO_DATAGRAM_BYTES, Said};
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
@@ -21,6 +21,8 @@ use std::time::Duration;
 
 /// Room for the largest that UDP carries.
 const DATAGRAM_BYTES: usize = 1 << 16;
+
+const _: () = assert!(HELLO_DATAGRAM_BYTES <= REFUSAL_BYTES, "a hello leaves as a refusal does");
 
 /// The other thread is rung this often at most.
 const RING_EVERY_NS: u64 = 20_000_000;

@@ -1,6 +1,7 @@
 //! The gate asks as often as it must, and no more often.
 
 use super::*;
+use crate::frame::BadFrame;
 use crate::harness::{End, MS, START, address};
 use crate::inbound::Came;
 use crate::report::Event;
@@ -43,7 +44,7 @@ fn who_is_not_known_is_asked_again_and_again_and_who_speaks_of_another_life_soon
     let (mut a, mut b) = (Router::new(0), Router::new(1));
     let asked = a.ask(START);
     assert_eq!(asked.iter().map(|(to, _)| *to).collect::<Vec<_>>(), [1, 2]);
-    assert_eq!(a.ask(START + ASK_EVERY_NS - MS), []);
+    assert_eq!(a.ask(START + ASK_EVERY_NS / 2), []);
     assert_eq!(a.ask(START + ASK_EVERY_NS).len(), 2, "nobody has answered");
     let answer = b.take(START, 0, &asked[0].1).unwrap();
     let last = a.take(START, 1, &answer).unwrap();
@@ -63,4 +64,18 @@ fn who_is_not_known_is_asked_again_and_again_and_who_speaks_of_another_life_soon
     assert_eq!(again.ask(now_ns + 20 * MS).len(), 1, "sooner than who says nothing");
     let told = again.end.log.events.iter().filter(|event| matches!(event, Event::Rejected { .. })).count();
     assert_eq!(told, 1);
+}
+
+#[test]
+fn another_wire_format_is_told_by_who_gets_it_and_changes_nothing() {
+    let (mut a, mut b) = (Router::new(0), Router::new(1));
+    let (_, mut question) = a.ask(START).swap_remove(0);
+    question[2] = 2;
+    crate::frame::write_check(&mut question);
+    assert_eq!(b.take(START, 0, &question), None);
+    let told =
+        Event::Rejected { source: address(0), peer: Some(0), why: NotOpened::Bad(BadFrame::Version(2)), datagrams: 1 };
+    assert_eq!(b.end.log.events, [told]);
+    assert_eq!(b.all.rejections(Port::Packages).of(Some(0), Rejection::Version), 1);
+    assert_eq!(b.all.known(), 0);
 }
