@@ -119,7 +119,7 @@ fn certificates(section: &Section<'_>, is_sealed: Option<bool>) -> Option<PathBu
         (Some(item), true) => item.text("certificates").map(PathBuf::from),
         (None, true) => {
             section.report(format!(
-                "`certificates` is missing; write for example `{EXAMPLE}`, the folder that `rohrpost certificates` fills"
+                "`certificates` is missing; write for example `{EXAMPLE}`, the folder that `rohrpost certify` fills"
             ));
             None
         }

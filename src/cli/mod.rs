@@ -3,7 +3,7 @@
 mod bench;
 mod bw;
 mod call;
-mod certificates;
+mod certify;
 mod check;
 mod clean;
 mod completions;
@@ -118,8 +118,8 @@ enum Command {
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
-    /// Make the certificates by which the TCP router and its clients know each other.
-    Certificates(certificates::Arguments),
+    /// Make the certificates of the TCP router and its clients.
+    Certify(certify::Arguments),
     /// Print versions, of this program and of what nodes share.
     Version(version::Arguments),
     /// Run a built-in module by hand.
@@ -165,7 +165,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Keys(arguments) => keys::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
-        Command::Certificates(arguments) => certificates::run(&arguments),
+        Command::Certify(arguments) => certify::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Router(arguments) => router::run(arguments),

@@ -70,7 +70,7 @@ impl Systems {
         let mut systems = Self::new(security)?;
         if security == SEALED {
             for node in SYSTEMS {
-                systems.place.say(&["certificates", systems.config(node).to_str().unwrap()]).ok();
+                systems.place.say(&["certify", systems.config(node).to_str().unwrap()]).ok();
             }
         }
         SYSTEMS.into_iter().for_each(|node| systems.launch(node));
@@ -154,10 +154,12 @@ impl Systems {
 
 fn configured(node: &str, id: u8, security: &str) -> String {
     let (server, address) = (if id == 1 { "server = \"north\"\n" } else { "" }, NODES[0].1);
+    // South's module follows north's.
+    let hears = if id == 2 { ", hears = \"1.probe.0.0\"" } else { "" };
     format!(
         "installation = \"test\"\n[system]\nname = \"{node}\"\nid = {id}\n{CLASSES}[nodes.{node}]\n[tcp]\n{security}\naddress = \"{address}\"\n\
          {server}{}",
-        probe("probe.0", "rate-hz = 20.0", "")
+        probe("probe.0", &format!("rate-hz = 20.0{hears}"), "")
     )
 }
 
@@ -166,6 +168,8 @@ fn check_crossing(systems: &Systems) {
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "1"]).ok(), "1\n");
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "2"]).ok(), "2\n", "by another tool");
     assert_eq!(systems.says("south", &["call", "1.probe.0.0", "count", "3"]).ok(), "1\n", "the other way");
+    let hears = || systems.place.record().iter().any(|line| line.starts_with("probe.0 each "));
+    wait("beats of the other system's module", || hears().then_some(()));
     let data = systems.says("north", &["echo", "2.probe.0.0", "beat", "--count", "3"]).ok();
     assert_eq!(data.lines().count(), 3, "{data}");
     let word = "x".repeat(900);
@@ -226,7 +230,7 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     let config = systems.config("south");
     let text = std::fs::read_to_string(&config).unwrap();
     std::fs::write(&config, text.replace("\"certificates\"", "\"others\"")).unwrap();
-    systems.place.say(&["certificates", config.to_str().unwrap()]).ok();
+    systems.place.say(&["certify", config.to_str().unwrap()]).ok();
     systems.launch("south");
     let why = wait("why it takes no part", || {
         let why = systems.client("south")["why"].as_str().map(str::to_owned);
@@ -260,7 +264,7 @@ fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
     let Some(systems) = Systems::launched(SEALED) else { return };
     let file = systems.place.path("python.toml");
     std::fs::write(&file, configured("python", 5, SEALED)).unwrap();
-    systems.place.say(&["certificates", file.to_str().unwrap()]).ok();
+    systems.place.say(&["certify", file.to_str().unwrap()]).ok();
     check_foreign(&systems, 5, "big", &["certificates", "python.system-5"]);
     systems.stop();
 }

@@ -240,13 +240,16 @@ impl Context {
     }
 
     fn named(&self, module: &str, wanted: &'static str) -> Result<Name, ContextError> {
-        let name = self.installation.classes.parse_module(module)?;
+        let classes = &self.installation.classes;
+        // What is beyond the LAN has a name of four parts, and stands in another configuration.
+        let is_beyond = self.installation.tcp.is_some() && module.split('.').count() == 4;
+        let name = if is_beyond { classes.parse_name(module)?.module() } else { classes.parse_module(module)? };
         let class = self.installation.classes.name(name.class()).unwrap_or_default();
         if class != wanted {
             return Err(ContextError::Class { module: module.into(), class: class.into(), wanted });
         }
         // The configuration counts on `calls`: who calls how many decides how many slots a mailbox needs.
-        let declared = self.installation.module(self.me).is_none_or(|me| me.calls.contains(&name));
+        let declared = is_beyond || self.installation.module(self.me).is_none_or(|me| me.calls.contains(&name));
         if !declared {
             tracing::warn!(
                 "it calls {module}, which its `calls` does not name; add it, so that `check` can count on it"

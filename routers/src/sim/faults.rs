@@ -76,7 +76,7 @@ impl World<'_> {
                     let bytes = if alters { altered(&arrived.bytes, &mut self.chance) } else { arrived.bytes.clone() };
                     let arrived = Arrived { bytes, ..arrived };
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
-                    let life = (to == whose).then_some(life);
+                    let life = (to == whose && !self.plan.sealed).then_some(life);
                     self.at(at_ns, Event::Again { to, life, arrived });
                 }
             }

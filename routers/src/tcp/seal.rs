@@ -68,10 +68,10 @@ impl Holder {
 #[derive(Debug, thiserror::Error)]
 pub enum SealError {
     /// A file is not there, or holds something else.
-    #[error("{0}: {1}; `rohrpost certificates` makes it")]
+    #[error("{0}: {1}; `rohrpost certify` makes it")]
     File(PathBuf, String),
     /// They do not belong together.
-    #[error("the certificates in {0} do not fit together: {1}; `rohrpost certificates` makes new ones")]
+    #[error("the certificates in {0} do not fit together: {1}; `rohrpost certify` makes new ones")]
     Unfit(PathBuf, String),
 }
 
@@ -219,7 +219,7 @@ impl Sealed {
 
 /// Why there is no sealed connection, and what would be right.
 fn words(error: &Error) -> String {
-    const NEW: &str = "make new ones with `rohrpost certificates`";
+    const NEW: &str = "make new ones with `rohrpost certify`";
     const FOREIGN: &str =
         "another authority has signed it than `ca.pem` here: use the certificates of one installation at both ends";
     match error {

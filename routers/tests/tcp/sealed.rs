@@ -148,5 +148,5 @@ fn files_that_are_not_there_are_named() {
         matches!(&error, SealError::File(path, _) if path.ends_with("base.system-4.pem") || path.ends_with("base.system-4.key")),
         "{error}"
     );
-    assert!(error.to_string().contains("`rohrpost certificates`"), "{error}");
+    assert!(error.to_string().contains("`rohrpost certify`"), "{error}");
 }

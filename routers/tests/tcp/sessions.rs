@@ -143,7 +143,7 @@ fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
         }
         (last > Some(number.saturating_sub(20))).then_some(())
     });
-    assert!(one.client.link().connections >= 5);
+    wait("a connection to each life", || (one.client.link().connections >= 5).then_some(()));
 }
 
 #[test]
@@ -232,12 +232,12 @@ fn what_is_for_all_systems_comes_once_to_each() {
     let mut to_all = systems[0].sender(ALL_SYSTEMS);
     let mut to_each = [1, 2, 3].map(|id| systems[0].sender(id));
     systems[0].say(&mut to_all, 7);
-    // What comes behind it shows that nothing else does.
+    // What is sent behind it shows that nothing else comes. In its own system that goes another way, and may be quicker.
     to_each.iter_mut().for_each(|sender| systems[0].say(sender, 8));
-    for (system, is_own) in systems.iter_mut().zip([true, false, false]) {
+    for system in &mut systems {
         let mut heard = [system.hear_within("one for all"), system.hear_within("one for each")];
-        // On the own node that for each goes straight there, and overtakes what goes by the client.
-        heard[..if is_own { 2 } else { 0 }].sort_unstable();
-        assert_eq!((heard, system.hear()), ([7, 8], None));
+        heard.sort_unstable();
+        assert_eq!(heard, [7, 8]);
+        assert_eq!(system.hear(), None);
     }
 }

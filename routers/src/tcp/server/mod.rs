@@ -266,8 +266,7 @@ impl Work {
             Moved::Over(_) => self.broke(client),
             Moved::Nothing => drop(self.flush(client)),
             Moved::Bytes(_) if is_new && !self.is_known(client) => {
-                let error =
-                    io::Error::other("its certificate names no node; make new ones with `rohrpost certificates`");
+                let error = io::Error::other("its certificate names no node; make new ones with `rohrpost certify`");
                 self.unsealed(client, &error);
             }
             Moved::Bytes(bytes) => {

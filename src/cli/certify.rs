@@ -1,4 +1,4 @@
-//! `rohrpost certificates`: makes what the TCP router and the nodes of a system show each other, so that sessions are sealed and everyone is who he
+//! `rohrpost certify`: makes what the TCP router and the nodes of a system show each other, so that sessions are sealed and everyone is who he
 //! says.
 
 use super::check::load;
@@ -24,7 +24,7 @@ const AUTHORITY_DAYS: u32 = 3650;
 const BEFORE: Duration = DAY;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: rohrpost certificates robot.toml
+#[command(after_help = "Example: rohrpost certify robot.toml
 The first time it makes the authority of the installation, `ca.pem` and `ca.key`, in the folder that `certificates` of [tcp] names, and each time new \
 certificates of all nodes of the file, and of the TCP router if one of them runs it. For another system of the installation, let its configuration name \
 the same folder, or put both files into its own first. A node needs `ca.pem` and its own two files; whoever has `ca.key` can make more, so keep it off \
