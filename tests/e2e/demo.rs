@@ -86,7 +86,7 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
     assert_eq!(rows.len(), 11, "all of config/demo-tdma.toml: {flows}");
     for row in rows {
         let columns: Vec<_> = row.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
-        let [flow, _, packages, bound, slowest, _, within, ..] = columns[..] else { panic!("{row}") };
+        let [flow, _, packages, bound, _, slowest, _, within, ..] = columns[..] else { panic!("{row}") };
         assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
         assert!(flow != "laser.0 → pilot.0" || ["10.00 ms", "900.00 ms"].contains(&within), "{row}");
     }
