@@ -39,12 +39,12 @@ pub use socket::{SocketError, listen};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
-use crate::security::{self, Acquaintances, KeyRing, NoRandom, Port, Rejections, Sealing, Who};
+use crate::security::{self, Acquaintances, Gate, KeyRing, NoRandom, Port, Rejections, Sealing, Who};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{Discipline, Table};
 use answers::Answers;
-use arrivals::{Arrivals, Desk, Guard};
+use arrivals::{Arrivals, Desk};
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
 use departures::{Departures, Wire};
 use news::News;
@@ -147,7 +147,7 @@ impl Shell {
         if parts.settings.is_sealed() != keys.is_some() {
             return Err(ShellError::Keys);
         }
-        let seed = security::random()?;
+        let seed = keys.as_ref().map(|_| security::random()).transpose()?;
         let Parts { node, name, mut settings, faults, socket, impair, clock } = parts;
         let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
         if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
@@ -204,7 +204,7 @@ impl Shell {
             },
             settings: settings.clone(),
             stats: stats.clone(),
-            guard: all.as_ref().map(|all| Guard::new(all, seed)),
+            guard: all.as_ref().zip(seed).map(|(all, seed)| Gate::new(all, seed)),
             refusals: None,
         };
         // From here on, whatever fails ends what has begun.

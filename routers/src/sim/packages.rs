@@ -218,6 +218,7 @@ impl Packages {
         if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
             self.refusals.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(&reply[..said.bytes]) });
         }
+        seals.gate.begin(now_ns);
         if bytes.len() < HEAD_BYTES + TAG_BYTES { arrived.bytes.clone() } else { opened(&bytes) }
     }
 

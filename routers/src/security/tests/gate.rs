@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::frame::BadFrame;
-use crate::harness::{End, MS, START, address};
+use crate::harness::{End, MS, S, START, address};
 use crate::inbound::Came;
 use crate::report::Event;
 use rohrpost_config::Security;
@@ -35,7 +35,9 @@ impl Router {
         let came = Came { source: address(from), arrived_ns: now_ns, bytes: bytes.len() };
         let Self { gate, end: End { inbound, log, .. }, .. } = self;
         let said = gate.take(now_ns, &came, &mut bytes, inbound, log, &mut reply);
-        said.map(|said| reply[..said.bytes].to_vec())
+        let reply = said.map(|said| reply[..said.bytes].to_vec());
+        gate.begin(now_ns);
+        reply
     }
 }
 
@@ -78,4 +80,31 @@ fn another_wire_format_is_told_by_who_gets_it_and_changes_nothing() {
     assert_eq!(b.end.log.events, [told]);
     assert_eq!(b.all.rejections(Port::Packages).of(Some(0), Rejection::Version), 1);
     assert_eq!(b.all.known(), 0);
+}
+
+#[test]
+fn who_is_asked_again_after_long_can_answer() {
+    let (mut a, mut b) = (Router::new(0), Router::new(1));
+    a.ask(START);
+    let late_ns = START + 50 * CHALLENGE_MAX_NS;
+    let question = a.ask(late_ns)[0].1.clone();
+    let answer = b.take(late_ns, 0, &question).unwrap();
+    assert!(a.take(late_ns + CHALLENGE_MAX_NS - 1, 1, &answer).is_some());
+    assert_eq!(a.all.known(), 0b10);
+}
+
+#[test]
+fn who_is_away_for_long_is_asked_seldom() {
+    let mut a = Router::new(0);
+    let mut asked_in = |seconds: std::ops::Range<u64>| {
+        let mut times_ns = (seconds.start * S..seconds.end * S).step_by((10 * MS) as usize);
+        let mut asked = 0;
+        times_ns.by_ref().for_each(|ns| asked += a.ask(START + ns).len());
+        asked / 2
+    };
+    let first = asked_in(0..5);
+    assert!((20..=50).contains(&first), "{first}");
+    asked_in(5..12);
+    let later = asked_in(12..32);
+    assert!((10..=20).contains(&later), "{later}");
 }
