@@ -78,8 +78,20 @@ impl Gate {
         deliver: &mut impl Deliver,
         reply: &mut [u8],
     ) -> Option<Said> {
+        if datagram.len() > inbound.sealed_bytes_max() {
+            let why = Rejection::NotOurs;
+            self.reject(now_ns, came, why, why.into(), inbound, deliver);
+            return None;
+        }
         match self.opening.open(datagram) {
-            Ok(Opened::Frame(head, text)) => inbound.handle_opened(now_ns, came, (&head, text), deliver),
+            // Right, but brought by someone else: that says nothing of the node whose address it has.
+            Ok(Opened::Frame(head, _) | Opened::Hello(head, _)) if !inbound.is_address_of(head.from, came.source) => {
+                let why = Rejection::Address;
+                self.reject(now_ns, came, why, why.into(), inbound, deliver);
+            }
+            Ok(Opened::Frame(head, text)) => {
+                inbound.handle_opened(now_ns, came, (&head, text, self.opening.first(head.from)), deliver);
+            }
             Ok(Opened::Hello(head, greeting)) => {
                 if inbound.may_greet(now_ns, came.source, &head, deliver) {
                     let greeted = self.greeter.greet(now_ns, &head, &greeting, reply);

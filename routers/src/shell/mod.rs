@@ -135,11 +135,17 @@ impl Shell {
         Self::start_with(parts, None)
     }
 
-    /// The same of a router that seals what it sends, and takes only what is sealed. The incarnation in its settings is random.
+    /// The same of a router that seals what it sends, and takes only what is sealed. In place of the incarnation in its settings it draws one:
+    /// two lives with one incarnation would have one key.
     ///
     /// # Errors
     /// [`ShellError`]
-    pub fn start_sealed(parts: Parts<'_>, keys: KeyRing) -> Result<Self, ShellError> {
+    pub fn start_sealed(mut parts: Parts<'_>, keys: KeyRing) -> Result<Self, ShellError> {
+        let incarnation = u64::from_le_bytes(security::random()?).max(1);
+        parts.settings.incarnation = incarnation;
+        if let Some(clock) = &mut parts.clock {
+            clock.settings.incarnation = incarnation;
+        }
         Self::start_with(parts, Some(keys))
     }
 
