@@ -7,6 +7,7 @@
 mod common;
 
 use common::{PATIENCE, Pair, Side, label, module};
+use rohrpost_config::Security;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::{Kind, Name, Options, Receiver, SendError, Shape, Type, local};
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
@@ -172,7 +173,7 @@ fn each_sealed_life_has_an_incarnation_of_its_own_whatever_its_settings_say() {
     assert!(lives[0] != lives[1] && lives[1] != lives[2] && lives[0] != lives[2], "{lives:?}");
 }
 
-/// Starts the first router anew with the settings of its first sealed life; the incarnation that it has.
+/// Starts the first router anew with the same settings; the incarnation that it has.
 fn sealed_life(pair: &mut Pair) -> u64 {
     let side = &mut pair.sides[0];
     side.settings.incarnation = 7;

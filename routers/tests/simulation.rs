@@ -58,7 +58,7 @@ const SEEN_IN_A_HUNDRED_SEALED: [(&str, u64); 6] = [
     ("delivered", 100_000),
     ("answered", 10_000),
     ("asked", 1000),
-    ("rejected", 1000),
+    ("rejected", 400),
     ("router killed", 50),
     ("time: taken", 300_000),
 ];

@@ -90,7 +90,7 @@ impl Gate {
                 self.reject(now_ns, came, why, why.into(), inbound, deliver);
             }
             Ok(Opened::Frame(head, text)) => {
-                inbound.handle_opened(now_ns, came, (&head, text, self.opening.first(head.from)), deliver);
+                inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
             }
             Ok(Opened::Hello(head, greeting)) => {
                 if inbound.may_greet(now_ns, came.source, &head, deliver) {
@@ -107,6 +107,11 @@ impl Gate {
             Err(why @ NotOpened::Rejected(rejection)) => self.reject(now_ns, came, rejection, why, inbound, deliver),
         }
         None
+    }
+
+    /// From which sequence on the present life of a peer is heard; what is missing from there on is lost.
+    pub fn first(&self, peer: NodeIndex) -> u64 {
+        self.opening.first(peer)
     }
 
     /// Lets the life begin that what was taken last has shown to live; whether one does. To be done when the reply has left.

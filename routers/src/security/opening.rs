@@ -154,7 +154,7 @@ impl Opening {
     }
 
     /// From which sequence on the life of a peer is heard that was opened last; what is missing from there on is lost.
-    pub fn first(&self, peer: NodeIndex) -> u64 {
+    pub(super) fn first(&self, peer: NodeIndex) -> u64 {
         self.peers[usize::from(peer)].made.as_ref().map_or(0, |heard| heard.first)
     }
 

@@ -414,7 +414,8 @@ impl Layer for Packages {
             io.book.broken(io.now, Promise::Accounts, text);
         }
         if taken > 0 {
-            io.book.took(io.now, io.life, &clear, DIGEST);
+            let first = self.seals.as_ref().map(|seals| seals.first(&clear));
+            io.book.took(io.now, io.life, (&clear, first), DIGEST);
             self.hears(io, source);
         } else if copies > 0 {
             io.book.saw("dropped as a copy");

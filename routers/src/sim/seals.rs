@@ -40,6 +40,11 @@ impl PackageSeals {
         self.all.known() & 1 << node != 0
     }
 
+    /// From which sequence on the life is heard that said a datagram, as it said when it began.
+    pub(super) fn first(&self, datagram: &[u8]) -> u64 {
+        FrameHead::read(datagram).map_or(0, |(head, _)| self.gate.first(head.from))
+    }
+
     /// Datagrams that were not taken.
     pub(super) fn rejected(&self, peer: Option<u8>) -> u64 {
         Rejection::ALL.iter().map(|why| self.all.rejections(Port::Packages).of(peer, *why)).sum()
