@@ -144,6 +144,22 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
 }
 
 #[test]
+fn each_sealed_life_has_an_incarnation_of_its_own_whatever_its_settings_say() {
+    let mut pair = Pair::new();
+    let lives: Vec<_> = (0..3).map(|_| sealed_life(&mut pair)).collect();
+    assert!(lives[0] != lives[1] && lives[1] != lives[2] && lives[0] != lives[2], "{lives:?}");
+}
+
+/// Starts the first router anew with the same settings; the incarnation that it has.
+fn sealed_life(pair: &mut Pair) -> u64 {
+    let side = &mut pair.sides[0];
+    side.settings.incarnation = 7;
+    side.settings.network.security = Security::Keys;
+    side.start();
+    side.shell().settings().incarnation
+}
+
+#[test]
 fn without_the_right_to_the_address_a_router_does_not_start_and_leaves_the_node_as_it_was() {
     let pair = Pair::new();
     let mut second = Pair::new();
@@ -164,20 +180,4 @@ fn without_the_right_to_the_address_a_router_does_not_start_and_leaves_the_node_
     // What is sent meanwhile waits.
     let mut sender = side.sender(module(1));
     assert!(!matches!(sender.send(&label(module(0), 1, 1), &[]), Err(SendError::NoRouter { .. })));
-}
-
-#[test]
-fn each_sealed_life_has_an_incarnation_of_its_own_whatever_its_settings_say() {
-    let mut pair = Pair::new();
-    let lives: Vec<_> = (0..3).map(|_| sealed_life(&mut pair)).collect();
-    assert!(lives[0] != lives[1] && lives[1] != lives[2] && lives[0] != lives[2], "{lives:?}");
-}
-
-/// Starts the first router anew with the same settings; the incarnation that it has.
-fn sealed_life(pair: &mut Pair) -> u64 {
-    let side = &mut pair.sides[0];
-    side.settings.incarnation = 7;
-    side.settings.network.security = Security::Keys;
-    side.start();
-    side.shell().settings().incarnation
 }

@@ -4,7 +4,7 @@ use super::book::{Promise, Role};
 use super::clock::Now;
 use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS};
 use super::plan::{Plan, SYSTEM};
-use super::seals::{PackageSeals, incarnation, opened, sealed};
+use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::access::Access;
 use crate::fragment::PARTIAL_MAX;
@@ -174,6 +174,7 @@ impl Packages {
             None => Some(bytes.clone()),
             Some(seals) => sealed(&mut seals.sealing, &bytes),
         };
+        let bytes = if self.seals.is_some() { checked(&bytes) } else { bytes };
         let Some(sealed) = sealed else {
             let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             return self.outbound.unsent(&bytes, &[], &mut watch);

@@ -84,8 +84,14 @@ pub(super) fn sealed(sealing: &mut Sealing, datagram: &[u8]) -> Option<Rc<[u8]>>
 pub(super) fn opened(bytes: &[u8]) -> Rc<[u8]> {
     let mut clear = bytes[..bytes.len() - TAG_BYTES].to_vec();
     frame::write_key(0, &mut clear);
-    frame::write_check(&mut clear);
-    Rc::from(clear)
+    checked(&clear)
+}
+
+/// A datagram with the check that it would have if it were not to be sealed.
+pub(super) fn checked(datagram: &[u8]) -> Rc<[u8]> {
+    let mut bytes = datagram.to_vec();
+    frame::write_check(&mut bytes);
+    Rc::from(bytes)
 }
 
 /// Incarnation in the head of a datagram, sealed or not.
