@@ -39,7 +39,8 @@ impl Access {
     }
 }
 
-/// Nobody is listed as a caller of whom it may not command.
+/// Nobody is listed as a caller of whom it may not command, and no face lets in whom its module keeps out: a router goes by the class of the
+/// name that is commanded.
 pub(crate) fn judge(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
     for (to, line) in module.calls.iter().zip(&lines.calls) {
         let refuses = |access: &&Access| access.class == to.class() && !access.callers.contains(&module.name.class());
@@ -47,6 +48,22 @@ pub(crate) fn judge(installation: &Installation, module: &Module, lines: &Lines,
             reader.report(*line, told(installation, module, *to, access));
         }
     }
+    let rule = |class| installation.access.iter().find(|access| access.class == class);
+    let Some(access) = rule(module.name.class()) else { return };
+    for face in module.faces.iter().filter(|face| rule(face.class()).is_none()) {
+        reader.report(module.line, told_of_face(installation, module, *face, access));
+    }
+}
+
+fn told_of_face(installation: &Installation, module: &Module, face: Name, access: &Access) -> String {
+    let classes = &installation.classes;
+    let class = classes.name(face.class()).unwrap_or_default();
+    format!(
+        "module `{}` may be commanded by the classes of [access] in line {} alone, and its face `{}` by all; add a line for class `{class}` there",
+        classes.format(module.name),
+        access.line,
+        classes.format(face),
+    )
 }
 
 fn told(installation: &Installation, module: &Module, to: Name, access: &Access) -> String {

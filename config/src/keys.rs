@@ -78,6 +78,9 @@ pub enum KeysError {
     /// It could not be written.
     #[error("{path}: keys cannot be written ({1})", path = .0.display())]
     Write(PathBuf, io::Error),
+    /// Where they are written first, there is something.
+    #[error("{path}: this was left when keys were written and the computer stopped, or they are being written now; if not, remove it", path = .0.display())]
+    Left(PathBuf),
     /// There is one already.
     #[error("{path}: there are keys already; `rohrpost keys rotate` changes them", path = .0.display())]
     Exists(PathBuf),
@@ -148,37 +151,51 @@ impl Keys {
         Self::parse(&text).map_err(|(line, why)| KeysError::Wrong { path: path.to_owned(), line, why })
     }
 
-    /// Writes a file that is not there yet, and its folder, if that is not there either.
+    /// Writes a file that is not there yet, in one step, and its folder, if that is not there either.
     ///
     /// # Errors
-    /// [`KeysError::Exists`] and [`KeysError::Write`]
+    /// [`KeysError::Exists`], [`KeysError::Left`] and [`KeysError::Write`]
     pub fn create(&self, path: &Path) -> Result<(), KeysError> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let made = folder.map_or(Ok(()), |folder| DirBuilder::new().recursive(true).mode(0o700).create(folder));
-        let written = made.and_then(|()| new_file(path)).and_then(|mut file| self.write(&mut file));
-        written.map_err(|error| match error.kind() {
-            io::ErrorKind::AlreadyExists => KeysError::Exists(path.to_owned()),
-            _ => KeysError::Write(path.to_owned(), error),
+        made.map_err(|error| KeysError::Write(path.to_owned(), error))?;
+        self.put(path, |beside| {
+            // Unlike renaming, this takes no name that another has.
+            std::fs::hard_link(beside, path)?;
+            std::fs::remove_file(beside)
         })
     }
 
-    /// Writes over a file, in one step: who reads it meanwhile gets the old keys or the new ones.
+    /// Writes over a file, in one step: who reads it meanwhile gets the old keys or the new ones. What leads to it stays as it is.
     ///
     /// # Errors
-    /// [`KeysError::Write`]
+    /// [`KeysError::Left`] and [`KeysError::Write`]
     pub fn replace(&self, path: &Path) -> Result<(), KeysError> {
+        let file = path.canonicalize().map_err(|error| KeysError::Write(path.to_owned(), error))?;
+        self.put(&file, |beside| std::fs::rename(beside, &file))
+    }
+
+    /// Writes them to a file beside another, and lets `name` give it that one's name.
+    fn put(&self, path: &Path, name: impl FnOnce(&Path) -> io::Result<()>) -> Result<(), KeysError> {
+        let failed = |error: io::Error| match error.kind() {
+            io::ErrorKind::AlreadyExists => KeysError::Exists(path.to_owned()),
+            _ => KeysError::Write(path.to_owned(), error),
+        };
         let mut beside = path.as_os_str().to_owned();
         beside.push(".new");
         let beside = PathBuf::from(beside);
-        let written = new_file(&beside).and_then(|mut file| self.write(&mut file));
-        let failed = |error| KeysError::Write(path.to_owned(), error);
-        written.and_then(|()| std::fs::rename(&beside, path)).map_err(|error| {
-            // One that another left here is not ours to remove.
-            if error.kind() != io::ErrorKind::AlreadyExists {
-                let _ = std::fs::remove_file(&beside);
-            }
+        let mut file = new_file(&beside).map_err(|error| match error.kind() {
+            // It is not ours to remove.
+            io::ErrorKind::AlreadyExists => KeysError::Left(beside.clone()),
+            _ => failed(error),
+        })?;
+        self.write(&mut file).and_then(|()| name(&beside)).map_err(|error| {
+            let _ = std::fs::remove_file(&beside);
             failed(error)
-        })
+        })?;
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        // Else the name may be lost if the computer stops now.
+        File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed)
     }
 
     fn write(&self, file: &mut File) -> io::Result<()> {
@@ -272,6 +289,35 @@ mod tests {
         }
         assert!(matches!(keys(3, None).create(&path), Err(KeysError::Exists(_))));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
+    }
+
+    #[test]
+    fn what_a_crash_left_is_named_and_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, left) = (folder.path().join("robot.keys"), folder.path().join("robot.keys.new"));
+        std::fs::write(&left, "half").unwrap();
+        let said = keys(1, None).create(&path).unwrap_err().to_string();
+        assert!(said.contains("robot.keys.new") && said.contains("remove it") && !path.exists(), "{said}");
+        std::fs::remove_file(&left).unwrap();
+        keys(1, None).create(&path).unwrap();
+        std::fs::write(&left, "half").unwrap();
+        let said = keys(2, Some(1)).replace(&path).unwrap_err().to_string();
+        assert!(said.contains("robot.keys.new") && said.contains("remove it"), "{said}");
+        assert_eq!(
+            (std::fs::read_to_string(&left).unwrap(), Keys::load(&path).unwrap()),
+            ("half".into(), keys(1, None))
+        );
+    }
+
+    #[test]
+    fn a_link_to_the_keys_stays_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, link) = (folder.path().join("robot.keys"), folder.path().join("link"));
+        keys(1, None).create(&path).unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        keys(2, Some(1)).replace(&link).unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(Keys::load(&path).unwrap(), keys(2, Some(1)));
     }
 
     #[test]

@@ -46,6 +46,7 @@ impl Router {
         let mut reply = [0; HELLO_DATAGRAM_BYTES];
         let Opened::Hello(head, greeting) = self.opening.open(hello).unwrap() else { panic!("no hello") };
         let replied = self.greeter.greet(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
+        self.greeter.begin();
         *hello = reply;
         replied
     }

@@ -7,6 +7,7 @@
 mod common;
 
 use common::{PATIENCE, Pair, Side, label, module};
+use rohrpost_config::Security;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::{Kind, Name, Options, Receiver, SendError, Shape, Type, local};
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
@@ -141,6 +142,22 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
     let head = FrameHead { system: 2, ..head };
     own.send_to(&[&head.to_bytes(&[&told])[..], &told].concat(), to).unwrap();
     until("it is counted", || refused(1) == 1);
+}
+
+#[test]
+fn each_sealed_life_has_an_incarnation_of_its_own_whatever_its_settings_say() {
+    let mut pair = Pair::new();
+    let lives: Vec<_> = (0..3).map(|_| sealed_life(&mut pair)).collect();
+    assert!(lives[0] != lives[1] && lives[1] != lives[2] && lives[0] != lives[2], "{lives:?}");
+}
+
+/// Starts the first router anew with the same settings; the incarnation that it has.
+fn sealed_life(pair: &mut Pair) -> u64 {
+    let side = &mut pair.sides[0];
+    side.settings.incarnation = 7;
+    side.settings.network.security = Security::Keys;
+    side.start();
+    side.shell().settings().incarnation
 }
 
 #[test]

@@ -13,7 +13,7 @@ pub(crate) mod window;
 pub use window::{REORDER_MAX, WINDOW};
 
 use crate::broken::broken;
-use crate::frame::{BadFrame, Frame, FrameHead, Reason, VERSION};
+use crate::frame::{BadFrame, Frame, FrameHead, NodeIndex, Reason, VERSION};
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
@@ -108,7 +108,7 @@ impl Inbound {
             Ok((_, Frame::Refusal(refusal))) => self.refused_by(now_ns, source, &refusal, deliver),
             Ok((_, Frame::Time(_))) | Err(BadFrame::Foreign) => self.stats.foreign.add(1),
             Ok((head, frame)) => match self.mismatch(source, &head) {
-                None => self.take(now_ns, &came, &head, frame, deliver),
+                None => self.take(now_ns, &came, (&head, None), frame, deliver),
                 Some(mismatch) => self.refuse(now_ns, source, mismatch, deliver),
             },
             Err(BadFrame::Version(version)) => {
@@ -123,23 +123,34 @@ impl Inbound {
         }
     }
 
-    /// The same of one that was sealed, and opened: `text` is what follows its head.
+    /// The same of one that was sealed, and opened: `text` is what follows its head, `first` the sequence from which on its life is heard.
     pub fn handle_opened(
         &mut self,
         now_ns: u64,
         came: &Came,
-        (head, text): (&FrameHead, &[u8]),
+        (head, text, first): (&FrameHead, &[u8], u64),
         deliver: &mut impl Deliver,
     ) {
         match Frame::read(head.kind, VERSION, text) {
             Ok(frame @ (Frame::Packages(_) | Frame::Fragment(_) | Frame::Alive(_))) => {
                 match self.mismatch(came.source, head) {
-                    None => self.take(now_ns, came, head, frame, deliver),
+                    None => self.take(now_ns, came, (head, Some(first)), frame, deliver),
                     Some(mismatch) => self.refuse(now_ns, came.source, mismatch, deliver),
                 }
             }
             Ok(Frame::Refusal(_) | Frame::Time(_)) | Err(_) => self.damaged(came.source),
         }
+    }
+
+    /// Whether an address is that of the node for which a datagram was sealed that came from there.
+    pub(crate) fn is_address_of(&self, from: NodeIndex, source: IpAddr) -> bool {
+        self.settings.nodes.get(usize::from(from)).is_some_and(|node| node.address == source)
+    }
+
+    /// Bytes of the longest datagram that a router of ours seals.
+    pub(crate) fn sealed_bytes_max(&self) -> usize {
+        let network = &self.settings.network;
+        network.datagram_bytes_max + network.security.tag_bytes()
     }
 
     /// Whether a life of a peer may begin that has this head: it may if all that must be equal is.
@@ -190,11 +201,19 @@ impl Inbound {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    fn take(&mut self, now_ns: u64, came: &Came, head: &FrameHead, frame: Frame<'_>, deliver: &mut impl Deliver) {
+    /// `first`: see [`Peer::lives`].
+    fn take(
+        &mut self,
+        now_ns: u64,
+        came: &Came,
+        (head, first): (&FrameHead, Option<u64>),
+        frame: Frame<'_>,
+        deliver: &mut impl Deliver,
+    ) {
         let from = head.from;
         let way = Way { from, stats: &self.stats, peer: self.stats.peer(from) };
         let peer = &mut self.peers[usize::from(from)];
-        if !peer.lives(now_ns, head, self.settings.is_sealed(), &way, deliver) {
+        if !peer.lives(now_ns, head, first, &way, deliver) {
             return way.peer.received.old.add(1);
         }
         if !peer.is_new(head.sequence, &way) {

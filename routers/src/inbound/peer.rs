@@ -55,12 +55,12 @@ impl Peer {
     /// Whether a datagram is of the life that is heard. A life that was not known begins; of one that is over nothing is taken, unless
     /// it goes on, and the one that was taken for its successor is silent: then it was the other way round. What it sent before it was
     /// over says nothing: that may be a copy, which the wire or a stranger kept.
-    /// `is_sure`: it is the present life, for it has shown so.
+    /// `first`: where datagrams are sealed, it has shown to be the present life, and to be heard from this sequence on.
     pub(super) fn lives(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        is_sure: bool,
+        first: Option<u64>,
         way: &Way<'_>,
         deliver: &mut impl Deliver,
     ) -> bool {
@@ -70,7 +70,7 @@ impl Peer {
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
-        let may_go_on = is_sure || (is_silent && goes_on) || broken!(TakesOldLives);
+        let may_go_on = first.is_some() || (is_silent && goes_on) || broken!(TakesOldLives);
         if was.is_some() && !may_go_on {
             if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
@@ -88,11 +88,13 @@ impl Peer {
             self.told = Told { heard: true, twice: self.told.twice, ..Told::default() };
             deliver.event(Event::Restarted { peer: way.from });
         }
-        self.window = match was {
+        self.window = match (first, was) {
+            // What is missing from there on was sent to this life of ours, and is lost.
+            (Some(first), _) => Window::going_on(first),
             // What it sent before may have been delivered.
-            Some(_) => Window::going_on(head.sequence),
-            None if is_first => Window::joining(head.sequence),
-            None => Window::default(),
+            (None, Some(_)) => Window::going_on(head.sequence),
+            (None, None) if is_first => Window::joining(head.sequence),
+            (None, None) => Window::default(),
         };
         (self.incarnation, self.began_ns) = (head.incarnation, now_ns);
         way.peer.link.incarnation.set(head.incarnation);

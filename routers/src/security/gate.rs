@@ -14,6 +14,10 @@ use std::sync::Arc;
 
 /// Who is not known, or silent, is asked so often.
 pub const ASK_EVERY_NS: u64 = 100_000_000;
+/// Who was asked in vain for so long is asked seldom: once it is there, it asks us.
+const EAGER_FOR_NS: u64 = 10_000_000_000;
+/// See [`EAGER_FOR_NS`].
+const ASK_SELDOM_NS: u64 = 1_000_000_000;
 /// A peer that says something of another life than the one that is known is asked so often at most.
 const DOUBT_EVERY_NS: u64 = 20_000_000;
 
@@ -46,6 +50,8 @@ struct Asked {
     at_ns: Option<u64>,
     /// When its present life began, ns.
     began_ns: u64,
+    /// Since when it is not known, or silent, ns.
+    missed_since_ns: Option<u64>,
 }
 
 impl Gate {
@@ -62,7 +68,7 @@ impl Gate {
     }
 
     /// Takes a datagram, whatever it is. `reply` has room for a hello ([`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES)), if one is to
-    /// be sent back.
+    /// be sent back. Then [`Self::begin`].
     pub fn take(
         &mut self,
         now_ns: u64,
@@ -72,14 +78,23 @@ impl Gate {
         deliver: &mut impl Deliver,
         reply: &mut [u8],
     ) -> Option<Said> {
+        if datagram.len() > inbound.sealed_bytes_max() {
+            let why = Rejection::NotOurs;
+            self.reject(now_ns, came, why, why.into(), inbound, deliver);
+            return None;
+        }
         match self.opening.open(datagram) {
-            Ok(Opened::Frame(head, text)) => inbound.handle_opened(now_ns, came, (&head, text), deliver),
+            // Right, but brought by someone else: that says nothing of the node whose address it has.
+            Ok(Opened::Frame(head, _) | Opened::Hello(head, _)) if !inbound.is_address_of(head.from, came.source) => {
+                let why = Rejection::Address;
+                self.reject(now_ns, came, why, why.into(), inbound, deliver);
+            }
+            Ok(Opened::Frame(head, text)) => {
+                inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
+            }
             Ok(Opened::Hello(head, greeting)) => {
                 if inbound.may_greet(now_ns, came.source, &head, deliver) {
                     let greeted = self.greeter.greet(now_ns, &head, &greeting, reply);
-                    if greeted.began {
-                        self.peers[usize::from(head.from)].began_ns = now_ns;
-                    }
                     return greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes });
                 }
             }
@@ -94,29 +109,50 @@ impl Gate {
         None
     }
 
+    /// From which sequence on the present life of a peer is heard; what is missing from there on is lost.
+    pub fn first(&self, peer: NodeIndex) -> u64 {
+        self.opening.first(peer)
+    }
+
+    /// Lets the life begin that what was taken last has shown to live; whether one does. To be done when the reply has left.
+    pub fn begin(&mut self, now_ns: u64) -> bool {
+        let began = self.greeter.begin();
+        if let Some(peer) = began {
+            self.peers[usize::from(peer)].began_ns = now_ns;
+        }
+        began.is_some()
+    }
+
     /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
     pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
         if now_ns < self.look_ns {
             return None;
         }
-        let Some(to) = (0..self.all.who.nodes).find(|peer| self.is_to_be_asked(*peer, now_ns, stats)) else {
+        let mut peers = 0..self.all.who.nodes;
+        let Some(to) = peers.find(|peer| self.is_to_be_asked(*peer, now_ns, stats)) else {
             self.look_ns = now_ns + LOOK_EVERY_NS;
             return None;
         };
         self.peers[usize::from(to)].at_ns = Some(now_ns);
         self.all.doubted(to);
+        self.greeter.refresh(now_ns, to);
         self.all.ask(to, datagram).map(|bytes| Said { to, bytes })
     }
 
-    fn is_to_be_asked(&self, peer: NodeIndex, now_ns: u64, stats: &Stats) -> bool {
-        let Asked { at_ns, began_ns } = self.peers[usize::from(peer)];
+    fn is_to_be_asked(&mut self, peer: NodeIndex, now_ns: u64, stats: &Stats) -> bool {
+        let Asked { at_ns, began_ns, missed_since_ns } = &mut self.peers[usize::from(peer)];
         let is_over = |every_ns| at_ns.is_none_or(|at_ns| at_ns + every_ns <= now_ns);
         if !self.all.is_peer(peer) || !is_over(DOUBT_EVERY_NS) {
             return false;
         }
-        let heard_ns = stats.peer(peer).link.heard_ns.get().max(began_ns);
+        let heard_ns = stats.peer(peer).link.heard_ns.get().max(*began_ns);
         let is_missed = self.all.known() & 1 << peer == 0 || heard_ns + SILENT_AFTER_NS <= now_ns;
-        self.all.doubts(peer) || (is_missed && is_over(ASK_EVERY_NS))
+        *missed_since_ns = is_missed.then(|| missed_since_ns.unwrap_or(now_ns));
+        let every_ns = missed_since_ns.map(|since_ns| match now_ns.saturating_sub(since_ns) < EAGER_FOR_NS {
+            true => ASK_EVERY_NS,
+            false => ASK_SELDOM_NS,
+        });
+        self.all.doubts(peer) || every_ns.is_some_and(is_over)
     }
 
     fn reject(

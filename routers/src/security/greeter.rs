@@ -9,29 +9,48 @@ use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use std::sync::Arc;
 
-/// Hellos that one peer is sent back in [`PER_NS`], at most: recorded questions that are sent again must not cost more than they are worth.
-pub const ANSWERS_MAX: u32 = 100;
+/// Questions of one peer that are answered in [`PER_NS`], at most: recorded ones that are sent again must not cost more than they are worth.
+/// Of more than half as many, a random share is.
+pub const ANSWERS_MAX: u32 = 10;
 /// See [`ANSWERS_MAX`].
 pub const PER_NS: u64 = 100_000_000;
+/// A challenge is drawn anew so often, ns.
+const DRAW_EVERY_NS: u64 = 1_000_000_000;
+/// So long after it was drawn it can be answered: an answer that is kept back says nothing of who lives when it comes.
+pub const CHALLENGE_MAX_NS: u64 = 2 * DRAW_EVERY_NS;
 
 /// Takes hellos, in the thread that receives packages.
 pub struct Greeter {
     all: Arc<Acquaintances>,
     random: ChaCha20Rng,
-    answered: Box<[Answered]>,
+    peers: Box<[Peer]>,
+    /// A life that has shown that it lives, and has not begun.
+    begins: Option<(NodeIndex, Life)>,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Answered {
+struct Peer {
+    /// When the present challenge was drawn, ns.
+    drawn_ns: u64,
+    /// The challenge before it, and when that was drawn; 0: none.
+    before: (u64, u64),
+    questions: Questions,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Questions {
     since_ns: u64,
-    times: u32,
+    came: u32,
+    answered: u32,
+    /// How many came in the time before.
+    came_before: u32,
 }
 
 /// What a hello brought about.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Greeted {
-    /// A life of the peer has begun.
-    pub began: bool,
+    /// A life of the peer begins, with [`Greeter::begin`].
+    pub begins: bool,
     /// Bytes of the hello to send back, in the buffer.
     pub reply_bytes: Option<usize>,
 }
@@ -39,43 +58,79 @@ pub struct Greeted {
 impl Greeter {
     /// There is one. `seed` comes from a source of random numbers that is fit for keys; each life has another.
     pub fn new(all: &Arc<Acquaintances>, seed: [u8; 32]) -> Self {
-        let answered = vec![Answered::default(); all.who.nodes.into()].into();
-        let mut greeter = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), answered };
-        (0..all.who.nodes).for_each(|peer| greeter.draw(peer));
+        let peers = vec![Peer::default(); all.who.nodes.into()].into();
+        let mut greeter = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), peers, begins: None };
+        (0..all.who.nodes).for_each(|peer| greeter.draw(0, peer));
         greeter
     }
 
     /// Takes a hello that was opened, if all else in its head is as it must be. `datagram` has room for a hello of
-    /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES).
+    /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If a life begins by it, [`Self::begin`] when the reply has left.
     pub fn greet(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
+        self.begin();
         let (peer, Greeting { hello, key }) = (head.from, *greeting);
-        let proves = hello.answer == self.all.challenge(peer) || broken!(BeginsUnproven);
-        let began = proves && self.all.incarnation(peer) != Some(head.incarnation);
+        self.refresh(now_ns, peer);
+        let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);
+        let begins = proves && self.all.incarnation(peer) != Some(head.incarnation);
         if proves {
             // Each challenge serves once: what else was answered to it, or will be, proves nothing any more.
-            self.draw(peer);
+            self.draw(now_ns, peer);
+            self.peers[usize::from(peer)].before = (0, 0);
         }
-        if began {
-            self.all.begin(peer, Life { incarnation: head.incarnation, key, next: hello.next });
+        if begins {
+            self.begins = Some((peer, Life { incarnation: head.incarnation, key, next: hello.next }));
         }
         let is_question = hello.answer == 0;
-        let may = hello.challenge != 0 && (proves || is_question) && self.may_answer(now_ns, peer);
+        // Nobody but who lives can answer, and once: that need not be counted.
+        let may = hello.challenge != 0 && (proves || is_question && self.may_answer(now_ns, peer));
         // Who has shown that it lives is told that we do, and that is the last word; who has not must show it first.
         let challenge = if is_question { self.all.challenge(peer) } else { 0 };
         let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
-        Greeted { began, reply_bytes: if may { self.all.hello(peer, key, reply, datagram) } else { None } }
+        Greeted { begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
 
-    fn draw(&mut self, peer: NodeIndex) {
+    /// Lets the life begin that has shown that it lives, if one has; of which peer. The reply was handed to the network before: it says from
+    /// which sequence on we are to be heard, and what left before it would not be taken.
+    pub fn begin(&mut self) -> Option<NodeIndex> {
+        let (peer, life) = self.begins.take()?;
+        self.all.begin(peer, life);
+        Some(peer)
+    }
+
+    /// Draws a peer's challenge anew if it is old. To be done before it is asked, or it has less time to answer.
+    pub fn refresh(&mut self, now_ns: u64, peer: NodeIndex) {
+        let drawn_ns = self.peers[usize::from(peer)].drawn_ns;
+        if now_ns.saturating_sub(drawn_ns) >= DRAW_EVERY_NS {
+            self.peers[usize::from(peer)].before = (self.all.challenge(peer), drawn_ns);
+            self.draw(now_ns, peer);
+        }
+    }
+
+    fn draw(&mut self, now_ns: u64, peer: NodeIndex) {
+        self.peers[usize::from(peer)].drawn_ns = now_ns;
         self.all.set_challenge(peer, self.random.next_u64().max(1));
     }
 
+    /// Whether this answers a challenge of ours that may still be answered.
+    fn is_answer(&self, now_ns: u64, peer: NodeIndex, answer: u64) -> bool {
+        let (before, drawn_ns) = self.peers[usize::from(peer)].before;
+        let is_before = before != 0 && answer == before && now_ns.saturating_sub(drawn_ns) < CHALLENGE_MAX_NS;
+        answer == self.all.challenge(peer) || is_before
+    }
+
+    /// Of a flood each question has the same chance, not the first ones alone: among them may be one of who lives.
     fn may_answer(&mut self, now_ns: u64, peer: NodeIndex) -> bool {
-        let answered = &mut self.answered[usize::from(peer)];
-        if now_ns.saturating_sub(answered.since_ns) >= PER_NS {
-            *answered = Answered { since_ns: now_ns, times: 0 };
+        let questions = &mut self.peers[usize::from(peer)].questions;
+        let passed_ns = now_ns.saturating_sub(questions.since_ns);
+        if passed_ns >= PER_NS {
+            let came_before = if passed_ns < 2 * PER_NS { questions.came } else { 0 };
+            *questions = Questions { since_ns: now_ns, came_before, ..Questions::default() };
         }
-        answered.times += 1;
-        answered.times <= ANSWERS_MAX
+        questions.came = questions.came.saturating_add(1);
+        let share = ANSWERS_MAX / 2;
+        let is_drawn = questions.came_before <= share || self.random.next_u32() % questions.came_before < share;
+        let may = is_drawn && questions.answered < ANSWERS_MAX;
+        questions.answered += u32::from(may);
+        may
     }
 }

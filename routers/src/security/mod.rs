@@ -11,7 +11,7 @@
 //! ```
 //!
 //! A *hello* (one of these three) is sealed from node to node, everything else from life to life: so nothing that was recorded in another life of
-//! either end opens in this one. A challenge serves once, then there is another; and a hello says from which
+//! either end opens in this one. A challenge serves once, and not for long, then there is another; and a hello says from which
 //! sequence on its life will be heard, so nothing that a life had sent before is taken either.
 //!
 //! ```text
@@ -35,7 +35,7 @@ mod tally;
 
 pub use acquaintances::{Acquaintances, Port, Who};
 pub use gate::{ASK_EVERY_NS, Gate, Said};
-pub use greeter::{ANSWERS_MAX, Greeted, Greeter, PER_NS};
+pub use greeter::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Greeter, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 pub use opening::{Greeting, NotOpened, Opened, Opening, Rejection};

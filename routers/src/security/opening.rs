@@ -1,5 +1,6 @@
 //! The half that opens: one for each port, in the thread that receives there.
 
+use super::HELLO_DATAGRAM_BYTES;
 use super::acquaintances::{Acquaintances, Known, Port};
 use super::hello::Hello;
 use super::keys::End;
@@ -49,6 +50,9 @@ pub enum Rejection {
     /// Its seal is not right: made with another key, or altered.
     #[error("its seal is not right: another key with this id, or someone altered it; all nodes need the same key file")]
     Forged,
+    /// Its seal is right, and it comes from another address than its node has.
+    #[error("it comes from another address than its node has in our configuration")]
+    Address,
     /// Of another wire format: nothing more can be told of it.
     #[error("it is of another wire format; run the same version of Rohrpost on all nodes")]
     Version,
@@ -56,8 +60,16 @@ pub enum Rejection {
 
 impl Rejection {
     /// All, in their order.
-    pub const ALL: [Self; 7] =
-        [Self::Unsealed, Self::OtherKey, Self::NotOurs, Self::OtherLife, Self::Replay, Self::Forged, Self::Version];
+    pub const ALL: [Self; 8] = [
+        Self::Unsealed,
+        Self::OtherKey,
+        Self::NotOurs,
+        Self::OtherLife,
+        Self::Replay,
+        Self::Forged,
+        Self::Address,
+        Self::Version,
+    ];
 
     /// A word for people and programs.
     pub const fn word(self) -> &'static str {
@@ -68,6 +80,7 @@ impl Rejection {
             Self::OtherLife => "other-life",
             Self::Replay => "replay",
             Self::Forged => "forged",
+            Self::Address => "address",
             Self::Version => "version",
         }
     }
@@ -96,6 +109,8 @@ struct Heard {
     incarnation: u64,
     /// By the place of the key: which of two the peer seals with is its choice.
     seals: Vec<Seal>,
+    /// From this sequence on it is heard.
+    first: u64,
     window: Window,
 }
 
@@ -138,9 +153,17 @@ impl Opening {
         Ok(Opened::Frame(head, text))
     }
 
+    /// From which sequence on the life of a peer is heard that was opened last; what is missing from there on is lost.
+    pub(super) fn first(&self, peer: NodeIndex) -> u64 {
+        self.peers[usize::from(peer)].made.as_ref().map_or(0, |heard| heard.first)
+    }
+
     fn hello(&self, head: &FrameHead, key: usize, datagram: &mut [u8]) -> Result<Greeting, Rejection> {
         if self.port != Port::Packages {
             return Err(Rejection::NotOurs);
+        }
+        if datagram.len() != HELLO_DATAGRAM_BYTES {
+            return Err(Rejection::Forged);
         }
         let number = u32::try_from(head.sequence).map_err(|_| Rejection::Forged)?;
         let seal = self.all.hello_from(head.from, key);
@@ -159,6 +182,7 @@ impl Opening {
             Heard {
                 incarnation: life.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
+                first: life.next[port as usize],
                 window: Window::going_on(life.next[port as usize]),
             }
         })

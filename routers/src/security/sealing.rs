@@ -61,12 +61,15 @@ impl Sealing {
     }
 
     /// Takes back what [`Self::close`] did last to a datagram that could not be sent: what is in it can be read again.
+    ///
+    /// # Panics
+    /// If that was not done to it.
     pub fn reopen(&mut self, datagram: &mut [u8]) {
         let (to, sequence) = frame::place_of(datagram);
-        if let Some(way) = Self::way(&mut self.peers, &self.all, self.port, to) {
-            // Another life has begun meanwhile: then it is as good as lost on the wire.
-            let _ = way.seal.open(seal::of_sequence(sequence), datagram);
-        }
+        // With the very key: another life may have begun meanwhile.
+        let way = self.peers[usize::from(to)].made.as_ref();
+        let opened = way.and_then(|way| way.seal.open(seal::of_sequence(sequence), datagram));
+        assert!(opened.is_some(), "what was just closed opens again");
     }
 
     fn way<'a>(peers: &'a mut [Known<Way>], all: &Acquaintances, port: Port, to: NodeIndex) -> Option<&'a mut Way> {

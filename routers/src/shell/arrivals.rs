@@ -10,7 +10,7 @@ use super::ways::Ways;
 use crate::frame::NodeIndex;
 use crate::inbound::{Came, Datagram, Inbound, Output, SOCKET_MAX_NS};
 use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::security::{Acquaintances, Gate, HELLO_DATAGRAM_BYTES, Said};
+use crate::security::{Gate, HELLO_DATAGRAM_BYTES, Said};
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
@@ -35,24 +35,10 @@ pub(super) struct Arrivals {
     pub(super) desk: Desk,
     pub(super) settings: Arc<Settings>,
     pub(super) stats: Arc<Stats>,
-    /// Where datagrams are sealed.
-    pub(super) guard: Option<Guard>,
+    /// Where datagrams are sealed: opens them, and knows who lives.
+    pub(super) guard: Option<Gate>,
     /// Where there are time slots, refusals and hellos leave through them.
     pub(super) refusals: Option<SyncSender<Refusal>>,
-}
-
-/// What opens datagrams, and knows who lives.
-pub(super) struct Guard {
-    gate: Gate,
-    all: Arc<Acquaintances>,
-    known: u64,
-}
-
-impl Guard {
-    /// `seed`: see [`Gate::new`].
-    pub(super) fn new(all: &Arc<Acquaintances>, seed: [u8; 32]) -> Self {
-        Self { gate: Gate::new(all, seed), all: all.clone(), known: 0 }
-    }
 }
 
 impl Arrivals {
@@ -89,27 +75,26 @@ impl Arrivals {
     }
 
     fn take(&mut self, now_ns: u64, came: &Came, datagram: &mut [u8]) {
-        let Self { inbound, desk, guard, shared, .. } = self;
-        let Some(Guard { gate, known, all }) = guard else {
+        let Self { inbound, desk, guard, .. } = self;
+        let Some(gate) = guard else {
             let Came { source, arrived_ns, .. } = *came;
             return inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: datagram }, desk);
         };
         let mut reply = [0; REFUSAL_BYTES];
-        let said = gate.take(now_ns, came, datagram, inbound, desk, &mut reply);
-        if all.known() != *known {
-            *known = all.known();
-            // What waits for this peer may leave.
-            shared.ring();
-        }
-        if let Some(Said { to, bytes }) = said {
+        if let Some(Said { to, bytes }) = gate.take(now_ns, came, datagram, inbound, desk, &mut reply) {
             self.say(self.settings.nodes[usize::from(to)].address, bytes, reply);
+        }
+        // After the last word: what leaves before it would not be taken.
+        if self.guard.as_mut().is_some_and(|gate| gate.begin(now_ns)) {
+            // What waits for this peer may leave.
+            self.shared.ring();
         }
     }
 
     /// Asks who is not known, or not heard, where datagrams are sealed.
     fn ask(&mut self, now_ns: u64) {
         let mut question = [0; REFUSAL_BYTES];
-        while let Some(Guard { gate, .. }) = &mut self.guard
+        while let Some(gate) = &mut self.guard
             && let Some(Said { to, bytes }) = gate.ask(now_ns, &self.stats, &mut question)
         {
             self.say(self.settings.nodes[usize::from(to)].address, bytes, question);

@@ -40,12 +40,12 @@ pub use socket::{SocketError, listen};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
-use crate::security::{self, Acquaintances, KeyRing, NoRandom, Port, Rejections, Sealing, Who};
+use crate::security::{self, Acquaintances, Gate, KeyRing, NoRandom, Port, Rejections, Sealing, Who};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{Discipline, Table};
 use answers::Answers;
-use arrivals::{Arrivals, Desk, Guard};
+use arrivals::{Arrivals, Desk};
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
 use departures::{Departures, Wire};
 use news::News;
@@ -136,11 +136,17 @@ impl Shell {
         Self::start_with(parts, None)
     }
 
-    /// The same of a router that seals what it sends, and takes only what is sealed. The incarnation in its settings is random.
+    /// The same of a router that seals what it sends, and takes only what is sealed. In place of the incarnation in its settings it draws one:
+    /// two lives with one incarnation would have one key.
     ///
     /// # Errors
     /// [`ShellError`]
-    pub fn start_sealed(parts: Parts<'_>, keys: KeyRing) -> Result<Self, ShellError> {
+    pub fn start_sealed(mut parts: Parts<'_>, keys: KeyRing) -> Result<Self, ShellError> {
+        let incarnation = u64::from_le_bytes(security::random()?).max(1);
+        parts.settings.incarnation = incarnation;
+        if let Some(clock) = &mut parts.clock {
+            clock.settings.incarnation = incarnation;
+        }
         Self::start_with(parts, Some(keys))
     }
 
@@ -148,7 +154,7 @@ impl Shell {
         if parts.settings.is_sealed() != keys.is_some() {
             return Err(ShellError::Keys);
         }
-        let seed = security::random()?;
+        let seed = keys.as_ref().map(|_| security::random()).transpose()?;
         let Parts { node, name, mut settings, faults, socket, impair, clock } = parts;
         let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
         if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
@@ -205,7 +211,7 @@ impl Shell {
             },
             settings: settings.clone(),
             stats: stats.clone(),
-            guard: all.as_ref().map(|all| Guard::new(all, seed)),
+            guard: all.as_ref().zip(seed).map(|(all, seed)| Gate::new(all, seed)),
             refusals: None,
         };
         // From here on, whatever fails ends what has begun.

@@ -4,7 +4,7 @@ use super::book::{Promise, Role};
 use super::clock::Now;
 use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS, TRANSIT_SLOTS};
 use super::plan::{Plan, SYSTEM};
-use super::seals::{PackageSeals, incarnation, opened, sealed};
+use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::access::Access;
 use crate::fragment::PARTIAL_MAX;
@@ -183,6 +183,7 @@ impl Packages {
             None => Some(bytes.clone()),
             Some(seals) => sealed(&mut seals.sealing, &bytes),
         };
+        let bytes = if self.seals.is_some() { checked(&bytes) } else { bytes };
         let Some(sealed) = sealed else {
             let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
             return self.outbound.unsent(&bytes, &[], &mut watch);
@@ -227,6 +228,7 @@ impl Packages {
         if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
             self.refusals.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(&reply[..said.bytes]) });
         }
+        seals.gate.begin(now_ns);
         if bytes.len() < HEAD_BYTES + TAG_BYTES { arrived.bytes.clone() } else { opened(&bytes) }
     }
 
@@ -423,7 +425,8 @@ impl Layer for Packages {
             io.book.broken(io.now, Promise::Accounts, text);
         }
         if taken > 0 {
-            io.book.took(io.now, io.life, &clear, DIGEST);
+            let first = self.seals.as_ref().map(|seals| seals.first(&clear));
+            io.book.took(io.now, io.life, (&clear, first), DIGEST);
             self.hears(io, source);
         } else if copies > 0 {
             io.book.saw("dropped as a copy");

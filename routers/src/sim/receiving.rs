@@ -42,8 +42,8 @@ struct Taken {
 
 impl Book {
     /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was the last
-    /// part that was missing.
-    pub fn took(&mut self, now: Now, life: u32, datagram: &[u8], digest: u64) {
+    /// part that was missing. `first`: where datagrams are sealed, the sequence from which on its life is heard.
+    pub fn took(&mut self, now: Now, life: u32, (datagram, first): (&[u8], Option<u64>), digest: u64) {
         let Ok((head, frame)) = Frame::parse(datagram) else {
             return self.broken(now, Promise::Unchanged, "a datagram that is no frame was taken".into());
         };
@@ -53,7 +53,11 @@ impl Book {
         let receiving = self.receiving.entry(life).or_default();
         let is_first_life = !receiving.present.contains_key(&head.from);
         let before = receiving.present.insert(head.from, head.incarnation);
-        let start = if is_first_life && head.sequence >= REORDER_MAX { head.sequence } else { 0 };
+        let start = match first {
+            Some(first) => first,
+            None if is_first_life && head.sequence >= REORDER_MAX => head.sequence,
+            None => 0,
+        };
         let is_known = receiving.taken.contains_key(&head.incarnation);
         let taken = receiving.taken.entry(head.incarnation).or_insert_with(|| Taken { start, ..Taken::default() });
         taken.unclear |= is_known && before != Some(head.incarnation);

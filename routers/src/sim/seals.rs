@@ -40,6 +40,11 @@ impl PackageSeals {
         self.all.known() & 1 << node != 0
     }
 
+    /// From which sequence on the life is heard that said a datagram, as it said when it began.
+    pub(super) fn first(&self, datagram: &[u8]) -> u64 {
+        FrameHead::read(datagram).map_or(0, |(head, _)| self.gate.first(head.from))
+    }
+
     /// Datagrams that were not taken.
     pub(super) fn rejected(&self, peer: Option<u8>) -> u64 {
         Rejection::ALL.iter().map(|why| self.all.rejections(Port::Packages).of(peer, *why)).sum()
@@ -79,8 +84,14 @@ pub(super) fn sealed(sealing: &mut Sealing, datagram: &[u8]) -> Option<Rc<[u8]>>
 pub(super) fn opened(bytes: &[u8]) -> Rc<[u8]> {
     let mut clear = bytes[..bytes.len() - TAG_BYTES].to_vec();
     frame::write_key(0, &mut clear);
-    frame::write_check(&mut clear);
-    Rc::from(clear)
+    checked(&clear)
+}
+
+/// A datagram with the check that it would have if it were not to be sealed.
+pub(super) fn checked(datagram: &[u8]) -> Rc<[u8]> {
+    let mut bytes = datagram.to_vec();
+    frame::write_check(&mut bytes);
+    Rc::from(bytes)
 }
 
 /// Incarnation in the head of a datagram, sealed or not.

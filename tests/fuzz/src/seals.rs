@@ -144,7 +144,8 @@ impl World {
             }
             Ok(Opened::Hello(head, greeting)) => {
                 let greeted = router.greeter.greet(0, &head, &greeting, &mut room);
-                if greeted.began {
+                router.greeter.begin();
+                if greeted.begins {
                     assert!(sent.step >= router.drawn, "a life began by what was said before");
                     router.drawn = self.step;
                 }

@@ -22,7 +22,7 @@ fn causes(end: &mut End, packages: &[Head]) -> Vec<Option<Cause>> {
         let before = end.log.lost.len();
         let (head, text) = datagram(sequence, package);
         let came = Came { source: address(1), arrived_ns: START, bytes: 68 };
-        end.inbound.handle_opened(START, &came, (&head, &text), &mut end.log);
+        end.inbound.handle_opened(START, &came, (&head, &text, 0), &mut end.log);
         all.push(end.log.lost.get(before).map(|(.., cause)| *cause));
     }
     end.assert_balanced();

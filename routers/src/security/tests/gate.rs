@@ -2,8 +2,10 @@
 
 use super::*;
 use crate::frame::BadFrame;
-use crate::harness::{End, MS, START, address};
+use crate::harness::{End, MS, S, START, address};
 use crate::inbound::Came;
+use crate::inbound::TICK_EVERY_NS;
+use crate::link::State;
 use crate::report::Event;
 use rohrpost_config::Security;
 
@@ -15,7 +17,14 @@ struct Router {
 
 impl Router {
     fn new(own: u8) -> Self {
-        let end = End::new(own, |settings| settings.network.security = Security::Keys);
+        Self::with_digest(own, DIGEST)
+    }
+
+    fn with_digest(own: u8, digest: u64) -> Self {
+        let end = End::new(own, |settings| {
+            settings.network.security = Security::Keys;
+            settings.digest = digest;
+        });
         let all = Acquaintances::new(Who::of(&end.settings), ring(&[1]));
         Self { gate: Gate::new(&all, [own; 32]), all, end }
     }
@@ -35,7 +44,9 @@ impl Router {
         let came = Came { source: address(from), arrived_ns: now_ns, bytes: bytes.len() };
         let Self { gate, end: End { inbound, log, .. }, .. } = self;
         let said = gate.take(now_ns, &came, &mut bytes, inbound, log, &mut reply);
-        said.map(|said| reply[..said.bytes].to_vec())
+        let reply = said.map(|said| reply[..said.bytes].to_vec());
+        gate.begin(now_ns);
+        reply
     }
 }
 
@@ -78,4 +89,84 @@ fn another_wire_format_is_told_by_who_gets_it_and_changes_nothing() {
     assert_eq!(b.end.log.events, [told]);
     assert_eq!(b.all.rejections(Port::Packages).of(Some(0), Rejection::Version), 1);
     assert_eq!(b.all.known(), 0);
+}
+
+#[test]
+fn who_is_asked_again_after_long_can_answer() {
+    let (mut a, mut b) = (Router::new(0), Router::new(1));
+    a.ask(START);
+    let late_ns = START + 50 * CHALLENGE_MAX_NS;
+    let question = a.ask(late_ns)[0].1.clone();
+    let answer = b.take(late_ns, 0, &question).unwrap();
+    assert!(a.take(late_ns + CHALLENGE_MAX_NS - 1, 1, &answer).is_some());
+    assert_eq!(a.all.known(), 0b10);
+}
+
+#[test]
+fn who_is_away_for_long_is_asked_seldom() {
+    let mut a = Router::new(0);
+    let mut asked_in = |seconds: std::ops::Range<u64>| {
+        let mut times_ns = (seconds.start * S..seconds.end * S).step_by((10 * MS) as usize);
+        let mut asked = 0;
+        times_ns.by_ref().for_each(|ns| asked += a.ask(START + ns).len());
+        asked / 2
+    };
+    let first = asked_in(0..5);
+    assert!((20..=50).contains(&first), "{first}");
+    asked_in(5..12);
+    let later = asked_in(12..32);
+    assert!((10..=20).contains(&later), "{later}");
+}
+
+/// Lets a ask b; both know each other then.
+fn acquaint_at(now_ns: u64, a: &mut Router, b: &mut Router) {
+    let (own, other) = (a.end.settings.own, b.end.settings.own);
+    let question = a.ask(now_ns).into_iter().find(|(to, _)| *to == other).unwrap().1;
+    let answer = b.take(now_ns, own, &question).unwrap();
+    let last_word = a.take(now_ns, other, &answer).unwrap();
+    assert_eq!(b.take(now_ns, own, &last_word), None);
+}
+
+#[test]
+fn what_is_lost_before_the_first_that_comes_is_counted() {
+    let (mut a, mut b) = (Router::new(0), Router::new(1));
+    acquaint_at(START, &mut a, &mut b);
+    let mut sealing = Sealing::new(&a.all, Port::Packages);
+    let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
+    let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
+    for sequence in 0..100 {
+        let kind = Kind::Alive;
+        let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence };
+        datagram[HEAD_BYTES..][..told.len()].copy_from_slice(&told);
+        sealing.seal(&head, &mut datagram).unwrap();
+    }
+    b.take(START, 0, &datagram);
+    for tick in 1..=4 {
+        b.end.inbound.poll(START + tick * TICK_EVERY_NS, &mut [0; 100], &mut b.end.log);
+    }
+    let received = &b.end.stats.peer(0).received;
+    assert_eq!((received.datagrams.get(), received.lost.get()), (1, 99));
+}
+
+#[test]
+fn who_sends_what_others_said_from_an_address_of_a_third_parts_nobody_from_it() {
+    let (mut a, mut b) = (Router::with_digest(0, 8), Router::new(1));
+    let recorded = a.ask(START)[0].1.clone();
+    assert_eq!(b.take(START, 2, &recorded), None);
+    let state = |router: &Router, peer| router.end.stats.state(peer, START);
+    assert!([0, 2].iter().all(|peer| !matches!(state(&b, *peer), State::Refused(_))));
+    assert_eq!(b.all.rejections(Port::Packages).of(Some(2), Rejection::Address), 1);
+    b.take(START, 0, &recorded);
+    assert!(matches!(state(&b, 0), State::Refused(_)), "from its own, it may have another configuration");
+}
+
+#[test]
+fn what_is_longer_than_any_of_ours_is_not_opened() {
+    let (a, mut b) = (Router::new(0), Router::new(1));
+    let mut hello = [0; HELLO_DATAGRAM_BYTES];
+    a.all.ask(1, &mut hello).unwrap();
+    b.take(START, 0, &checked([&hello[..], &[0; 60_000]].concat()));
+    b.take(START, 0, &checked([&hello[..], &[0; 1]].concat()));
+    let rejected = |why| b.all.rejections(Port::Packages).of(Some(0), why);
+    assert_eq!((rejected(Rejection::NotOurs), rejected(Rejection::Forged)), (1, 1));
 }

@@ -101,7 +101,7 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
                 Ok(Opened::Frame(head, _)) => panic!("datagram {number} was taken: {head:?}, {sent:?}"),
                 Ok(Opened::Hello(head, greeting)) => {
                     let greeted = router.greeter.greet(number, &head, &greeting, &mut room);
-                    assert!(!greeted.began, "a life began by datagram {number}: {sent:?}");
+                    assert!(!greeted.begins, "a life began by datagram {number}: {sent:?}");
                 }
                 Err(_) => {}
             }

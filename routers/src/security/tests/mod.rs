@@ -90,11 +90,16 @@ impl Router {
 
     /// Takes a hello: whether a life began by it, and the answer.
     pub(super) fn greet(&mut self, datagram: &[u8]) -> Result<(bool, Option<Vec<u8>>), NotOpened> {
+        self.greet_at(0, datagram)
+    }
+
+    pub(super) fn greet_at(&mut self, now_ns: u64, datagram: &[u8]) -> Result<(bool, Option<Vec<u8>>), NotOpened> {
         let mut room = [0; HELLO_DATAGRAM_BYTES];
         match self.opening[0].open(&mut datagram.to_vec())? {
             Opened::Hello(head, greeting) => {
-                let greeted = self.greeter.greet(0, &head, &greeting, &mut room);
-                Ok((greeted.began, greeted.reply_bytes.map(|bytes| room[..bytes].to_vec())))
+                let greeted = self.greeter.greet(now_ns, &head, &greeting, &mut room);
+                assert_eq!(self.greeter.begin().is_some(), greeted.begins);
+                Ok((greeted.begins, greeted.reply_bytes.map(|bytes| room[..bytes].to_vec())))
             }
             Opened::Frame(..) => panic!("a frame in the place of a hello"),
         }

@@ -145,3 +145,12 @@ fn what_is_not_taken_is_counted_by_cause_and_told_once_a_second() {
     assert_eq!((counts.of(Some(1), Rejection::Forged), counts.of(Some(1), Rejection::Replay)), (30, 0));
     assert_eq!((counts.of(None, Rejection::Unsealed), counts.of(Some(0), Rejection::Unsealed)), (1, 0));
 }
+
+#[test]
+fn what_could_not_be_sent_can_be_read_again_whoever_lives_by_then() {
+    let (mut a, _) = pair();
+    let mut datagram = a.seal(Port::Packages, 1, b"a package").unwrap();
+    acquaint(&mut Router::new(1, 201), &mut a);
+    a.sealing[0].reopen(&mut datagram);
+    assert_eq!(&datagram[HEAD_BYTES..][..9], b"a package");
+}
