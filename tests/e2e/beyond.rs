@@ -242,6 +242,30 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     systems.stop();
 }
 
+#[test]
+fn a_robot_starts_without_its_certificates_and_takes_part_when_they_are_there() {
+    let place = Place::new();
+    let config = place.path("north.toml");
+    std::fs::write(&config, configured("north", 1, SEALED).replace(NODES[0].1, "127.0.0.77")).unwrap();
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "north", &mut launch);
+    let wait_for = |launch: &mut Running, module, state| {
+        wait(format!("{module} is {state}"), || {
+            launch.assert_runs();
+            (robot.state(module) == state).then_some(())
+        });
+    };
+    wait_for(&mut launch, "probe.0", "on");
+    assert_ne!((robot.state("tcp.255"), robot.state("tcp.0")), ("on", "on"), "there is no certificate");
+    place.say(&["certify", config.to_str().unwrap()]).ok();
+    for module in ["tcp.255", "tcp.0"] {
+        wait_for(&mut launch, module, "on");
+    }
+    drop(robot);
+    launch.stop();
+    place.assert_empty();
+}
+
 /// A program calls, subscribes and is called.
 fn check_foreign(systems: &Systems, system: u8, order: &str, certificates: &[&str]) {
     let mut program = systems.foreign(system, order, certificates);

@@ -43,7 +43,10 @@ use end::Ending;
 use events::Bell;
 use look::Looks;
 use program::Program;
-use rohrpost_config::{Installation, Module, Node as NodeConfig, TimeSource as ConfiguredTime};
+use rohrpost_config::{
+    Installation, Module, Node as NodeConfig, Program as Configured, TCP_CLIENT, TCP_ROUTER,
+    TimeSource as ConfiguredTime,
+};
 use rohrpost_mailbox::{
     LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
     wait_any,
@@ -196,6 +199,14 @@ impl Launch {
                 let child = &self.children[index];
                 match child.phase() {
                     Phase::Failed => return Err(not_ready(child, child.last_end())),
+                    _ if self.can_do_without(child) => {
+                        let note = format!(
+                            "{} does not start yet; the others go on without it, and it is tried again",
+                            child.text()
+                        );
+                        self.note(Some(note));
+                        break;
+                    }
                     _ if self.never_ready(child) => return Err(not_ready(child, child.last_end())),
                     Phase::Starting | Phase::Waiting | Phase::Stopping => {}
                     Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => break,
@@ -220,6 +231,12 @@ impl Launch {
             }
         }
         Ok(())
+    }
+
+    /// What goes beyond the LAN is no reason to keep a robot from starting: its certificates may be missing, or its link not be there yet.
+    fn can_do_without(&self, child: &Child) -> bool {
+        let is_beyond = |module: &Module| matches!(&module.program, Configured::Builtin(name) if [TCP_CLIENT, TCP_ROUTER].contains(&name.as_str()));
+        child.restarts() > 0 && self.installation.module(child.name()).is_some_and(is_beyond)
     }
 
     /// A router is never given up, but a node on which it never was ready has not started: perhaps another one has its port.

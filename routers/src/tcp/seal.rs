@@ -6,11 +6,11 @@
 //!  base.system-1.rohrpost       node `base` of system 1: it may host names of that system, and of no other
 //! ```
 
-use rustls::client::WebPkiServerVerifier;
+use rustls::client::{Resumption, WebPkiServerVerifier};
 use rustls::crypto::ring;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
-use rustls::server::WebPkiClientVerifier;
+use rustls::server::{NoServerSessionStorage, WebPkiClientVerifier};
 use rustls::{
     AlertDescription, CertificateError, ClientConfig, Connection, Error, RootCertStore, ServerConfig, version,
 };
@@ -123,7 +123,10 @@ impl ClientSeal {
             .map_err(|error| unfit(&error))?
             .with_webpki_verifier(verifier.map_err(|error| unfit(&error))?)
             .with_client_auth_cert(chain, key);
-        Ok(Self(Arc::new(config.map_err(|error| unfit(&error))?)))
+        let mut config = config.map_err(|error| unfit(&error))?;
+        // A session that goes on where another ended would not look at certificates again.
+        config.resumption = Resumption::disabled();
+        Ok(Self(Arc::new(config)))
     }
 
     pub(super) fn begin(&self) -> io::Result<Sealed> {
@@ -148,7 +151,11 @@ impl ServerSeal {
             .map_err(|error| unfit(&error))?
             .with_client_cert_verifier(verifier.map_err(|error| unfit(&error))?)
             .with_single_cert(chain, key);
-        Ok(Self(Arc::new(config.map_err(|error| unfit(&error))?)))
+        let mut config = config.map_err(|error| unfit(&error))?;
+        // As for clients: each connection shows a certificate that holds.
+        config.send_tls13_tickets = 0;
+        config.session_storage = Arc::new(NoServerSessionStorage {});
+        Ok(Self(Arc::new(config)))
     }
 
     pub(super) fn begin(&self) -> io::Result<Sealed> {

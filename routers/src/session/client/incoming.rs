@@ -75,7 +75,7 @@ impl Client {
         self.inn.came(carried.head.priority);
         let Some(session) = self.session(now_ns) else { return };
         // As old as it may be at most: a command that came too late must not be run.
-        let oldest_ns = (session.ns + session.error_ns).saturating_sub(carried.published_ns);
+        let oldest_ns = session.ns.saturating_add(session.error_ns).saturating_sub(carried.published_ns);
         let shift = i128::from(now_ns) - i128::from(session.ns);
         let published_ns = u64::try_from(i128::from(carried.published_ns) + shift).unwrap_or(0).min(now_ns);
         let delivered = if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) {

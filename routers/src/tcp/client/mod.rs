@@ -182,7 +182,11 @@ impl Work {
             }
             match self.client.poll(now_ns, &mut self.voice) {
                 Output::Connect => self.connect(now_ns),
-                Output::Write => self.write(),
+                Output::Write => {
+                    self.write();
+                    // However much there is to send, what comes has its turn.
+                    self.watches.look();
+                }
                 Output::Close => self.forget(),
                 Output::Wait { .. } if more => self.watches.look(),
                 Output::Wait { until_ns } => self.sleep(until_ns.min(say_ns)),

@@ -221,6 +221,9 @@ impl Work {
             }
             if !ending && self.shared.ends.load(Ordering::Acquire) {
                 ending = true;
+                // Who was told that it ends would come back.
+                let _ = self.epoll.delete(&self.listener);
+                self.accept_ns = None;
                 self.server.end(now_ns, &mut self.host);
             }
             match self.server.poll(now_ns, &mut self.host) {
