@@ -142,9 +142,9 @@ impl Inbound {
         }
     }
 
-    /// Whether an address is that of the node for which a datagram was sealed that came from there.
-    pub(crate) fn is_address_of(&self, from: NodeIndex, source: IpAddr) -> bool {
-        self.settings.nodes.get(usize::from(from)).is_some_and(|node| node.address == source)
+    /// Whether a node has this address.
+    pub(crate) fn is_address_of(&self, node: NodeIndex, address: IpAddr) -> bool {
+        self.settings.nodes.get(usize::from(node)).is_some_and(|node| node.address == address)
     }
 
     /// Bytes of the longest datagram that a router of ours seals.

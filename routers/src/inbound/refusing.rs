@@ -34,7 +34,7 @@ impl Inbound {
         if head.digest != ours.digest && !broken!(TakesOtherDigests) {
             return Some(differs(Reason::Digest));
         }
-        let is_there = ours.nodes.get(usize::from(head.from)).is_some_and(|node| node.address == source);
+        let is_there = self.is_address_of(head.from, source);
         let is_known = is_there && head.from != ours.own && head.to == ours.own && head.system == ours.system;
         (!is_known).then(|| differs(Reason::Stranger))
     }
