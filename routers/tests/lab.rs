@@ -164,7 +164,9 @@ fn a_network_that_was_divided_is_one_again() {
     let Some(lab) = lab(&addresses, 1500) else { return };
     let sockets = [0, 1, 2, 3].map(|index| socket(&lab, &format!("n{index}"), addresses[index]));
     let [a, b, c, d] = &sockets;
+    // Whose address is known: what waits for an address would be sent when it is found.
     arrives(a, c);
+    arrives(d, b);
     lab.divide(&["n2", "n3"]).unwrap();
     arrives(a, b);
     arrives(c, d);

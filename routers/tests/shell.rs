@@ -130,6 +130,7 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
     let head = FrameHead { kind: FrameKind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation: 99, sequence: 0 };
     let told = [0; 24];
     let claims = [&head.to_bytes(&[&told])[..HEAD_BYTES], &told].concat();
+    until("the peer is heard", || here.shell().stats().peer(1).link.incarnation.get() == 2);
     let before = foreign();
     let stranger = UdpSocket::bind((IpAddr::V4(Ipv4Addr::new(127, 127, 127, 127)), 0)).unwrap();
     for bytes in [&claims[..], b"anything", b""] {
