@@ -7,7 +7,7 @@ use rohrpost::interfaces::{FlowState, FlowStates, Links};
 
 /// What the columns say that their heads do not.
 pub(super) const LEGEND: &str = "\
-at worst: the bound that `check` computes, for slots that are kept; kept: the slowest package since whose publishing none was left out or cut
+at worst: the bound that `check` computes, for slots that are kept; kept: the slowest package since whose publishing none was missed or cut
 short; slowest: of all, as the router that sends measured it, up to the arrival at the other computer; beyond: packages slower than the bound,
 of kept: those among them whose slots were kept; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's class
 when they came to its mailbox, by their stamp. All that goes between two modules is put to one of their flows, declared or not";
