@@ -29,6 +29,8 @@ pub mod settings;
 pub mod statistics;
 pub mod table;
 #[cfg(feature = "lan")]
+pub mod tcp;
+#[cfg(feature = "lan")]
 pub mod tdma;
 
 pub use harness::Failure;

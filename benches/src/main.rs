@@ -1,4 +1,4 @@
-//! `cargo run --release -p rohrpost-bench -- local`, `lan` or `tdma`.
+//! `cargo run --release -p rohrpost-bench -- local`, `lan`, `tdma` or `tcp`.
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::cases::Case;
@@ -29,6 +29,9 @@ enum Command {
     /// Time slots: three network namespaces of this computer.
     #[cfg(feature = "lan")]
     Tdma(Run),
+    /// Packages between systems, over the TCP router: the loopback device.
+    #[cfg(feature = "lan")]
+    Tcp(Run),
 }
 
 #[derive(clap::Args)]
@@ -72,6 +75,8 @@ fn main() -> ExitCode {
             rohrpost_bench::lan::prepare();
             measure(&run, &cases::tdma::all())
         }
+        #[cfg(feature = "lan")]
+        Command::Tcp(run) => measure(&run, &cases::tcp::all()),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

@@ -127,7 +127,7 @@ fn claims(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
     for (module, lines) in installation.modules.iter().zip(lines) {
         let mut callers = Senders::of(installation, module, |other| calls(other, module));
         // Tools on other nodes call every module, through the router.
-        callers.router |= installation.nodes.len() > 1 && module.is_in_file();
+        callers.router |= installation.router_of(&module.node).is_some() && module.is_in_file();
         let mut called = Senders::of(installation, module, |other| calls(module, other));
         // Who is beyond the LAN calls every module, and may be called by each.
         let beyond = installation.tcp.is_some() && module.is_in_file();
@@ -170,7 +170,8 @@ impl Senders {
         let senders = || installation.modules.iter().filter(|other| other.name != module.name && sends(other));
         Self {
             local: senders().filter(|other| other.node == module.node).count(),
-            router: senders().any(|other| other.node != module.node),
+            router: installation.router_of(&module.node).is_some()
+                && senders().any(|other| other.node != module.node && installation.lan_index(&other.node).is_some()),
             beyond: false,
         }
     }

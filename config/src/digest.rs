@@ -4,6 +4,7 @@
 //! SipHash-2-4 under a fixed key gives the same on every node, compiler and release, which std's hasher does not promise.
 
 use crate::installation::Installation;
+use crate::node::Reach;
 use siphasher::sip::SipHasher24;
 use std::fmt::Write;
 use std::hash::Hasher;
@@ -13,7 +14,7 @@ use std::hash::Hasher;
 pub struct Digest {
     /// Equal wherever packages are exchanged: the classes, by id and name.
     pub common: u64,
-    /// Equal inside a system: its nodes, their tool instances, which module is where, and what routers agree on: port, MTU, masters
+    /// Equal inside a system: its nodes, which of them are on the LAN, their tool instances, which module is where, and what routers agree on: port, MTU, masters
     /// of time and how often they synchronise, the time slots and their tunnel.
     pub system: u64,
 }
@@ -50,7 +51,8 @@ impl Installation {
         let mut lines = Vec::new();
         for node in &self.nodes {
             let address = node.address.map_or("-".into(), |address| address.to_string());
-            lines.push(format!("node {} {address:?} {} {}", node.name, node.tools.start(), node.tools.end()));
+            let beyond = if node.reach == Reach::Tcp { " beyond" } else { "" };
+            lines.push(format!("node {} {address:?} {} {}{beyond}", node.name, node.tools.start(), node.tools.end()));
         }
         for module in &self.modules {
             let mut names: Vec<String> = module.names().skip(1).map(|name| name.to_string()).collect();
@@ -59,7 +61,7 @@ impl Installation {
         }
         // The order of the nodes is their index on the wire.
         if let Some(network) = &self.network {
-            let order: Vec<&str> = self.nodes.iter().map(|node| node.name.as_str()).collect();
+            let order: Vec<&str> = self.lan_nodes().iter().map(|node| node.name.as_str()).collect();
             if let Some(tdma) = &self.tdma {
                 lines.push(tdma.lan_text());
             }

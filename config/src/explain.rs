@@ -8,10 +8,10 @@ use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{Module, Program, Restart, RestartPolicy, Start};
 use crate::network::{LEVEL_NOT_REAL_TIME, TRANSIT};
-use crate::node::Node;
+use crate::node::{Node, Reach};
 use crate::output::LineFormat;
 use crate::saved::SavedValue;
-use crate::tcp::{TCP_CLIENT, TCP_ROUTER, Tcp};
+use crate::tcp::{TCP_CLIENT, TCP_ROUTER};
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
@@ -155,13 +155,7 @@ impl Page<'_> {
             size_text(tcp.quota_bytes as u64)
         );
         self.entry("beyond", &words);
-        match &tcp.certificates {
-            None => self.entry("security", Tcp::UNPROTECTED),
-            Some(folder) => {
-                let words = format!("TLS 1.3 to the TCP router, both ends with a certificate in {}", folder.display());
-                self.entry("security", &words);
-            }
-        }
+        self.entry("security", &tcp.security_text());
     }
 
     fn classes(&mut self) {
@@ -200,6 +194,10 @@ impl Page<'_> {
         self.line("");
         if let Some(address) = &node.address {
             self.entry("address", &address.to_string());
+        }
+        if node.reach == Reach::Tcp {
+            let words = "none on the LAN: packages to and from it, and its time, go through the TCP router";
+            self.entry("network", words);
         }
         self.entry("access", &format!("mode {:04o} of the shared-memory directory", node.mode));
         let (hand, launch) = (node.tools_by_hand(), node.launch_instance());

@@ -9,7 +9,7 @@ use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::module::{Context, Module};
 use crate::network::{self, Network};
-use crate::node::{Node, System};
+use crate::node::{self, Node, System};
 use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
 use crate::saved::Saved;
@@ -38,7 +38,7 @@ pub struct Installation {
     pub system: System,
     /// The classes.
     pub classes: ClassTable,
-    /// The nodes, in the order of the file; at least one.
+    /// The nodes, at least one: in the order of the file, but that those that are not on the LAN come behind the others.
     pub nodes: Vec<Node>,
     /// The modules, in the order of their start: the routers, if there are several nodes, what `[tcp]` brings, then those of the file.
     pub modules: Vec<Module>,
@@ -108,6 +108,11 @@ impl Installation {
         self.modules.iter().filter(move |module| module.node == node)
     }
 
+    /// The nodes that are on the LAN, or the only one; they come first in [`nodes`](Self::nodes).
+    pub fn lan_nodes(&self) -> &[Node] {
+        node::on_lan(&self.nodes)
+    }
+
     /// The node of a name.
     pub fn node(&self, name: &str) -> Option<&Node> {
         self.nodes.iter().find(|node| node.name == name)
@@ -153,22 +158,24 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     );
     let scheduling = SchedulingRule::read(file.section("scheduling", "[scheduling]"));
     let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
-    let tdma = Tdma::read(&file, sections(&file, "slot"), &nodes);
-    let network = file.section("network", "[network]").map(|section| Network::read(section, &nodes, tdma.as_ref()));
+    let on_lan = node::on_lan(&nodes);
+    let tdma = Tdma::read(&file, sections(&file, "slot"), on_lan);
+    let network = file.section("network", "[network]").map(|section| Network::read(section, on_lan, tdma.as_ref()));
     let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
     let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
-    network::judge(&file, &nodes, &classes);
+    network::judge(&file, on_lan, &classes);
     let tcp = file.section("tcp", "[tcp]").map(|section| Tcp::read(section, &nodes, tdma.as_ref()));
     if tcp.is_some() {
         tcp::judge(&file, &classes, scheduling);
     }
+    tcp::judge_nodes(&file, tcp.as_ref(), &nodes);
 
     let sections = self::sections(&file, "module");
     if sections.is_empty() {
         file.report("no module; add one: `[[module]]` with `name` and `builtin` or `program`");
     }
-    let mut routers = network::routers(&nodes, &classes, system.id);
+    let mut routers = network::routers(on_lan, &classes, system.id);
     routers.extend(tcp::modules(tcp.as_ref(), &nodes, &classes, system.id));
     let router_names: Vec<Name> = routers.iter().map(|(router, _)| router.name).collect();
     let directory = Directory::read(&sections, &classes, &router_names);

@@ -73,7 +73,7 @@ pub use keys::{KEY_BYTES, Key, Keys, KeysError};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
 pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
 pub use network::{LEVEL_NOT_REAL_TIME, NODES_MAX, Network, Route, Security, TRANSIT};
-pub use node::{Node, System};
+pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};
 pub use program::{MissingProgram, find_program};
 pub use reader::nearest;
@@ -82,7 +82,7 @@ pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
 pub use tcp::{TCP_CLIENT, TCP_ROUTER, Tcp};
-pub use tdma::{LATE, Tdma, TimeSlot, Tunnel};
+pub use tdma::{GATE, LATE, Tdma, TimeSlot, Tunnel};
 pub use time::TimeSource;
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,

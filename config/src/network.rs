@@ -127,16 +127,14 @@ impl Network {
         heads + security.tag_bytes()
     }
 
-    /// `tdma` are the time slots in which nodes send, if they do.
+    /// `nodes` are those of the LAN, `tdma` the time slots in which they send, if they do.
     pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) -> Self {
         if nodes.len() == 1 {
-            section
-                .report("there is one node, so nothing goes over a network; drop this section, or add the other nodes");
+            section.report(
+                "there is one node on the LAN, so nothing goes over that; drop this section, or add the other nodes",
+            );
         }
         let security = read_security(&section);
-        if tdma.is_some() && security == Security::Keys {
-            section.report("`security = \"keys\"`: with time slots nothing is sealed in this version; write `security = \"none\"`, or drop `mode`");
-        }
         let port = section.get("port").and_then(|item| item.whole(1024..=65_534, PORT.into()));
         let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
         let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
@@ -201,7 +199,7 @@ pub(crate) fn keys_folder(file: &Section<'_>, security: Security, folder: &Path)
     named.map(|path| folder.join(path))
 }
 
-/// Judges what several nodes need beside `[network]`: addresses that can reach each other, and the class of routers.
+/// Judges what several nodes of a LAN need beside `[network]`: addresses that can reach each other, and the class of routers.
 pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
     if nodes.len() < 2 {
         return;
@@ -222,7 +220,7 @@ pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
     }
 }
 
-/// The routers of all nodes, which no `[[module]]` describes; their messages name the line of the node.
+/// The routers of the nodes of a LAN, which no `[[module]]` describes; their messages name the line of the node.
 pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(Module, Lines)> {
     let Some(class) = classes.id(ROUTER).filter(|_| nodes.len() > 1) else { return Vec::new() };
     // Without it the node is cut off, so it is never given up: pauses grow, so that so many in a second cannot be. The first is short,
@@ -241,7 +239,7 @@ pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(
 }
 
 impl Installation {
-    /// What `check` and every start say of security; none if nothing goes over a network.
+    /// What `check` and every start say of the security of the LAN; none if nothing goes over it.
     pub fn security_text(&self) -> Option<String> {
         let network = self.network?;
         Some(match (network.security, &self.keys) {
@@ -260,17 +258,22 @@ impl Installation {
         self.nodes.iter().position(|known| known.name == node).and_then(|index| u8::try_from(index).ok())
     }
 
-    /// The router of a node; none if there is one node only.
-    pub fn router_of(&self, node: &str) -> Option<Name> {
-        let class = self.classes.id(ROUTER).filter(|_| self.network.is_some())?;
-        self.node_index(node).map(|index| Name::new(self.system.id, class.0, index, rohrpost_mailbox::local::COMMANDS))
+    /// The place of a node on the LAN, which is that among all nodes; none if it is not there.
+    pub fn lan_index(&self, node: &str) -> Option<u8> {
+        self.node_index(node).filter(|index| usize::from(*index) < self.lan_nodes().len())
     }
 
-    /// All names that lie on other nodes than this one: their modules, faces and tools, each with all its mailboxes. Sorted by name; no
+    /// The router of a node; none if it is not on the LAN, or alone there.
+    pub fn router_of(&self, node: &str) -> Option<Name> {
+        let class = self.classes.id(ROUTER).filter(|_| self.network.is_some())?;
+        self.lan_index(node).map(|index| Name::new(self.system.id, class.0, index, rohrpost_mailbox::local::COMMANDS))
+    }
+
+    /// All names that lie on other nodes of the LAN than this one: their modules, faces and tools, each with all its mailboxes. Sorted by name; no
     /// two overlap.
     pub fn routes_from(&self, node: &str) -> Vec<Route> {
         let mut routes = Vec::new();
-        for (other, index) in self.nodes.iter().zip(0..).filter(|(other, _)| other.name != node) {
+        for (other, index) in self.lan_nodes().iter().zip(0..).filter(|(other, _)| other.name != node) {
             let whole = |first: Name, last: Name| Route {
                 first: first.with_local(0),
                 last: last.with_local(u8::MAX),

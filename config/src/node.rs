@@ -19,7 +19,9 @@ pub struct System {
 pub struct Node {
     /// Its name: `main` of `[nodes.main]`.
     pub name: String,
-    /// Where other nodes reach it; there if there are several.
+    /// How it reaches the other nodes.
+    pub reach: Reach,
+    /// Where the other nodes of its LAN reach it; there if there are several.
     pub address: Option<IpAddr>,
     /// Permission bits of its shared-memory directory.
     pub mode: u32,
@@ -27,6 +29,24 @@ pub struct Node {
     pub tools: RangeInclusive<u8>,
     /// Line in the file.
     pub line: usize,
+}
+
+/// How a node and the others reach each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// By datagrams, on the LAN of the system.
+    Lan,
+    /// Through the TCP router alone, from wherever it is.
+    Tcp,
+}
+
+/// How the key `network` of a node says it.
+const LAN: &str = "lan";
+const TCP: &str = "tcp";
+
+/// Those of some nodes that are on the LAN: they come first.
+pub(crate) fn on_lan(nodes: &[Node]) -> &[Node] {
+    &nodes[..nodes.iter().take_while(|node| node.reach == Reach::Lan).count()]
 }
 
 impl System {
@@ -62,36 +82,48 @@ impl Node {
         if items.is_empty() {
             section.report("no node; add one, such as `[nodes.main]`");
         }
+        let on_lan = items.iter().filter(|item| !item.has("network", TCP)).count();
         let mut nodes: Vec<Self> = Vec::new();
         for item in &items {
-            let node = Self::read(item, items.len() == 1, &nodes);
+            let alone = Alone { on_lan: on_lan == 1, at_all: items.len() == 1 };
+            let node = Self::read(item, alone, &nodes);
             nodes.extend(node);
         }
+        // So those of the LAN have the first places, by which they call each other.
+        nodes.sort_by_key(|node| node.reach == Reach::Tcp);
         nodes
     }
 
-    fn read(item: &Item<'_>, alone: bool, earlier: &[Self]) -> Option<Self> {
+    fn read(item: &Item<'_>, alone: Alone, earlier: &[Self]) -> Option<Self> {
         let name = item.key.clone();
         if !is_word(&name) {
             item.report(format!("`{name}` is no node name; use lower-case letters, digits and `-`, a letter first"));
         }
         let section = item.section(&format!("node `{name}`"))?;
-        let address = match section.get("address") {
-            Some(item) => read_address(&item, earlier),
-            None if alone => None,
-            None => {
+        let reach = section.get("network").and_then(|item| item.choice(&[(LAN, Reach::Lan), (TCP, Reach::Tcp)]));
+        let reach = reach.unwrap_or(Reach::Lan);
+        let address = match (section.get("address"), reach) {
+            (Some(item), Reach::Tcp) => {
+                item.report(
+                    "`address` is where others on the LAN reach a node, and with `network = \"tcp\"` nobody does; drop one of both",
+                );
+                None
+            }
+            (Some(item), Reach::Lan) => read_address(&item, earlier),
+            (None, Reach::Lan) if !alone.on_lan => {
                 section.report(format!(
                     "`address` is missing: with several nodes the others must know where this one is; write for example \
-                     `address = \"10.77.0.{}\"`",
+                     `address = \"10.77.0.{}\"`, or `network = \"tcp\"` if it reaches them through the TCP router alone",
                     earlier.len() + 1
                 ));
                 None
             }
+            (None, _) => None,
         };
         let mode = section.get("mode").and_then(|item| read_mode(&item)).unwrap_or(0o700);
         let tools = match section.get("tools") {
             Some(item) => read_tools(&item, earlier),
-            None if alone => Some(0..=63),
+            None if alone.at_all => Some(0..=63),
             None => {
                 section.report(format!(
                     "`tools` is missing: with several nodes each needs tool instances of its own; write `tools = {}`",
@@ -101,8 +133,17 @@ impl Node {
             }
         };
         section.finish();
-        Some(Self { name, address, mode, tools: tools.unwrap_or(0..=63), line: item.line })
+        Some(Self { name, reach, address, mode, tools: tools.unwrap_or(0..=63), line: item.line })
     }
+}
+
+/// What a node needs not say, since nobody asks.
+#[derive(Clone, Copy)]
+struct Alone {
+    /// No other node is on its LAN.
+    on_lan: bool,
+    /// There is no other node.
+    at_all: bool,
 }
 
 fn read_mode(item: &Item<'_>) -> Option<u32> {

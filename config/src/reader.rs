@@ -297,6 +297,12 @@ impl<'d> Item<'d> {
         text.or_else(|| self.wrong(&format!("a list of texts, such as `{} = [\"{example}\"]`", self.key)))
     }
 
+    /// Whether it is a table in which a key is this word. Nobody takes that for reading the key.
+    pub(crate) fn has(&self, key: &str, word: &str) -> bool {
+        let table = self.value.get_ref().as_table();
+        table.and_then(|table| table.get(key)).is_some_and(|value| value.get_ref().as_str() == Some(word))
+    }
+
     pub(crate) fn is_table(&self) -> bool {
         self.value.get_ref().is_table()
     }

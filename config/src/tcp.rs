@@ -8,7 +8,7 @@ use crate::classes::{ClassTable, TCP};
 use crate::installation::Installation;
 use crate::module::{Lines, Module, Restart, RestartPolicy};
 use crate::network::{NODES_MAX, level};
-use crate::node::Node;
+use crate::node::{Node, Reach};
 use crate::reader::Section;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tdma::Tdma;
@@ -33,6 +33,8 @@ const BULK_BELOW: u8 = 16;
 /// Networks of computers beside each other are mostly no smaller.
 const LAN_BITS_V4: u32 = 24;
 const LAN_BITS_V6: u32 = 64;
+/// Letters of a part of a domain name (RFC 1035).
+const LABEL_MAX: usize = 63;
 /// Above the clients of the nodes, of which there are at most 64.
 const SERVER_INSTANCE: u8 = u8::MAX;
 
@@ -57,6 +59,19 @@ impl Tcp {
     /// What `check` says of it, and each start of a client or the server.
     pub const UNPROTECTED: &str = "security = \"none\": packages to and from the TCP router are neither sealed nor signed, and whoever reaches its port may take part; use a \
          network that nobody else reaches";
+
+    /// What `check` says of security.
+    pub fn security_text(&self) -> String {
+        match &self.certificates {
+            None => Self::UNPROTECTED.into(),
+            Some(folder) => {
+                format!(
+                    "security = \"tls\": TLS 1.3 to the TCP router, both ends with a certificate in {}",
+                    folder.display()
+                )
+            }
+        }
+    }
 
     /// In which queue of a connection a package waits, as in the routers of the LAN: 0 goes first.
     pub fn level(&self, priority: Priority) -> u8 {
@@ -119,7 +134,7 @@ fn certificates(section: &Section<'_>, is_sealed: Option<bool>) -> Option<PathBu
         (Some(item), true) => item.text("certificates").map(PathBuf::from),
         (None, true) => {
             section.report(format!(
-                "`certificates` is missing; write for example `{EXAMPLE}`, the folder that `rohrpost certify` fills"
+                "`certificates` is missing; write for example `{EXAMPLE}`, the folder that `rohrpost keys new` fills"
             ));
             None
         }
@@ -180,6 +195,56 @@ pub(crate) fn judge(file: &Section<'_>, classes: &ClassTable, scheduling: Schedu
     }
 }
 
+/// Judges what nodes need that are not on the LAN: a TCP router, and one that knows the time that they are to have.
+pub(crate) fn judge_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
+    let is_beyond = |node: &&Node| node.reach == Reach::Tcp;
+    judge_names(file, tcp, nodes);
+    let Some(node) = nodes.iter().find(is_beyond) else { return };
+    let Some(tcp) = tcp else {
+        let what = format!(
+            "node `{}`: `network = \"tcp\"`: the others are reached through the TCP router, and there is none; add `[tcp]`, or drop \
+             `network` and write an `address`",
+            node.name
+        );
+        return file.reader.report(node.line, what);
+    };
+    let server = nodes.iter().find(|node| tcp.server.as_ref() == Some(&node.name));
+    if server.is_some_and(|server| !is_beyond(&server)) {
+        return;
+    }
+    let homes: Vec<String> =
+        nodes.iter().filter(|node| !is_beyond(node)).map(|node| format!("`{}`", node.name)).collect();
+    let right = if homes.is_empty() {
+        "drop `network` of the node that runs it".into()
+    } else {
+        format!("write one of {}", homes.join(", "))
+    };
+    let line = file.get("tcp").map_or(file.line, |tcp| tcp.line);
+    file.reader.report(
+        line,
+        format!(
+            "[tcp]: `server` names no node that is there without the TCP router, and node `{}`, with `network = \"tcp\"`, has the time of \
+             that node; {right}",
+            node.name
+        ),
+    );
+}
+
+/// A certificate names its node as a part of a domain name.
+fn judge_names(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
+    if tcp.is_none_or(|tcp| tcp.certificates.is_none()) {
+        return;
+    }
+    for node in nodes.iter().filter(|node| node.name.len() > LABEL_MAX || node.name.ends_with('-')) {
+        let what = format!(
+            "[nodes]: `{}` fits in no certificate, of which `security = \"tls\"` in [tcp] makes use; take a name of {LABEL_MAX} letters at most \
+             that does not end in `-`",
+            node.name
+        );
+        file.reader.report(node.line, what);
+    }
+}
+
 /// The clients of all nodes and the server, which no `[[module]]` describes; their messages name the line of the node.
 pub(crate) fn modules(tcp: Option<&Tcp>, nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(Module, Lines)> {
     let (Some(tcp), Some(class)) = (tcp, classes.id(TCP)) else { return Vec::new() };
@@ -202,6 +267,11 @@ pub(crate) fn modules(tcp: Option<&Tcp>, nodes: &[Node], classes: &ClassTable, s
 }
 
 impl Installation {
+    /// What `check` and every start say of the security of LAN and TCP router, as far as there are any.
+    pub fn security_texts(&self) -> Vec<String> {
+        self.security_text().into_iter().chain(self.tcp.as_ref().map(Tcp::security_text)).collect()
+    }
+
     /// The client of the TCP router on a node; none without `[tcp]`.
     pub fn tcp_client_of(&self, node: &str) -> Option<Name> {
         let class = self.classes.id(TCP).filter(|_| self.tcp.is_some())?;

@@ -14,8 +14,10 @@ use std::net::Ipv4Addr;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-/// A slot is begun so late at most; later it is left unused.
+/// Bounds allow for slots that are begun so late.
 pub const LATE: Duration = Duration::from_micros(50);
+/// A slot is begun so late at most; later it is left unused. What is begun after [`LATE`] may not carry all that bounds reckon with.
+pub const GATE: Duration = Duration::from_micros(100);
 
 const CYCLE: Duration = Duration::from_millis(5);
 /// Below it a Linux computer wakes up too late too often; above it a package waits for longer than it may.

@@ -1,6 +1,6 @@
 //! Where system time comes from.
 
-use crate::node::Node;
+use crate::node::{self, Node, Reach};
 use crate::reader::{Item, Section, nearest};
 use crate::units::duration_text;
 use std::time::Duration;
@@ -40,13 +40,15 @@ impl TimeSource {
         }
     }
 
-    /// `file` is asked for the line of what is missing; `cycle` is that of the time slots, if there are any.
+    /// `file` is asked for the line of what is missing; `nodes` are all of them; `cycle` is that of the time slots, if there are any.
     pub(crate) fn read(
         section: Option<Section<'_>>,
         file: &Section<'_>,
         nodes: &[Node],
         cycle: Option<Duration>,
     ) -> Self {
+        let beyond = nodes.iter().find(|node| node.reach == Reach::Tcp);
+        let nodes = node::on_lan(nodes);
         let several = nodes.len() > 1;
         let Some(section) = section else {
             if several {
@@ -69,13 +71,21 @@ impl TimeSource {
         let is_master = matches!(source, Self::Master { .. });
         match &item {
             Some(item) if is_master && nodes.len() == 1 => {
-                item.report("`source` is \"master\", and there is one node; write \"local\", or add the other nodes");
+                item.report("`source` is \"master\", and there is one node on the LAN; write \"local\", or add the other nodes");
             }
             Some(item) if several && !is_master => item.report(
                 "`source`: with several nodes one of them is the master of time, and no other source reaches all of them; write \
                  `source = \"master\"`",
             ),
             None if several => section.report("`source` is missing; with several nodes write `source = \"master\"`"),
+            Some(item) if matches!(source, Self::Simulation { .. } | Self::Log) => {
+                if let Some(node) = beyond {
+                    item.report(format!(
+                        "`source`: the time of node `{}` comes by TCP, in which only clocks of computers can be told; write \"local\"",
+                        node.name
+                    ));
+                }
+            }
             _ => {}
         }
         if let Some(item) = section.get("speed") {

@@ -1,7 +1,7 @@
 //! What other crates rely on when they use an installation.
 
 use rohrpost_config::{
-    Full, Installation, Level, LineFormat, Node, Program, RestartPolicy, Scheduling, Start, TimeSource, explain,
+    Full, Installation, Level, LineFormat, Node, Program, Reach, RestartPolicy, Scheduling, Start, TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -23,7 +23,8 @@ fn every_key_arrives() {
     assert_eq!(full.folder, Path::new("conf"));
     assert_eq!(full.scheduling(Class(159)), Scheduling::Normal { nice: 0 });
     assert_eq!(full.scheduling(Class(160)), Scheduling::Fifo { priority: 1 });
-    let base = Node { name: "base".into(), address: Some([10, 0, 0, 1].into()), mode: 0o770, tools: 0..=15, line: 21 };
+    let address = Some([10, 0, 0, 1].into());
+    let base = Node { name: "base".into(), reach: Reach::Lan, address, mode: 0o770, tools: 0..=15, line: 21 };
     assert_eq!(full.node("base"), Some(&base));
     assert_eq!(full.time, TimeSource::Master { masters: vec![1, 0], interval: Duration::from_millis(500) });
     let network = full.network.unwrap();

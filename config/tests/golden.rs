@@ -45,8 +45,10 @@ fn files_that_ship_load_and_explain_themselves() {
         "demo-log.toml",
         "demo-nodes.toml",
         "demo-tdma.toml",
+        "demo-tcp.toml",
         "tests/tdma.toml",
         "tests/tcp.toml",
+        "tests/beyond.toml",
         "tests/full.toml",
     ] {
         let text = fs::read_to_string(folder().join(file)).unwrap();

@@ -37,6 +37,17 @@ fn every_key_arrives() {
     assert_eq!(installation.network.unwrap().rate_bytes_s, 12_500_000, "the link's");
 }
 
+/// What seals takes its part of each slot, and with it of each bound.
+#[test]
+fn what_leaves_in_slots_may_be_sealed_and_takes_longer() {
+    let open = include_str!("../demo-tdma.toml");
+    let sealed = open.replace("security = \"none\"", "security = \"keys\"");
+    let worst =
+        |text: &str| -> Duration { bounds(&parse(text)).into_iter().map(|bound| bound.latency.unwrap().latency).sum() };
+    assert!(sealed != open && worst(&sealed) > worst(open));
+    assert_ne!(parse(&sealed).digest(), parse(open).digest(), "who seals has nothing to do with who does not");
+}
+
 #[test]
 fn a_slot_holds_what_the_link_carries_before_the_guard() {
     let tdma = parse(SLOTS).tdma.unwrap();

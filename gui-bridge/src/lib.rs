@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 mod asking;
+mod beyond;
 mod blueprint;
 mod bridge;
 mod charts;

@@ -31,7 +31,7 @@ const NODE: palette::Rgb = [86, 180, 233];
 const OLD: Duration = Duration::from_secs(3);
 
 /// The tab of both views.
-fn tab() -> Tab {
+pub(crate) fn tab() -> Tab {
     Tab::own("Network", || {
         let chart =
             |name: &str, origin: &str| -> ContainerLike { TimeSeriesView::new(name).with_origin(origin).into() };

@@ -16,6 +16,8 @@ const STATES: [(&str, u32); 6] = [
     ("silent", 0xA97B_D6FF),
 ];
 
+/// What is so far behind is not told late: time itself went back.
+const STEPPED_BACK_NS: u64 = 10_000_000_000;
 /// A line is cut after this many bytes.
 const LINE_MAX: usize = 4096;
 
@@ -47,6 +49,10 @@ impl Level {
 #[derive(Default)]
 pub(crate) struct States {
     last: BTreeMap<String, String>,
+    /// System time of the table that was drawn last, ns.
+    table_ns: u64,
+    /// It does not say all.
+    table_is_old: bool,
 }
 
 impl From<OutputLevel> for Level {
@@ -81,13 +87,17 @@ impl Scene {
     pub fn module_state(&mut self, module: &str, state: &str, text: &str) {
         let lane = entity(&["modules", module]);
         match self.states.last.insert(module.into(), state.into()) {
-            Some(last) if last == state => return,
+            Some(last) if last == state => {
+                if self.states.table_is_old {
+                    self.draw_states();
+                }
+                return;
+            }
             Some(_) => {}
             None => self.log_static(lane.clone(), &colours()),
         }
         self.log(lane, &StateChange::single(state));
-        let table = self.states.table();
-        self.log(entity(&["modules now"]), &table);
+        self.draw_states();
         if text.is_empty() {
             return;
         }
@@ -97,6 +107,27 @@ impl Scene {
             _ => Level::Info,
         };
         self.output_line(module, level, text);
+    }
+
+    /// What is no module has a lane beside those that are: from now on it is in this state. Each change is drawn, however soon the next comes.
+    pub(crate) fn lane(&mut self, name: &str, state: &str) {
+        let lane = entity(&["modules", name]);
+        if self.states.last.insert(name.into(), state.into()).is_none() {
+            self.log_static(lane.clone(), &colours());
+        }
+        self.log_event(lane, &StateChange::single(state));
+        self.draw_states();
+    }
+
+    /// The table, unless a later one is drawn: then the next word of any module brings it.
+    fn draw_states(&mut self) {
+        let behind_ns = self.states.table_ns.saturating_sub(self.time_ns);
+        self.states.table_is_old = (1..STEPPED_BACK_NS).contains(&behind_ns);
+        if !self.states.table_is_old {
+            self.states.table_ns = self.time_ns;
+            let table = self.states.table();
+            self.log(entity(&["modules now"]), &table);
+        }
     }
 
     /// `module` says something.

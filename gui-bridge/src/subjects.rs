@@ -100,6 +100,10 @@ impl Subjects {
             let (module, data) = (text(router), Some(data.into()));
             entries.push(Entry { from: router, module, data, rate: None, answered: false, asking: None });
         }
+        for client in installation.nodes.iter().filter_map(|node| installation.tcp_client_of(&node.name)) {
+            let (module, data) = (text(client), Some("link".into()));
+            entries.push(Entry { from: client, module, data, rate: None, answered: false, asking: None });
+        }
         let views = own.into_iter().chain(views::built_in()).collect();
         Self { views, entries, subjects: Vec::new() }
     }

@@ -1,5 +1,6 @@
 //! The views that are built in: a scan is a scan, whoever sends it, and what nobody knows is drawn by its description.
 
+use crate::beyond::Beyond;
 use crate::blueprint::Tab;
 use crate::network::{Clocks, Network};
 use crate::scene::{DrawError, Scene};
@@ -23,6 +24,7 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
         Box::new(Output),
         Box::new(Network::default()),
         Box::new(Clocks),
+        Box::new(Beyond::default()),
         Box::new(Slots::default()),
         Box::new(Flows),
         Box::new(Other),

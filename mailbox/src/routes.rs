@@ -25,9 +25,6 @@ const FILE: &str = "routes";
 /// Of the same form: for names that the other leads nowhere.
 const BEYOND: &str = "routes.beyond";
 
-/// Why the file cannot be believed; another process wrote it.
-const DAMAGED: &str = "its file `routes` is damaged, or another version's; start the node's router again";
-
 impl Node {
     /// Says that packages for these names (first and last of each range) go to the mailbox `via`, if they have no mailbox
     /// here. What was said before is forgotten. Without ranges, nothing goes anywhere.
@@ -106,23 +103,27 @@ impl Node {
 
 /// The mailbox that packages for a name go to, or what is wrong with the file.
 pub(crate) fn find(node: &Path, name: Name) -> Result<Option<Name>, String> {
-    match find_in(&node.join(FILE), name)? {
-        None => find_in(&node.join(BEYOND), name),
+    match find_in(node, FILE, name)? {
+        None => find_in(node, BEYOND, name),
         found => Ok(found),
     }
 }
 
-fn find_in(path: &Path, name: Name) -> Result<Option<Name>, String> {
+fn find_in(node: &Path, file_name: &str, name: Name) -> Result<Option<Name>, String> {
     let mut bytes = Vec::new();
-    match open_to_read(path) {
+    let unread = |error: io::Error| format!("its file `{file_name}`: {error}");
+    match open_to_read(&node.join(file_name)) {
         Ok(file) => {
             let most = (HEAD_BYTES + ROUTES_MAX * RANGE_BYTES) as u64;
-            file.take(most).read_to_end(&mut bytes).map_err(|error| format!("its file `routes`: {error}"))?;
+            file.take(most).read_to_end(&mut bytes).map_err(unread)?;
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(format!("its file `routes`: {error}")),
+        Err(error) => return Err(unread(error)),
     }
-    look_up(&bytes, name).ok_or_else(|| DAMAGED.into())
+    // Another process wrote it.
+    let who = if file_name == BEYOND { "client of the TCP router" } else { "router" };
+    look_up(&bytes, name)
+        .ok_or_else(|| format!("its file `{file_name}` is damaged, or another version's; start the node's {who} again"))
 }
 
 /// None when these bytes are no routes.

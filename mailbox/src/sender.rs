@@ -219,7 +219,7 @@ impl Sender {
     /// A slot for a body of `len` bytes. One too large is refused before it pushes anybody out.
     fn claim(&mut self, priority: Priority, label: Option<&Label>, len: usize) -> Result<Claim, SendError> {
         if self.is_routed() && self.participant.node().registry_epoch() != self.epoch {
-            self.look_here()?;
+            self.look_again()?;
         }
         for _ in 0..REOPEN_MAX {
             let me = self.participant.claimant();
@@ -252,12 +252,19 @@ impl Sender {
         self.segment.name != self.to
     }
 
-    /// Looks whether the mailbox is on this node by now: what is here goes before any route.
+    /// Looks whether the mailbox is on this node by now, or another router leads to it: what is here goes before any route. As long as
+    /// there is nothing better, it goes on as before.
     #[cold]
-    fn look_here(&mut self) -> Result<(), SendError> {
+    fn look_again(&mut self) -> Result<(), SendError> {
         let epoch = self.participant.node().registry_epoch();
-        if let Some(here) = open_here(&self.participant, self.to)? {
-            self.enter(here)?;
+        let node = self.participant.node().path();
+        let router = || routes::find(node, self.to).ok().flatten().filter(|router| *router != self.segment.name);
+        let better = match open_here(&self.participant, self.to)? {
+            None => router().map(|router| open_here(&self.participant, router)).transpose()?.flatten(),
+            here => here,
+        };
+        if let Some(better) = better {
+            self.enter(better)?;
         }
         self.epoch = epoch;
         Ok(())

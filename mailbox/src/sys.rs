@@ -20,7 +20,7 @@ pub enum Scheduling {
 /// Time of a processor that a thread needs again and again, for SCHED_DEADLINE.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reservation {
-    /// So much of it in each period, ns. Who uses it up stands still until the next period. From 1024 on.
+    /// So much of it in each period, ns. Who uses it up stands still until the next period, unless nobody has reserved the rest. From 1024 on.
     pub runtime_ns: u64,
     /// It has got it so long after it has become ready to run, at the latest, ns; at least the runtime, at most the period.
     pub deadline_ns: u64,
@@ -84,10 +84,13 @@ const _: () = {
 /// # Errors
 /// [`ReservationError`]
 pub fn reserve(reservation: Reservation) -> Result<(), ReservationError> {
+    // Interrupts and the hypervisor take the processor from a thread that runs, and the kernel counts that as the thread's. Whoever exceeds
+    // its reservation by that stands still for as many periods as make up for it, unless it counts what nobody has reserved as well.
+    let flags = libc::SCHED_FLAG_RESET_ON_FORK | libc::SCHED_FLAG_RECLAIM;
     let attributes = libc::sched_attr {
         size: size_of::<libc::sched_attr>() as u32,
         sched_policy: libc::SCHED_DEADLINE as u32,
-        sched_flags: libc::SCHED_FLAG_RESET_ON_FORK as u64,
+        sched_flags: flags as u64,
         sched_nice: 0,
         sched_priority: 0,
         sched_runtime: reservation.runtime_ns,

@@ -145,6 +145,25 @@ fn a_name_that_comes_here_later_is_found_and_one_that_goes_is_routed() {
 }
 
 #[test]
+fn a_way_of_the_lan_goes_before_one_beyond_it_as_soon_as_there_is_one() {
+    const CLIENT: Name = Name::new(1, 64, 0, local::TRANSIT);
+    let ground = Ground::new();
+    ground.node().set_routes_beyond(CLIENT, &[(FAR, FAR)]).unwrap();
+    let mut client = ground.join().receiver(CLIENT, shape(4)).unwrap();
+    let mut sender = ground.join().sender(FAR).unwrap();
+    send(&mut sender, 1);
+    ground.node().set_routes(TRANSIT, &[(FAR, FAR)]).unwrap();
+    // Its router does not run yet: what there is stays good.
+    send(&mut sender, 2);
+    let mut transit = transit(&ground);
+    send(&mut sender, 3);
+    let ids = |mailbox: &mut Receiver| {
+        std::iter::from_fn(|| mailbox.try_receive().map(|package| package.head().id)).collect::<Vec<_>>()
+    };
+    assert_eq!((ids(&mut client), ids(&mut transit)), (vec![1, 2], vec![3]));
+}
+
+#[test]
 fn one_participant_sends_to_as_many_far_mailboxes_as_the_router_has_claims() {
     let ground = routed();
     let mut transit = transit(&ground);
@@ -184,4 +203,8 @@ fn damaged_routes_are_told_and_not_followed() {
     let error = ground.join().sender(FAR).err().unwrap().to_string();
     assert!(error.contains("`routes` is damaged") && error.contains("start the node's router again"), "{error}");
     assert_eq!(ground.node().route(FAR), None);
+    std::fs::remove_file(ground.path().join("routes")).unwrap();
+    std::fs::write(ground.path().join("routes.beyond"), b"rohrpost, but what then?").unwrap();
+    let error = ground.join().sender(FAR).err().unwrap().to_string();
+    assert!(error.contains("`routes.beyond` is damaged") && error.contains("client of the TCP router"), "{error}");
 }

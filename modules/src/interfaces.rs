@@ -9,7 +9,10 @@ pub use router::{
     Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
 };
 
-pub use tcp::{BeyondClient, BeyondClients, BeyondLink, BeyondState, ClassPassed, Tcp, TcpInterface, TcpProxy};
+pub use tcp::{
+    BeyondClient, BeyondClients, BeyondHost, BeyondHosts, BeyondLink, BeyondOutage, BeyondState, BeyondTime,
+    ClassPassed, Tcp, TcpInterface, TcpProxy,
+};
 
 use crate::interface;
 use crate::output::OutputLine;

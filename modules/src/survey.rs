@@ -262,11 +262,7 @@ fn is_of(installation: &Installation, name: Name, nodes: &[&str]) -> bool {
 /// The node that a name is on: that of its module, or the one that hands out its instance of class `tool`. None for what is in
 /// no configuration.
 pub fn node_of(installation: &Installation, name: Name) -> Option<&str> {
-    if name.class() == installation.classes.tool() {
-        let instance = name.instance();
-        return installation.nodes.iter().find(|node| node.tools.contains(&instance)).map(|node| node.name.as_str());
-    }
-    installation.module(name.module()).map(|module| module.node.as_str())
+    installation.node_of(name)
 }
 
 /// The same, but of packages in transit only those that were lost there: the others are received once more where they go.

@@ -127,6 +127,10 @@ mod variants {
         RegistersOnce,
         /// Session: a client tries again at once, however often it fails.
         NeverBacksOff,
+        /// Session: every registration is looked at, however many one client sends.
+        RegistersAtOnce,
+        /// Session: a question for the time waits behind packages that have not begun to leave.
+        AsksLast,
         /// Security: what was opened before is opened again.
         OpensTwice,
         /// Security: whoever says hello is held to live.
@@ -157,6 +161,16 @@ mod variants {
         TrustsItself,
         /// Time slots: who goes by what it has heard only asks before its slot begins.
         AsksTooSoon,
+        /// Time slots, sealed: a node begins a time whatever it hears of those who have not shown that they live.
+        IgnoresUnproven,
+        /// Time slots, sealed: it never does as long as it hears any.
+        WaitsForEver,
+        /// Time slots, sealed: what comes of who has not shown that it lives is taken as if it had.
+        TakesUnproven,
+        /// Time slots, sealed: by the time of such more than hellos leave.
+        TellsUnproven,
+        /// Time slots, sealed: by the time of such hellos leave in each slot.
+        AsksWithoutPause,
         /// Time: a master does not care who is too far off to follow it.
         NeverBeginsEpoch,
     }
@@ -190,7 +204,7 @@ mod variants {
         ];
 
         /// All mistakes of sessions.
-        pub const SESSION: [Self; 18] = [
+        pub const SESSION: [Self; 20] = [
             Self::ForgetsPieces,
             Self::TakesTwice,
             Self::TakesAnyRange,
@@ -209,6 +223,8 @@ mod variants {
             Self::TakesOtherSystems,
             Self::RegistersOnce,
             Self::NeverBacksOff,
+            Self::RegistersAtOnce,
+            Self::AsksLast,
         ];
 
         /// All mistakes of what leaves in a slot. Where packages leave as they come they do not show.
@@ -225,6 +241,17 @@ mod variants {
             Self::ReplacesHeard,
             Self::SyncInForeignWindow,
             Self::KeepsOwnTime,
+        ];
+    }
+
+    impl Broken {
+        /// All mistakes of who joins a network with time slots where datagrams are sealed.
+        pub const UNPROVEN: [Self; 5] = [
+            Self::IgnoresUnproven,
+            Self::WaitsForEver,
+            Self::TakesUnproven,
+            Self::TellsUnproven,
+            Self::AsksWithoutPause,
         ];
     }
 

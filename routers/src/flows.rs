@@ -39,7 +39,9 @@ impl Flow {
         let flow = |(index, flow): (usize, &rohrpost_config::Flow)| {
             let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
             let bound = bounds.iter().find(|bound| bound.flow == index);
-            (from.node == node && to.node != node).then(|| Self {
+            // What goes through the TCP router never comes to this one.
+            let on_lan = installation.lan_index(&to.node).is_some();
+            (from.node == node && to.node != node && on_lan).then(|| Self {
                 from: names(flow.from, from),
                 to: names(flow.to, to),
                 size: flow.size,

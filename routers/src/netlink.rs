@@ -41,7 +41,9 @@ const IFLA_INFO_DATA: u16 = 2;
 const VETH_INFO_PEER: u16 = 1;
 const IFA_ADDRESS: u16 = 1;
 const IFA_LOCAL: u16 = 2;
+const RTA_DST: u16 = 1;
 const RTA_OIF: u16 = 4;
+const RTA_GATEWAY: u16 = 5;
 
 const IFF_UP: u32 = 0x1;
 /// Up, with a carrier, and the kernel has noticed.
@@ -205,6 +207,20 @@ impl Netlink {
         let scope = if like.is_ipv4() { RT_SCOPE_LINK } else { RT_SCOPE_UNIVERSE };
         let fixed = [family(like), 0, 0, 0, RT_TABLE_MAIN, RTPROT_STATIC, scope, RTN_UNICAST, 0, 0, 0, 0];
         self.ask(Message::new(RTM_NEWROUTE, NLM_F_CREATE | NLM_F_EXCL, &fixed).number(RTA_OIF, device)).map(drop)
+    }
+
+    /// One address is reached by a device, directly or through another.
+    pub(crate) fn add_route(&mut self, device: Device, to: IpAddr, through: Option<IpAddr>) -> io::Result<()> {
+        let scope = if to.is_ipv4() && through.is_none() { RT_SCOPE_LINK } else { RT_SCOPE_UNIVERSE };
+        let octets = octets(to);
+        let bits = 8 * octets.len() as u8;
+        let fixed = [family(to), bits, 0, 0, RT_TABLE_MAIN, RTPROT_STATIC, scope, RTN_UNICAST, 0, 0, 0, 0];
+        let message = Message::new(RTM_NEWROUTE, NLM_F_CREATE | NLM_F_EXCL, &fixed).attribute(RTA_DST, &octets);
+        let message = match through {
+            Some(through) => message.attribute(RTA_GATEWAY, &self::octets(through)),
+            None => message,
+        };
+        self.ask(message.number(RTA_OIF, device)).map(drop)
     }
 
     /// Whether a device carries packets: it is up, and so is its other end.

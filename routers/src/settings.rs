@@ -38,7 +38,7 @@ pub struct Settings {
     pub system: u8,
     /// Which of `nodes` it runs on.
     pub own: NodeIndex,
-    /// All nodes, in the order of the configuration; [`NODES_MAX`](rohrpost_config::NODES_MAX) at most.
+    /// All nodes of the LAN, in the order of the configuration; [`NODES_MAX`](rohrpost_config::NODES_MAX) at most.
     pub nodes: Vec<NodeSettings>,
     /// What must be equal on both ends of a wire.
     pub digest: u64,
@@ -70,11 +70,11 @@ pub struct NodeSettings {
 /// Why there is no router for a node.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum SettingsError {
-    /// There is one node.
-    #[error("the installation has one node, so it needs no router; add the other nodes and `[network]`")]
+    /// There is one node on the LAN.
+    #[error("the installation has one node on the LAN, so it needs no router; add the other nodes and `[network]`")]
     OneNode,
-    /// There is no such node.
-    #[error("the installation has no node `{0}`; it has {1}")]
+    /// There is no such node on the LAN.
+    #[error("the installation has no node `{0}` on the LAN; there it has {1}")]
     NoNode(String, String),
 }
 
@@ -85,13 +85,13 @@ impl Settings {
     /// [`SettingsError`]
     pub fn new(installation: &Installation, node: &str, incarnation: u64) -> Result<Self, SettingsError> {
         let network = installation.network.ok_or(SettingsError::OneNode)?;
-        let Some(own) = installation.node_index(node) else {
-            let known: Vec<_> = installation.nodes.iter().map(|node| format!("`{}`", node.name)).collect();
+        let Some(own) = installation.lan_index(node) else {
+            let known: Vec<_> = installation.lan_nodes().iter().map(|node| format!("`{}`", node.name)).collect();
             return Err(SettingsError::NoNode(node.into(), known.join(", ")));
         };
-        // With several nodes each has an address: configuration sees to it.
+        // Of several nodes on a LAN each has an address: configuration sees to it.
         let address = |address: Option<IpAddr>| address.unwrap_or(IpAddr::V4(std::net::Ipv4Addr::UNSPECIFIED));
-        let nodes = installation.nodes.iter();
+        let nodes = installation.lan_nodes().iter();
         Ok(Self {
             system: installation.system.id,
             own,

@@ -59,6 +59,31 @@ fn every_node_reaches_every_other_from_the_first_datagram_on() {
 }
 
 #[test]
+fn who_is_beyond_reaches_one_node_and_the_others_reach_that_one_at_the_same_address() {
+    for (addresses, home) in [
+        (["10.77.0.1", "10.77.0.2"], "192.168.7.1"),
+        (["10.77.0.1", "10.77.0.2"], "10.77.0.1"),
+        (["fd00::1", "fd00::2"], "fd77::1"),
+    ] {
+        let Some(mut lab) = lab(&addresses, 1500) else { return };
+        lab.join_beyond("n0", home.parse().unwrap(), &["far"]).unwrap();
+        let far = lab.nodes().find(|node| node.name == "far").unwrap().address.to_string();
+        let (home, other, far) =
+            (socket(&lab, "n0", home), socket(&lab, "n1", addresses[1]), socket(&lab, "far", &far));
+        for (from, to) in [(&home, &far), (&far, &home), (&other, &home), (&home, &other)] {
+            arrives(from, to);
+        }
+        other.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+        // The kernel may know at once that there is no way.
+        let _ = far.send_to(b"hello", other.local_addr().unwrap());
+        assert_eq!(other.recv_from(&mut [0; 16]).unwrap_err().kind(), ErrorKind::WouldBlock, "nothing is handed on");
+        lab.cut("far").unwrap();
+        lab.mend("far").unwrap();
+        arrives(&far, &home);
+    }
+}
+
+#[test]
 fn a_node_sees_the_lab_and_nothing_else() {
     let Some(lab) = lab(&["10.77.0.1", "10.77.0.2"], 1500) else { return };
     let devices = |node: &str| {

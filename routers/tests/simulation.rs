@@ -30,6 +30,8 @@ const NETWORKS: &str = "a_hundred_networks";
 const SEALED: &str = "sealed_networks";
 /// The same with time slots: a quarter as many.
 const SLOTTED: &str = "networks_with_time_slots";
+/// The same with time slots and sealed datagrams: a quarter as many.
+const SEALED_SLOTTED: &str = "sealed_networks_with_time_slots";
 /// Those in which all goes wrong: a tenth as many.
 const ROUGH_SLOTTED: &str = "rough_slotted_networks";
 /// What must have been seen so often in each hundred networks.
@@ -73,6 +75,17 @@ const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 6] = [
     ("window used", 200_000),
     ("router killed", 20),
     ("frozen", 20),
+    ("split", 8),
+];
+/// The same with sealed datagrams.
+const SEEN_IN_A_HUNDRED_SEALED_SLOTTED: [(&str, u64); 8] = [
+    ("delivered", 20_000),
+    ("time: taken", 400_000),
+    ("time: overheard", 2_000),
+    ("asked by what was overheard", 200),
+    ("asked by an echo", 10),
+    ("rejected", 100),
+    ("router killed", 20),
     ("split", 8),
 ];
 /// The same where all goes wrong.
@@ -217,6 +230,17 @@ fn networks_with_time_slots_keep_their_promises() {
 }
 
 #[test]
+fn sealed_networks_with_time_slots_keep_their_promises() {
+    let plan = |seed| Plan::slotted(seed).sealed();
+    if let Some(seed) = number("ROHRPOST_SIM_SEED") {
+        return replay(plan(seed));
+    }
+    let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 4;
+    let seen = keep_promises(SEALED_SLOTTED, seeds, plan);
+    saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED_SEALED_SLOTTED);
+}
+
+#[test]
 fn sealed_networks_keep_their_promises_whatever_is_recorded_altered_and_sent_again() {
     let plan = |seed| Plan::new(seed).sealed();
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {
@@ -355,9 +379,24 @@ fn every_promise_of_time_slots_can_be_broken() {
         (Mistake::Packages(Broken::BeginsForEver), Promise::Recovery),
         (Mistake::Packages(Broken::NeverBeginsEpoch), Promise::Recovery),
     ];
+    each_is_called_what_it_is(&broken, Plan::slotted);
+}
+
+/// So is each where datagrams are sealed. What is believed that nobody vouches for, and who waits for ever, the core's own tests see.
+#[test]
+fn every_promise_of_sealed_time_slots_can_be_broken() {
+    let broken = [
+        (Mistake::Packages(Broken::IgnoresUnproven), Promise::Exclusive),
+        (Mistake::Packages(Broken::TellsUnproven), Promise::SilentWhenUnsure),
+        (Mistake::Packages(Broken::AsksWithoutPause), Promise::SilentWhenUnsure),
+    ];
+    each_is_called_what_it_is(&broken, |seed| Plan::slotted(seed).sealed());
+}
+
+fn each_is_called_what_it_is(broken: &[(Mistake, Promise)], plan: fn(u64) -> Plan) {
     let found = for_all(broken.len() as u64, |index| {
         let (mistake, promise) = broken[index as usize];
-        let judged = |seed| run_broken(Plan::slotted(seed), guard, mistake).problems.first().map(|first| first.promise);
+        let judged = |seed| run_broken(plan(seed), guard, mistake).problems.first().map(|first| first.promise);
         (mistake, promise, (0..PROMISE_SEEDS).find(|seed| judged(*seed) == Some(promise)))
     });
     eprintln!("{found:?}");

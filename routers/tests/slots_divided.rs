@@ -6,7 +6,7 @@
 mod common;
 
 use common::process::{Router, be_a_router};
-use common::talk::{Ears, mouths};
+use common::talk::{Ears, talk};
 use common::{Capture, Crossed, MASTERS, Segment, assert_kept, judge, name, table};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
 use rohrpost_routers::link::State;
@@ -29,7 +29,6 @@ const FAST_PPB: i64 = 200_000;
 const APART_NS: u64 = 1_300_000;
 /// So many cycles after the network is one again nobody sends any more by the time that is given up.
 const HEALED_CYCLES: u32 = 16;
-const PAUSE: Duration = Duration::from_micros(2300);
 
 /// Reads the page of a node all the time: what it says goes back in no epoch.
 fn watch_time(node: &Arc<Node>, ends: &Arc<AtomicBool>) -> JoinHandle<()> {
@@ -74,16 +73,6 @@ fn are_apart(crossed: &[Crossed]) -> bool {
     let last = |master| ahead_ns(crossed, master, 0).next_back();
     let off = last(LONELY).zip(last(OTHERS[0]));
     off.is_some_and(|((_, one_ns), (_, other_ns))| (one_ns - other_ns).unsigned_abs() > APART_NS.into())
-}
-
-fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
-    let mut mouths = mouths(segment, nodes);
-    for id in 0..rounds {
-        mouths.iter_mut().for_each(|mouth| mouth.say(id));
-        ears.listen();
-        std::thread::sleep(PAUSE);
-    }
-    ears.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
 }
 
 #[test]

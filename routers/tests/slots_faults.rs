@@ -6,7 +6,7 @@
 mod common;
 
 use common::relay::Relay;
-use common::talk::{Ears, mouths};
+use common::talk::{Ears, talk};
 use common::{Capture, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
 use rohrpost_routers::frame::Kind;
 use rohrpost_routers::shell::Failure;
@@ -16,8 +16,6 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 const ALL: [u8; NODES as usize] = [0, 1, 2];
-/// A round of packages comes so much after the one before: a few in each cycle, at any moment of it.
-const PAUSE: Duration = Duration::from_micros(2300);
 /// The clocks of two computers differ by at most so much, and their rates change by less than this swing brings: 470 ppb in a second.
 const DRIFT_PPB: i64 = 100_000;
 const SWING_PPB: f64 = 1500.0;
@@ -26,16 +24,6 @@ const DRIFTS: Duration = Duration::from_secs(5);
 const HELD_BACK: Duration = Duration::from_millis(2);
 /// With this it is 100 µs further off after five seconds.
 const DRIFT_NS_S_MAX: u64 = 20_000;
-
-fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
-    let mut mouths = mouths(segment, nodes);
-    for id in 0..rounds {
-        mouths.iter_mut().for_each(|mouth| mouth.say(id));
-        ears.listen();
-        std::thread::sleep(PAUSE);
-    }
-    ears.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
-}
 
 #[test]
 fn a_slave_whose_clock_drifts_and_changes_its_rate_keeps_its_slots() {

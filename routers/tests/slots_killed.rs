@@ -7,7 +7,7 @@ mod common;
 
 use common::hog::{Hog, be_a_hog};
 use common::process::{Router, be_a_router};
-use common::talk::{Ears, Mouth, mouths};
+use common::talk::{Ears, Mouth, PAUSE, mouths};
 use common::{Capture, MASTERS, Segment, assert_kept};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::monotonic_ns;
@@ -21,8 +21,6 @@ use std::time::Duration;
 const PROCESS: &str = "in_a_process_of_its_own";
 /// This node is in this process, and never master: it sees who is.
 const WITNESS: u8 = 2;
-/// A round of packages comes so much after the one before: a few in each cycle, at any moment of it.
-const PAUSE: Duration = Duration::from_micros(2300);
 /// Longer than a takeover takes, and than anything may be late.
 const FROZEN: Duration = Duration::from_millis(500);
 /// A stumble, and the time between two: at most half of the windows are met by one.

@@ -5,16 +5,14 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
-use common::talk::{Ears, mouths};
+use common::talk::{Ears, PAUSE, mouths};
 use common::{Capture, NODES, PATIENCE, Segment, assert_kept, judge};
 use rohrpost_routers::frame::Kind;
 use rohrpost_routers::time::Role;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Rounds of packages: from each node to each other.
 const ROUNDS: u16 = 150;
-/// A round comes so much after the one before: a few in each cycle, at any moment of it.
-const PAUSE: Duration = Duration::from_micros(2300);
 #[test]
 fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
     let Some(mut segment) = Segment::start() else { return };

@@ -1,7 +1,9 @@
 //! `rohrpost demo`: a simulated robot, or the log of a real one.
 
 mod account;
+mod beyond;
 mod copy;
+mod ears;
 mod lives;
 mod losses;
 mod nodes;
@@ -38,9 +40,10 @@ const FIRST_FUNCTION: u16 = 16;
   rohrpost demo --log run.log.gz --speed 10
   rohrpost demo --nodes 3 --seconds 30 --impair loss=5%,delay=2ms,reorder=5%
   rohrpost demo --nodes 3 --secure --seconds 30
+  rohrpost demo --nodes 3 --gui tcp --secure --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
-Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml) of the present folder if there is one, else its own copy.")]
+Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) of the present folder if there is one, else its own copy.")]
 pub(super) struct Arguments {
     /// End by itself after so many seconds.
     #[arg(long, value_name = "SECONDS")]
@@ -57,8 +60,12 @@ pub(super) struct Arguments {
     /// The nodes send in time slots, each in its own.
     #[arg(long, requires = "nodes", conflicts_with = "config")]
     tdma: bool,
-    /// What passes between the nodes is sealed, with keys that are made for this run.
-    #[arg(long, requires = "nodes", conflicts_with = "tdma")]
+    /// How the node with the GUI is joined to the robot: on its LAN, or through the TCP router alone. With `tcp` and --seconds the TCP router
+    /// is killed in the middle of the run (SIGKILL); launch starts it again.
+    #[arg(long, value_enum, default_value = "lan", requires = "nodes", conflicts_with = "tdma")]
+    gui: Joined,
+    /// What passes between the nodes is sealed, with keys and certificates that are made for this run.
+    #[arg(long, requires = "nodes")]
     secure: bool,
     /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch starts it again.
     #[arg(long, requires_all = ["nodes", "seconds"])]
@@ -80,10 +87,20 @@ pub(super) struct Arguments {
     quiet: bool,
 }
 
+/// How a node is joined to the others.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Joined {
+    Lan,
+    Tcp,
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.seconds.map(super::units::seconds).transpose()?;
     if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
         return nodes::run(arguments, count, long);
+    }
+    if arguments.gui == Joined::Tcp {
+        return Err("one node alone has its GUI beside it; say --nodes 3".into());
     }
     if arguments.kill_master {
         return Err("one node alone has no master to be killed; say --nodes 3".into());

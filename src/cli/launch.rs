@@ -58,10 +58,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
-/// An installation that could run here: mistakes that a router would only find when it starts are told at once.
+/// An installation that could run here: mistakes that a router would only find when it starts are told at once. A node without one needs no keys.
 fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
     let installation = super::check::load(&arguments.file)?;
-    installation.keys.as_deref().map(|folder| Keys::load(&Keys::file(folder))).transpose()?;
+    let node = arguments.node.as_deref();
+    if node.is_none_or(|node| installation.router_of(node).is_some()) {
+        installation.keys.as_deref().map(|folder| Keys::load(&Keys::file(folder))).transpose()?;
+    }
     Ok(Arc::new(installation))
 }
 
@@ -71,7 +74,7 @@ fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
     // Before the first thread, of which the speech has two.
     let lab = all::lab(&installation)?;
     let speech = Speech::begin()?;
-    installation.security_text().iter().for_each(|security| speech.say(security));
+    installation.security_texts().iter().for_each(|security| speech.say(security));
     let mut nodes = Nodes::begin(installation, lab, arguments.impair, &speech)?;
     while nodes.watch(Duration::MAX) {}
     let code = nodes.stop();

@@ -3,9 +3,11 @@
 use super::sight::Silence;
 use super::summary::{Losses, ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
-use super::target::Target;
+use super::target::{Running, Target};
 use super::{Failure, say};
+use rohrpost::Name;
 use rohrpost::config::Installation;
+use rohrpost::interfaces::BeyondHost;
 use rohrpost::mailbox::{Loss, MailboxInfo, saturating_sum};
 use rohrpost::survey::{Scope, node_of, purpose};
 use serde::Serialize;
@@ -66,6 +68,15 @@ fn node_line(node: &str, silent: &[Silence]) -> NodeLine {
     }
 }
 
+/// What is registered at the TCP router, and in no configuration here.
+#[derive(Serialize)]
+struct BeyondLine {
+    module: String,
+    system: u8,
+    /// Who hosts it.
+    by: String,
+}
+
 #[derive(Serialize)]
 struct Listing<'a> {
     installation: &'a str,
@@ -74,6 +85,7 @@ struct Listing<'a> {
     nodes: Vec<NodeLine>,
     modules: Vec<ModuleLine>,
     mailboxes: Vec<MailboxLine>,
+    beyond: Vec<BeyondLine>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -87,6 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         nodes: nodes.iter().map(|node| node_line(node, &silent)).collect(),
         modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
         mailboxes: mailbox_lines(&running.installation, &survey.mailboxes),
+        beyond: beyond(&running)?,
     };
     if arguments.json {
         say(serde_json::to_string(&listing)?);
@@ -99,6 +112,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say(format_args!("node {} of {}\n", nodes.join(", "), listing.installation));
     }
     say(print_modules(&listing.modules, several).trim_end());
+    if !listing.beyond.is_empty() {
+        let rows = listing.beyond.iter().map(|line| [line.module.clone(), line.system.to_string(), line.by.clone()]);
+        let table = table(["beyond", ">system", "by"], rows);
+        say(format_args!("\n{}(modules at the TCP router that this configuration does not have)", table));
+    }
     if !silent.is_empty() {
         let lines: Vec<String> = silent.iter().map(Silence::text).collect();
         say(format_args!("\n{}", lines.join("\n")));
@@ -107,6 +125,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say(format_args!("\n{}", print_mailboxes(&listing.mailboxes).trim_end()));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Modules that the TCP router knows, if it runs here, and the configuration does not. Tools come and go.
+fn beyond(running: &Running) -> Result<Vec<BeyondLine>, Failure> {
+    let installation = &running.installation;
+    let Some(hosts) = running.hosts_beyond()? else { return Ok(Vec::new()) };
+    let first = |host: &BeyondHost| Name::from_raw(host.first);
+    let is_other = |host: &&BeyondHost| {
+        let name = first(host);
+        name.class() != installation.classes.tool() && installation.module(name).is_none()
+    };
+    let line = |host: &BeyondHost| {
+        let (name, last) = (first(host).module(), Name::from_raw(host.last).module());
+        let text = |name| running.text(name);
+        let module = if name == last { text(name) } else { format!("{} to {}", text(name), text(last)) };
+        BeyondLine { module, system: name.system(), by: host.client.clone() }
+    };
+    Ok(hosts.hosts.iter().filter(is_other).map(line).collect())
 }
 
 /// Mailboxes, one a line.

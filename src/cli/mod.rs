@@ -3,7 +3,6 @@
 mod bench;
 mod bw;
 mod call;
-mod certify;
 mod check;
 mod clean;
 mod completions;
@@ -118,8 +117,6 @@ enum Command {
     New(new::Arguments),
     /// Print a script by which a shell completes what you type.
     Completions(completions::Arguments),
-    /// Make the certificates of the TCP router and its clients.
-    Certify(certify::Arguments),
     /// Print versions, of this program and of what nodes share.
     Version(version::Arguments),
     /// Run a built-in module by hand.
@@ -165,7 +162,6 @@ pub(crate) fn main() -> ExitCode {
         Command::Keys(arguments) => keys::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
-        Command::Certify(arguments) => certify::run(&arguments),
         Command::Version(arguments) => version::run(&arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Router(arguments) => router::run(arguments),

@@ -8,7 +8,7 @@ use super::units::short;
 use rohrpost::common::GET_DATA;
 use rohrpost::config::Installation;
 use rohrpost::description::Description;
-use rohrpost::interfaces::{LinkState, Links, RouterInterface};
+use rohrpost::interfaces::{BeyondHosts, LinkState, Links, RouterInterface, TcpInterface};
 use rohrpost::launch::{Look, launcher_of};
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::mailbox::{InspectError, Name, SendError, realtime_ns};
@@ -148,6 +148,16 @@ impl Running {
             .ok()?
             .map(|(_, links)| links)
             .ok()
+    }
+
+    /// What is registered at the TCP router; none if it runs elsewhere, or does not answer.
+    pub(super) fn hosts_beyond(&self) -> Result<Option<BeyondHosts>, Failure> {
+        let Some(server) = self.installation.tcp_router() else { return Ok(None) };
+        let port = TcpInterface::HOSTS;
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let read = |bytes: &[u8]| from_bytes::<(u64, BeyondHosts)>(bytes);
+        let told = self.sight.with(self, |tool| tool.call(server, GET_DATA, (port.hash)(), write, read))?;
+        Ok(told.ok().map(|(_, hosts)| hosts))
     }
 
     /// The modules of all nodes that are meant, but for those that need not run; with why, those that cannot be asked.

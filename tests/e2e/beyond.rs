@@ -10,6 +10,7 @@ use rohrpost::macro_support::{append, from_bytes};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Head of all configurations but for the system.
@@ -70,7 +71,7 @@ impl Systems {
         let mut systems = Self::new(security)?;
         if security == SEALED {
             for node in SYSTEMS {
-                systems.place.say(&["certify", systems.config(node).to_str().unwrap()]).ok();
+                systems.place.say(&["keys", "new", systems.config(node).to_str().unwrap()]).ok();
             }
         }
         SYSTEMS.into_iter().for_each(|node| systems.launch(node));
@@ -79,8 +80,35 @@ impl Systems {
     }
 
     fn config(&self, node: &str) -> PathBuf {
-        let system = if node == "arm" { "north" } else { node };
+        // It may be of a system of its own.
+        let third = self.place.path("arm.toml");
+        let system = if node == "arm" && !third.exists() { "north" } else { node };
         self.place.path(&format!("{system}.toml"))
+    }
+
+    /// Gives north a LAN, with `probe.1` on `arm`.
+    fn with_lan(&self) {
+        let config = self.config("north");
+        let text = std::fs::read_to_string(&config).unwrap();
+        let [(_, north), _, (_, arm)] = NODES;
+        let nodes = format!(
+            "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}[tcp]"
+        );
+        let text = text.replace("[nodes.north]\n[tcp]", &nodes)
+            + "node = \"north\"\n"
+            + &probe("probe.1", "", "node = \"arm\"");
+        std::fs::write(&config, text).unwrap();
+    }
+
+    /// `arm`, of a system of its own, takes no part, and both it and the TCP router say why.
+    fn wait_refused(&self, here: &str, there: &str) {
+        wait(format!("arm is refused: {here}"), || {
+            let told = self.client("arm");
+            (told["state"] != "up" && told["why"].as_str().is_some_and(|why| why.contains(here))).then_some(())
+        });
+        wait(format!("the TCP router refuses: {there}"), || {
+            self.says("north", &["net"]).out.contains(there).then_some(())
+        });
     }
 
     fn launch(&mut self, node: &'static str) {
@@ -195,22 +223,68 @@ fn calls_and_data_cross_from_system_to_system() {
     systems.stop();
 }
 
+/// How often the TCP router is killed: for a long run, `ROHRPOST_KILLS=100 cargo test --test e2e beyond::a_tcp_router`.
+fn kills() -> u64 {
+    std::env::var("ROHRPOST_KILLS").ok().map_or(3, |kills| kills.parse().unwrap())
+}
+
+/// Of each class of a client, what came and what became of it.
+fn accounts(client: &serde_json::Value) -> Vec<(u64, u64)> {
+    let ways = ["sent", "received"].map(|way| client[way].as_array().cloned().unwrap_or_default());
+    let number = |value: &serde_json::Value| value.as_u64().unwrap_or_default();
+    let account = |class: &serde_json::Value| {
+        let lost = class["lost"].as_array().into_iter().flatten().map(|lost| number(&lost["packages"])).sum::<u64>();
+        (number(&class["packages"]), number(&class["passed"]) + lost)
+    };
+    ways.iter().flatten().map(account).collect()
+}
+
 #[test]
 fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
     let Some(systems) = Systems::launched(OPEN) else { return };
-    let clients = || SYSTEMS.map(|node| systems.robot(node).pid("tcp.0"));
-    let before = clients();
-    let mut last = 0;
-    for number in 0..3 {
-        last = wait("a call that comes through", || systems.count(number).ok().filter(|counted| *counted > last));
-        let server = systems.robot("north").pid("tcp.255");
-        signal(server, Signal::SIGKILL);
-        systems.robot("north").wait_restarted("tcp.255", server);
+    let north = systems.robot("north");
+    let clients = || SYSTEMS.map(|node| (systems.robot(node).pid("tcp.0"), systems.robot(node).pid("probe.0")));
+    let (before, mut called, mut answered) = (clients(), 0, 0);
+    for kill in 1..=kills() {
+        let server = north.pid("tcp.255");
+        // Calls are under way at any moment of it, and beats of both modules all the time.
+        let is_killed = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(kill * 7 % 50));
+                signal(server, Signal::SIGKILL);
+                is_killed.store(true, Ordering::Relaxed);
+            });
+            let first = called;
+            while called < first + 20 || !is_killed.load(Ordering::Relaxed) {
+                called += 1;
+                answered += u32::from(systems.count(called).is_ok());
+            }
+        });
+        north.wait_restarted("tcp.255", server);
+        wait("a call that comes through", || {
+            called += 1;
+            systems.count(called).ok()
+        });
+        answered += 1;
+        SYSTEMS.into_iter().for_each(|node| systems.wait_up(node));
+        let reconnects = systems.client("south")["reconnects"].as_u64().unwrap();
+        assert!(reconnects >= kill, "{reconnects} after {kill}");
     }
-    wait("a call that comes through", || systems.count(9).ok().filter(|counted| *counted > last));
     assert_eq!(clients(), before, "nothing else was started again");
-    let reconnects = systems.client("south")["reconnects"].as_u64().unwrap();
-    assert!(reconnects >= 3, "{reconnects}");
+    let record = systems.place.record();
+    let mut run: Vec<&str> = record.iter().filter_map(|line| line.split_once(" count ")).map(|(_, of)| of).collect();
+    let times = run.len();
+    run.sort_unstable();
+    run.dedup();
+    assert_eq!(run.len(), times, "each call is run at most once");
+    assert!(answered as usize <= times && times <= called as usize, "{answered} of {called} answered, {times} run");
+    for node in SYSTEMS {
+        // A moment in which nothing waits: beats come and go all the time.
+        let accounts = || Some(accounts(&systems.client(node))).filter(|accounts| !accounts.is_empty());
+        let is_even = |accounts: &Vec<(u64, u64)>| accounts.iter().all(|(came, went)| came == went);
+        wait(format!("{node} accounts for all"), || accounts().filter(is_even));
+    }
     systems.stop();
 }
 
@@ -230,7 +304,7 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     let config = systems.config("south");
     let text = std::fs::read_to_string(&config).unwrap();
     std::fs::write(&config, text.replace("\"certificates\"", "\"others\"")).unwrap();
-    systems.place.say(&["certify", config.to_str().unwrap()]).ok();
+    systems.place.say(&["keys", "new", config.to_str().unwrap()]).ok();
     systems.launch("south");
     let why = wait("why it takes no part", || {
         let why = systems.client("south")["why"].as_str().map(str::to_owned);
@@ -257,7 +331,7 @@ fn a_robot_starts_without_its_certificates_and_takes_part_when_they_are_there() 
     };
     wait_for(&mut launch, "probe.0", "on");
     assert_ne!((robot.state("tcp.255"), robot.state("tcp.0")), ("on", "on"), "there is no certificate");
-    place.say(&["certify", config.to_str().unwrap()]).ok();
+    place.say(&["keys", "new", config.to_str().unwrap()]).ok();
     for module in ["tcp.255", "tcp.0"] {
         wait_for(&mut launch, module, "on");
     }
@@ -275,6 +349,12 @@ fn check_foreign(systems: &Systems, system: u8, order: &str, certificates: &[&st
     let module = format!("{system}.probe.0.0");
     assert_eq!(systems.says("north", &["call", &module, "double", "21"]).ok(), "42\n", "{order}");
     program.wait_for("doubled 21");
+    // A certificate says who it is, before it says so itself.
+    let name = if certificates.is_empty() { "a program in Python" } else { "node python of system 5" };
+    wait(format!("{module} in the list"), || {
+        let list = systems.says("north", &["list"]).ok();
+        list.lines().any(|line| line.starts_with(&module) && line.ends_with(name)).then_some(())
+    });
     let said = systems.says("north", &["call", &module]).ok();
     assert!(said.contains("double <number: u32> -> u32"), "{said}");
 }
@@ -288,7 +368,7 @@ fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
     let Some(systems) = Systems::launched(SEALED) else { return };
     let file = systems.place.path("python.toml");
     std::fs::write(&file, configured("python", 5, SEALED)).unwrap();
-    systems.place.say(&["certify", file.to_str().unwrap()]).ok();
+    systems.place.say(&["keys", "new", file.to_str().unwrap()]).ok();
     check_foreign(&systems, 5, "big", &["certificates", "python.system-5"]);
     systems.stop();
 }
@@ -296,15 +376,7 @@ fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
 #[test]
 fn each_node_of_a_lan_is_reached_from_beyond_and_the_lan_goes_on_without_the_tcp_router() {
     let Some(mut systems) = Systems::new(OPEN) else { return };
-    let config = systems.config("north");
-    let text = std::fs::read_to_string(&config).unwrap();
-    let [(_, north), _, (_, arm)] = NODES;
-    let nodes = format!(
-        "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}[tcp]"
-    );
-    let text =
-        text.replace("[nodes.north]\n[tcp]", &nodes) + "node = \"north\"\n" + &probe("probe.1", "", "node = \"arm\"");
-    std::fs::write(&config, text).unwrap();
+    systems.with_lan();
     for node in ["north", "arm", "south"] {
         systems.launch(node);
     }
@@ -319,5 +391,68 @@ fn each_node_of_a_lan_is_reached_from_beyond_and_the_lan_goes_on_without_the_tcp
     wait("a call over the LAN", || {
         (systems.says("north", &["call", "probe.1", "count", "4"]).code == Some(0)).then_some(())
     });
+    systems.stop();
+}
+
+#[test]
+fn a_third_with_a_certificate_of_another_installation_takes_no_part_and_both_sides_say_why() {
+    let Some(mut systems) = Systems::launched(SEALED) else { return };
+    let other = configured("arm", 3, SEALED).replace("installation = \"test\"", "installation = \"other\"");
+    std::fs::write(systems.place.path("arm.toml"), other.replace("\"certificates\"", "\"others\"")).unwrap();
+    systems.place.say(&["keys", "new", systems.config("arm").to_str().unwrap()]).ok();
+    systems.launch("arm");
+    systems.wait_refused("certificate is foreign", "refuses this end's certificate as foreign");
+    assert_eq!(systems.says("arm", &["call", "1.probe.0.0", "count", "1"]).code, Some(1), "nothing goes there");
+    check_crossing(&systems);
+    systems.stop();
+}
+
+#[test]
+fn installations_with_the_same_classes_meet_whatever_else_differs_but_one_system_is_one_file() {
+    let Some(mut systems) = Systems::new(OPEN) else { return };
+    let south = configured("south", 2, OPEN).replace("installation = \"test\"", "installation = \"other\"");
+    std::fs::write(systems.config("south"), south + &probe("probe.3", "", "")).unwrap();
+    // A third has south's system, and other modules.
+    std::fs::write(systems.place.path("arm.toml"), configured("arm", 2, OPEN).replace("\"arm\"\nid", "\"south\"\nid"))
+        .unwrap();
+    SYSTEMS.into_iter().for_each(|node| systems.launch(node));
+    SYSTEMS.into_iter().for_each(|node| systems.wait_up(node));
+    let digests = SYSTEMS.map(|node| systems.robot(node).installation.digest());
+    assert!(digests[0].common == digests[1].common && digests[0].system != digests[1].system);
+    check_crossing(&systems);
+    systems.launch("arm");
+    let [mine, theirs] =
+        ["arm", "south"].map(|node| format!("{:016x}", systems.robot(node).installation.digest().system));
+    systems.wait_refused(&format!("the system's digest here is {mine}, that of node south of south {theirs}"), &mine);
+    assert_eq!(systems.says("north", &["call", "2.probe.3.0", "count", "9"]).ok(), "1\n", "south goes on");
+    systems.stop();
+}
+
+#[test]
+fn a_package_to_all_systems_comes_once_to_each_whatever_the_path() {
+    let Some(mut systems) = Systems::new(OPEN) else { return };
+    systems.with_lan();
+    let south = std::fs::read_to_string(systems.config("south")).unwrap() + &probe("probe.1", "", "");
+    std::fs::write(systems.config("south"), south).unwrap();
+    for node in ["north", "arm", "south"] {
+        systems.launch(node);
+    }
+    for node in ["north", "arm", "south"] {
+        systems.wait_up(node);
+    }
+    let times = |number: u32| systems.place.counted().into_iter().filter(|counted| *counted == number).count();
+    for (node, number) in [("north", 100), ("arm", 200), ("south", 300)] {
+        let robot = systems.robot(node);
+        let mut tool = robot.tool(Duration::from_secs(1));
+        robot.begin(&mut tool, "255.probe.1.0", crate::probe::COUNT, &(number,));
+        wait(format!("both count what came from {node}"), || (times(number) >= 2).then_some(()));
+        tool.close();
+        // What follows by either path would come behind a second copy.
+        for (further, module) in [(1, "1.probe.1.0"), (2, "2.probe.1.0")] {
+            let counted = || systems.says(node, &["call", module, "count", &(number + further).to_string()]).code;
+            wait(format!("{module} counts from {node}"), || (counted() == Some(0)).then_some(()));
+        }
+        assert_eq!(times(number), 2, "once in each system, from {node}: {:?}", systems.place.record());
+    }
     systems.stop();
 }

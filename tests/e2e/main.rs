@@ -16,6 +16,7 @@ mod control;
 mod crash;
 mod demo;
 mod doctor;
+mod far;
 mod faults;
 mod harness;
 mod lan;

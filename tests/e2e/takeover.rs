@@ -1,7 +1,7 @@
 //! The demo in time slots, whose master's router is killed: what is told of it, and that next to nothing of a declared flow is lost.
 
 use crate::harness::{Place, Robot, lacks_namespaces, signal, wait};
-use crate::process::Running;
+use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
 use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
@@ -29,13 +29,29 @@ fn assert_kept(said: &str, kills: usize) {
     assert!(lost <= kills.div_ceil(20) as u64, "{lost} lost by {kills} kills:\n{said}");
 }
 
+/// What was sealed to the life that died is lost with it, and nothing can be sealed to the next before that has joined: of each flow a
+/// part of so many at most.
+fn assert_lost_of(said: &str, part: u64) {
+    for row in flows(said) {
+        let figure = |text: &str| text.parse::<u64>().unwrap();
+        let [.., lost] = row[..] else { panic!("{row:?}") };
+        let count = row.iter().find(|text| text.parse::<u64>().is_ok()).unwrap_or_else(|| panic!("{row:?}"));
+        assert!(figure(lost) * part <= figure(count), "{row:?}:\n{said}");
+    }
+}
+
 /// The last column of the flows' table.
 fn losses(said: &str) -> impl Iterator<Item = u64> {
+    flows(said).into_iter().map(|row| row.last().unwrap().parse().unwrap())
+}
+
+/// The flows' table, word by word.
+fn flows(said: &str) -> Vec<Vec<&str>> {
     let flows = said.split("from end to end").nth(1).unwrap_or_else(|| panic!("no flows:\n{said}"));
     let rows: Vec<&str> = flows.lines().skip(3).take_while(|line| !line.is_empty()).collect();
     assert!(rows.iter().any(|row| row.starts_with("laser.0 → pilot.0") && row.contains("data")), "{said}");
     assert!(rows.iter().any(|row| row.starts_with("pilot.0 → motor.0") && row.contains("commands")), "{said}");
-    rows.into_iter().map(|row| row.split_whitespace().last().unwrap().parse().unwrap())
+    rows.into_iter().map(|row| row.split_whitespace().collect()).collect()
 }
 
 /// What the router of a node says of itself, if it answers.
@@ -113,5 +129,32 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
     }
     assert!(said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"), "{said}");
     assert_kept(&said, 1);
+    place.assert_empty();
+}
+
+/// Sealed, its next life knows nobody, and hears the time before anybody has shown that it lives.
+#[test]
+fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
+    let place = Place::new();
+    let arguments = ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "--kill-master"];
+    let said = place.say(&arguments);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let Said { out, err, .. } = said;
+    assert!(err.contains("is sealed with") || out.contains("is sealed with"), "{out}{err}");
+    for words in
+        ["killed on purpose); there again ", "It was the master. ", "Master at the end: ", "the accounts balance\n"]
+    {
+        assert!(out.contains(words), "no `{words}`:\n{out}");
+    }
+    let slots = out.split("In time slots").nth(1).unwrap();
+    for node in NODES {
+        let row = slots.lines().find_map(|line| line.strip_prefix(node)).unwrap_or_else(|| panic!("no {node}:\n{out}"));
+        assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
+    }
+    // A second of eight.
+    assert_lost_of(&out, 8);
     place.assert_empty();
 }

@@ -31,7 +31,7 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
             return None;
         }
         // Of several nodes, see `lan`; of several systems, see `beyond`.
-        "net" | "time" | "router" | "certify" | "tcp-router" | "tcp-client" => return None,
+        "net" | "time" | "router" | "tcp-router" | "tcp-client" => return None,
         other => panic!("`{other}` is new: say here how it is tested"),
     };
     Some([&[command], after].concat())

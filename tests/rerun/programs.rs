@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 /// Rerun's command line.
 pub(crate) fn rerun() -> PathBuf {
@@ -57,4 +58,40 @@ pub(crate) fn rows(printed: &str) -> BTreeMap<String, u64> {
 pub(crate) fn entities_of(stats: &str) -> BTreeSet<String> {
     let lines = stats.lines().skip_while(|line| !line.starts_with("Num chunks per entity"));
     lines.filter(|line| line.starts_with('/')).filter_map(|line| Some(line.rsplit_once(": ")?.0.to_owned())).collect()
+}
+
+/// What is in a drawing. One that is still being written may be torn at its end.
+pub(crate) fn printed(file: &Path, how: &[&str]) -> String {
+    let mut print = Command::new(rerun());
+    print.args(["rrd", "print"]).args(how).arg(file).env("NO_COLOR", "1");
+    String::from_utf8_lossy(&print.output().unwrap().stdout).into_owned()
+}
+
+/// The rows of an entity that have a time, in order: when, ns since 1970, and what stands behind that.
+pub(crate) fn timed_rows(file: &Path, entity: &str) -> Vec<(u64, String)> {
+    let all = printed(file, &["-vvv"]);
+    let head = format!(" - {entity} - ");
+    let chunks = all.split("\nChunk(").filter(|chunk| chunk.lines().next().unwrap().contains(&head));
+    // Columns: row, time since the beginning, system time, then data. What is there for all times has none.
+    let rows = chunks.filter(|chunk| chunk.contains(" system_time ")).flat_map(str::lines);
+    let rows: Vec<Vec<&str>> =
+        rows.filter(|line| line.contains(" row_")).map(|line| line.split('┆').map(str::trim).collect()).collect();
+    let times: String = rows.iter().map(|columns| format!("{}Z\n", columns[2])).collect();
+    let mut date =
+        Command::new("date").args(["-f", "-", "+%s%N"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut pipe = date.stdin.take().unwrap();
+    // It writes while it reads.
+    let writer = std::thread::spawn(move || pipe.write_all(times.as_bytes()));
+    let output = date.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    let times = String::from_utf8(output.stdout).unwrap();
+    let times = times.lines().map(|ns| ns.parse().unwrap());
+    let mut rows: Vec<(u64, String)> = times.zip(rows.iter().map(|columns| columns[3..].join(" "))).collect();
+    rows.sort_unstable();
+    rows
+}
+
+/// Times of the rows of an entity, ns since 1970, in order.
+pub(crate) fn times_ns(file: &Path, entity: &str) -> Vec<u64> {
+    timed_rows(file, entity).into_iter().map(|(ns, _)| ns).collect()
 }

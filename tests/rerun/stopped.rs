@@ -1,48 +1,18 @@
 //! The bridge itself stands still for a while, as on a computer that is too busy, and goes on.
 
-use super::programs::{rerun, rows};
+use super::programs::{printed, rows, times_ns};
 use super::robot::{Robot, wait};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost::mailbox::{ClassTraffic, Full, Loss, local};
-use std::io::Write;
-use std::path::Path;
-use std::process::{Command, Stdio};
 
+const SCAN: &str = "/world/scan/source.0";
 /// The bridge's mailbox for what tells how things are.
 const NEWEST: u8 = 3;
 /// Patches of the source's map.
 const PATCHES: usize = 64;
 /// Patches that come while the bridge stands still: a second, which is less than a subscription lives without being renewed.
 const WAITING: u32 = 10;
-
-/// What is in a drawing; it is still being written, so what is last in it may be torn.
-fn printed(file: &Path, how: &[&str]) -> String {
-    let mut print = Command::new(rerun());
-    print.args(["rrd", "print"]).args(how).arg(file).env("NO_COLOR", "1");
-    String::from_utf8_lossy(&print.output().unwrap().stdout).into_owned()
-}
-
-/// Times of the scans that are drawn, ns since 1970, in order.
-fn scans_ns(file: &Path) -> Vec<u64> {
-    let all = printed(file, &["-vvv"]);
-    let chunks =
-        all.split("\nChunk(").filter(|chunk| chunk.lines().next().unwrap().contains(" - /world/scan/source.0 - "));
-    // Columns: row, time since the beginning, system time.
-    let rows = chunks.flat_map(str::lines).filter(|line| line.contains(" row_"));
-    let times = rows.map(|row| format!("{}Z\n", row.split('┆').nth(2).unwrap().trim()));
-    let mut date =
-        Command::new("date").args(["-f", "-", "+%s%N"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
-    let times: String = times.collect();
-    let mut pipe = date.stdin.take().unwrap();
-    // It writes while it reads.
-    let writer = std::thread::spawn(move || pipe.write_all(times.as_bytes()));
-    let output = date.wait_with_output().unwrap();
-    writer.join().unwrap().unwrap();
-    let mut ns: Vec<u64> = String::from_utf8(output.stdout).unwrap().lines().map(|ns| ns.parse().unwrap()).collect();
-    ns.sort_unstable();
-    ns
-}
 
 fn is_stopped(pid: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
@@ -53,7 +23,7 @@ fn is_stopped(pid: u32) -> bool {
 fn a_bridge_that_stood_still_goes_on_with_the_newest() {
     let mut robot = Robot::start("file = \"robot.rrd\"", "");
     let file = robot.folder().join("robot.rrd");
-    wait("scans are drawn", || (!scans_ns(&file).is_empty()).then_some(()));
+    wait("scans are drawn", || (!times_ns(&file, SCAN).is_empty()).then_some(()));
 
     let pid = robot.bridge_pid();
     let signal = |signal| kill(Pid::from_raw(pid as i32), signal).unwrap();
@@ -74,7 +44,7 @@ fn a_bridge_that_stood_still_goes_on_with_the_newest() {
     signal(Signal::SIGCONT);
 
     let drawn = wait("it draws again", || {
-        let drawn = scans_ns(&file);
+        let drawn = times_ns(&file, SCAN);
         drawn.last().is_some_and(|last| *last >= continued_ns).then_some(drawn)
     });
     let first = drawn.into_iter().find(|ns| *ns > stopped_ns).unwrap();

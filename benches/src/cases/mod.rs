@@ -12,6 +12,8 @@ mod rates;
 mod rivals;
 mod startup;
 #[cfg(feature = "lan")]
+pub mod tcp;
+#[cfg(feature = "lan")]
 pub mod tdma;
 
 pub use startup::run_hidden_program;

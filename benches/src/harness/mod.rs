@@ -3,6 +3,7 @@
 mod alone;
 mod child;
 mod interrupt;
+mod machine;
 mod ping_pong;
 mod place;
 mod samples;
@@ -12,6 +13,7 @@ mod shared;
 pub use alone::{Alone, alone};
 pub use child::Child;
 pub use interrupt::{heed, interrupted, rest};
+pub use machine::Machine;
 #[cfg(feature = "peers")]
 pub use ping_pong::time_two_threads;
 pub use ping_pong::{Cell, End, Link, Meetings, check_echo, fill, ping, pong, time_two_processes};

@@ -30,8 +30,20 @@ impl Module {
     /// When the mailboxes cannot be made, or there is no way to the other node.
     pub fn open(nodes: &Nodes, end: End, turn: u8, bytes: usize, meetings: &mut Meetings) -> Result<Self, Failure> {
         let other = nodes::bench(if end == End::Ping { End::Pong } else { End::Ping }, turn);
-        let own = nodes::bench(end, turn);
-        let participant = join(&nodes.directory(end), own)?;
+        Self::between(&nodes.directory(end), [nodes::bench(end, turn), other], bytes, meetings)
+    }
+
+    /// An end on the node with this directory; names are its own and the other's.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn between(
+        directory: &Path,
+        [own, other]: [Name; 2],
+        bytes: usize,
+        meetings: &mut Meetings,
+    ) -> Result<Self, Failure> {
+        let participant = join(directory, own)?;
         let shape = Shape { body_bytes_max: body(bytes)?, ..Shape::default() };
         let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
         meetings.meet()?;

@@ -1,24 +1,39 @@
 //! The floor of time slots: threads that wake up for them as routers do, and send nothing. How late these are no router can better.
+//!
+//! A master of which nothing comes in three cycles in a row has a successor. So whoever misses all windows of three cycles would be
+//! taken for dead, however well it lives.
 
 use super::plan::Plan;
 use super::stage::{NODES, Stage};
 use crate::Failure;
 use crate::harness::{Child, Gate, Samples, Shared, rest};
-use rohrpost_config::LATE;
 use rohrpost_mailbox::{monotonic_ns, sys};
 use rohrpost_routers::shell::spin_ns;
+use rohrpost_routers::tdma::{GATE_NS, Kind, Window};
+use rohrpost_routers::time::TIME_BYTES;
 use std::time::Duration;
 
 /// So much of a cycle is reserved for each.
 const SHARE: u64 = 4;
 /// Until reservations are granted and the load is there.
 const SETTLES: Duration = Duration::from_secs(1);
+/// A master that is not heard in so many cycles has a successor.
+const STANDSTILL_CYCLES: u64 = 3;
 
 /// How late bare threads were.
 #[derive(Clone, Debug)]
 pub struct Bare {
     /// Of each slot of each node: how long after its beginning, µs.
     pub late_us: Vec<f64>,
+    /// How often one of those who may be master missed all its windows of three cycles in a row.
+    pub standstills: usize,
+}
+
+/// What a thread says of itself.
+struct Said {
+    late_us: Shared<Samples>,
+    /// Cycles that each standstill took.
+    standstills: Shared<Samples>,
 }
 
 impl Bare {
@@ -28,42 +43,68 @@ impl Bare {
     /// [`Failure::Skipped`] where the kernel reserves no time.
     pub fn turn(stage: &Stage, plan: &Plan, loaded: bool, watched: Duration) -> Result<Self, Failure> {
         let ready = Shared::<Gate>::new()?;
-        let samples = (0..NODES).map(|_| Shared::<Samples>::new()).collect::<Result<Vec<_>, Failure>>()?;
+        let said = || Ok(Said { late_us: Shared::new()?, standstills: Shared::new()? });
+        let all = (0..NODES).map(|_| said()).collect::<Result<Vec<_>, Failure>>()?;
         let _load = loaded.then(|| stage.load()).transpose()?;
-        let child = |(own, samples): (u8, &Shared<Samples>)| Child::start(|| wake_up(plan, own, &ready, samples));
-        let mut children = (0..NODES).zip(&samples).map(child).collect::<Result<Vec<_>, Failure>>()?;
+        let child = |(own, said): (u8, &Said)| Child::start(|| wake_up(plan, own, &ready, said));
+        let mut children = (0..NODES).zip(&all).map(child).collect::<Result<Vec<_>, Failure>>()?;
         ready.meet_children(&mut children)?;
         rest(SETTLES)?;
-        let before: Vec<usize> = samples.iter().map(|samples| samples.len()).collect();
+        let lengths = |said: &Said| (said.late_us.len(), said.standstills.len());
+        let before: Vec<(usize, usize)> = all.iter().map(lengths).collect();
         rest(watched)?;
-        let since = samples.iter().zip(before).map(|(samples, before)| samples.all().split_off(before));
-        Ok(Self { late_us: since.flatten().collect() })
+        let late_us = all.iter().zip(&before).flat_map(|(said, before)| said.late_us.all().split_off(before.0));
+        let of_masters = all.iter().zip(&before).take(plan.masters.into());
+        let standstills = of_masters.map(|(said, before)| said.standstills.len() - before.1).sum();
+        Ok(Self { late_us: late_us.collect(), standstills })
     }
 
     /// Slots for which it was too late, percent: a router leaves these out.
     pub fn omitted_percent(&self) -> f64 {
-        let late = self.late_us.iter().filter(|late_us| **late_us > LATE.as_nanos() as f64 / 1000.0).count();
+        self.later_percent(GATE_NS as f64 / 1000.0)
+    }
+
+    /// Slots for which it was later than this, percent.
+    pub fn later_percent(&self, than_us: f64) -> f64 {
+        let late = self.late_us.iter().filter(|late_us| **late_us > than_us).count();
         late as f64 * 100.0 / self.late_us.len().max(1) as f64
     }
 }
 
 /// The monotonic clock is system time here: a slot is anywhere in the cycle, but where the others are it is not.
-fn wake_up(plan: &Plan, own: u8, ready: &Gate, samples: &Samples) -> Result<(), Failure> {
+fn wake_up(plan: &Plan, own: u8, ready: &Gate, said: &Said) -> Result<(), Failure> {
     let table = plan.table(own)?;
     let period_ns = table.cycle_ns();
     let reservation = sys::Reservation { runtime_ns: period_ns / SHARE, deadline_ns: period_ns, period_ns };
     sys::reserve(reservation).map_err(|error| Failure::Skipped(error.to_string()))?;
     ready.meet(u32::from(NODES) + 1)?;
-    let spin_ns = spin_ns(period_ns);
-    let mut from_ns = monotonic_ns();
+    let (spin_ns, frame_ns) = (spin_ns(period_ns), table.wire().ns(TIME_BYTES));
+    let (mut from_ns, mut used_cycle) = (monotonic_ns(), None);
     loop {
-        let Some(slot) = table.next_slot(from_ns) else { return Err(Failure::Failed("a node without slot".into())) };
-        from_ns = slot.begin_ns + 1;
-        let sleeps_ns = slot.begin_ns.saturating_sub(spin_ns).saturating_sub(monotonic_ns());
-        std::thread::sleep(Duration::from_nanos(sleeps_ns));
-        while monotonic_ns() < slot.begin_ns {
-            std::hint::spin_loop();
+        let Some(window) = table.next_window(from_ns) else {
+            return Err(Failure::Failed("a node without slot".into()));
+        };
+        from_ns = window.begin_ns + 1;
+        let late_ns = late_ns(&window, spin_ns);
+        let is_slot = matches!(window.kind, Kind::Slot { .. });
+        if is_slot {
+            said.late_us.push(late_ns as f64 / 1000.0);
         }
-        samples.push(monotonic_ns().saturating_sub(slot.begin_ns) as f64 / 1000.0);
+        if if is_slot { late_ns <= GATE_NS } else { window.begin_ns + late_ns + frame_ns <= window.end_ns } {
+            let missed = used_cycle.replace(window.cycle).map_or(0, |used| window.cycle.saturating_sub(used + 1));
+            if missed >= STANDSTILL_CYCLES {
+                said.standstills.push(missed as f64);
+            }
+        }
     }
+}
+
+/// Waits for a window as a router does; how long after its beginning it is then.
+fn late_ns(window: &Window, spin_ns: u64) -> u64 {
+    let sleeps_ns = window.begin_ns.saturating_sub(spin_ns).saturating_sub(monotonic_ns());
+    std::thread::sleep(Duration::from_nanos(sleeps_ns));
+    while monotonic_ns() < window.begin_ns {
+        std::hint::spin_loop();
+    }
+    monotonic_ns().saturating_sub(window.begin_ns)
 }

@@ -15,7 +15,6 @@ pub mod capture;
 pub mod counts;
 pub mod filter;
 pub mod kept;
-pub mod machine;
 pub mod plan;
 pub mod rights;
 pub mod routers;

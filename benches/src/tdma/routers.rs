@@ -2,12 +2,11 @@
 
 use super::capture::{Capture, What};
 use super::counts::Counts;
-use super::machine::Machine;
 use super::plan::{INSTALLATION, Plan};
 use super::rights::Rights;
 use super::stage::{NODES, Place, Stage};
 use crate::Failure;
-use crate::harness::{Scratch, interrupted};
+use crate::harness::{Machine, Scratch, interrupted};
 use crate::lan::router::{Router, RouterSpec, end_all};
 use crate::settings::Settings;
 use rohrpost_mailbox::{Node, SystemClock};
@@ -19,6 +18,8 @@ use std::time::{Duration, Instant};
 const SENDS_WITHIN: Duration = Duration::from_secs(60);
 /// So many datagrams with packages, and the node has found its slots.
 const FRAMES: usize = 10;
+/// A thread of a router that sends in its slots is called so.
+const SLOTS_THREAD: &str = "slots";
 const LOOK_EACH: Duration = Duration::from_millis(10);
 
 /// Three routers, until this is dropped.
@@ -100,7 +101,7 @@ impl<'a> Routers<'a> {
 
     /// What the computer did for them.
     pub fn machine(&self) -> Machine {
-        Machine::look(&self.routers.iter().map(Router::pid).collect::<Vec<_>>())
+        Machine::look(&self.routers.iter().map(Router::pid).collect::<Vec<_>>(), SLOTS_THREAD)
     }
 
     /// Until each of these nodes has sent some packages from now on.

@@ -44,9 +44,12 @@ pub fn changes_of_master(frames: &[Crossed]) -> usize {
 }
 
 /// How many of so many cycles had no master's synchronisation, percent.
-pub fn without_sync_percent(frames: &[Crossed], cycles: f64) -> f64 {
-    let syncs = frames.iter().filter(|frame| frame.what == What::Sync).count() as f64;
-    (cycles - syncs).max(0.0) * 100.0 / cycles
+pub fn without_sync_percent(frames: &[Crossed], cycle: Duration, cycles: f64) -> f64 {
+    let syncs = || frames.iter().filter(|frame| frame.what == What::Sync).map(|frame| frame.at_ns);
+    // Of one cycle are those that follow each other within half of one: each slave gets one.
+    let half_ns = cycle.as_nanos() as u64 / 2;
+    let begun = syncs().zip(syncs().skip(1)).filter(|(before, at)| at - before > half_ns).count() + 1;
+    (cycles - begun as f64).max(0.0) * 100.0 / cycles
 }
 
 /// Kills the master after some part of a cycle, and waits until another reigns.
@@ -156,4 +159,19 @@ fn ahead_ns(clock: &SystemClock, time: &TimeRecord) -> Result<i64, Failure> {
     let record = clock.record().ok_or_else(|| Failure::Failed("a node has no time".into()))?;
     let now_ns = monotonic_ns();
     Ok(record.at(now_ns).ns.wrapping_sub(time.at(now_ns).ns).cast_signed())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cycle_has_a_sync_however_many_slaves_get_one() {
+        let cycle = Duration::from_millis(5);
+        let sync = |at_us: u64| Crossed { at_ns: at_us * 1_000, from: 0, what: What::Sync };
+        let all = [0, 5_000, 15_200, 20_000].map(|at_us| [sync(at_us), sync(at_us + 20)]);
+        assert_eq!(without_sync_percent(all.as_flattened(), cycle, 5.0), 20.0);
+        assert_eq!(without_sync_percent(&all.as_flattened()[..4], cycle, 2.0), 0.0);
+        assert_eq!(without_sync_percent(&[], cycle, 100.0), 99.0, "one cannot be told");
+    }
 }

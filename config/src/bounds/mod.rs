@@ -88,7 +88,7 @@ pub enum Unbounded {
     TooLong,
 }
 
-/// The bounds of all flows between different nodes, in their order in the file; none if nodes send as packages come.
+/// The bounds of all flows between different nodes of the LAN, in their order in the file; none if nodes send as packages come.
 pub fn bounds(installation: &Installation) -> Vec<FlowBound> {
     let Some(tdma) = &installation.tdma else { return Vec::new() };
     (0..installation.flows.len()).filter_map(|flow| bound(installation, tdma, flow)).collect()
@@ -98,7 +98,7 @@ pub fn bounds(installation: &Installation) -> Vec<FlowBound> {
 fn bound(installation: &Installation, tdma: &Tdma, flow: usize) -> Option<FlowBound> {
     let network = installation.network.as_ref()?;
     let own = Sent::new(installation, &installation.flows[flow])?;
-    let link = Link::new(tdma, network, &installation.nodes);
+    let link = Link::new(tdma, network, installation.lan_nodes());
     let level = network.level(own.least);
     let latency = if level == LEVEL_NOT_REAL_TIME {
         Err(Unbounded::NotRealTime)
@@ -166,7 +166,7 @@ fn supply(installation: &Installation, tdma: &Tdma, link: &Link, node: u8) -> Su
     Supply {
         windows: windows.collect(),
         repeats_ns: cycles * ns(tdma.cycle),
-        said_ns: link.said_ns(tdma, installation.nodes.len(), installation.time.masters().len()),
+        said_ns: link.said_ns(tdma, installation.lan_nodes().len(), installation.time.masters().len()),
         taken_before_ns: ns(TAKEN_BEFORE),
         late_ns: ns(LATE),
     }
@@ -183,10 +183,10 @@ struct Sent<'f> {
 }
 
 impl<'f> Sent<'f> {
-    /// None if both ends are on one node.
+    /// None if both ends are on one node, or one is not on the LAN.
     fn new(installation: &Installation, flow: &'f Flow) -> Option<Self> {
         let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
-        let (node, peer) = (installation.node_index(&from.node)?, installation.node_index(&to.node)?);
+        let (node, peer) = (installation.lan_index(&from.node)?, installation.lan_index(&to.node)?);
         let commands = to.names().any(|name| from.calls.contains(&name)).then(|| from.name.class().priority());
         let data = from.names().any(|name| to.calls.contains(&name)).then(|| to.name.class().priority());
         let (commands, data) = (commands.or(data)?, data.or(commands)?);

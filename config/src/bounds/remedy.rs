@@ -138,7 +138,7 @@ impl<'a> Search<'a> {
     fn another(&self) -> Option<TimeSlot> {
         let (_, model) = self.own().next()?;
         let network = self.installation.network.as_ref()?;
-        let link = Link::new(self.tdma, network, &self.installation.nodes);
+        let link = Link::new(self.tdma, network, self.installation.lan_nodes());
         let length_min = self.tdma.length_min(self.installation, &link);
         let tries = self.tdma.gaps(self.installation.time.masters()).into_iter().filter_map(|(offset, free)| {
             let length = |steps: u32| length_min + STEP * (steps - 1);

@@ -2,7 +2,7 @@
 
 use super::{Page, timeline};
 use crate::bounds::{Bound, bounds};
-use crate::tdma::{LATE, Tdma, TimeSlot};
+use crate::tdma::{GATE, LATE, Tdma, TimeSlot};
 use crate::units::{duration_decimal, duration_text, rate_text};
 use std::time::Duration;
 
@@ -29,7 +29,9 @@ impl Page<'_> {
             );
         }
         self.entry("guard", &words);
-        self.entry("late", &format!("a slot whose turn is noticed more than {late} too late is left unused"));
+        let gate = duration_text(GATE);
+        let words = format!("a slot noticed more than {gate} too late is left unused; bounds allow {late}");
+        self.entry("late", &words);
         let names: Vec<&str> = masters.iter().map(|index| self.node_name(*index)).collect();
         let window = duration_text(tdma.synchronisation);
         self.entry("synchronised", &format!("in {window} at the beginning for each master: {}", names.join(", ")));
@@ -38,7 +40,7 @@ impl Page<'_> {
             self.entry("tunnel", &words);
         }
         self.line("");
-        for row in timeline::rows(tdma, &self.installation.nodes, masters) {
+        for row in timeline::rows(tdma, self.installation.lan_nodes(), masters) {
             self.line(row);
         }
         self.line("");
@@ -50,7 +52,7 @@ impl Page<'_> {
     }
 
     fn table(&mut self, tdma: &Tdma) {
-        let width = self.installation.nodes.iter().map(|node| node.name.len()).max().unwrap_or(0).max(4);
+        let width = self.installation.lan_nodes().iter().map(|node| node.name.len()).max().unwrap_or(0).max(4);
         self.line(format!("  {:width$}  {:>8}  {:>8}  {:>9}  there", "node", "offset", "length", "bytes"));
         for slot in &tdma.slots {
             let (offset, length) = (duration_decimal(slot.offset), duration_decimal(slot.length));

@@ -116,6 +116,7 @@ fn step(cycle: Duration) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::node::Reach;
     use crate::tdma::TimeSlot;
 
     #[test]
@@ -131,6 +132,7 @@ mod tests {
             let tdma = Tdma { cycle, synchronisation, guard, link_bytes_s: 12_500_000, slots, tunnel: None, line: 0 };
             let node = |index: u8| Node {
                 name: format!("node-{index}"),
+                reach: Reach::Lan,
                 address: None,
                 mode: 0o700,
                 tools: index..=index,

@@ -23,7 +23,7 @@ const CYCLES_MAX: u64 = 64;
 /// Judges the table, then whether every flow keeps its deadline with it.
 pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
     let (Some(tdma), Some(network)) = (&installation.tdma, &installation.network) else { return };
-    let link = Link::new(tdma, network, &installation.nodes);
+    let link = Link::new(tdma, network, installation.lan_nodes());
     let judge = Judge { installation, tdma, link, reader };
     judge.guard();
     judge.synchronisation();
@@ -90,7 +90,7 @@ impl Judge<'_> {
 
     fn synchronisation(&self) {
         let Tdma { cycle, synchronisation, guard, .. } = self.tdma;
-        let others = self.installation.nodes.len() - 1;
+        let others = self.installation.lan_nodes().len() - 1;
         let frames = Duration::from_nanos(2 * others as u64 * self.link.time_ns());
         let needed = round_up(*guard + LATE + frames);
         if *synchronisation < needed {
@@ -147,7 +147,7 @@ impl Judge<'_> {
     /// Each node sends often enough that nobody takes it for silent.
     fn silence(&self) {
         let pause = |slot: &TimeSlot| self.tdma.cycle * slot.period;
-        for node in 0..self.installation.nodes.len() {
+        for node in 0..self.installation.lan_nodes().len() {
             let own = self.tdma.slots.iter().filter(|slot| usize::from(slot.node) == node);
             let Some(slot) = own.min_by_key(|slot| slot.period).filter(|slot| pause(slot) > SLOT_WITHIN) else {
                 continue;
@@ -239,7 +239,7 @@ impl Judge<'_> {
     /// Each node has a slot.
     fn nodes(&self) {
         let has_one = |index: u8| self.tdma.slots.iter().any(|slot| slot.node == index);
-        for (node, index) in self.installation.nodes.iter().zip(0..).filter(|(_, index)| !has_one(*index)) {
+        for (node, index) in self.installation.lan_nodes().iter().zip(0..).filter(|(_, index)| !has_one(*index)) {
             let master = if self.masters().contains(&index) { ", although it may be master of time" } else { "" };
             let needed = self.tdma.length_min(self.installation, &self.link);
             let gap = self.tdma.gaps(self.masters()).into_iter().find(|(_, free)| *free >= needed);
@@ -349,7 +349,7 @@ impl Tdma {
 
     /// What a slot needs at least: its guard, what routers say to each other, and a largest datagram.
     pub(crate) fn length_min(&self, installation: &Installation, link: &Link) -> Duration {
-        let said_ns = link.said_ns(self, installation.nodes.len(), installation.time.masters().len());
+        let said_ns = link.said_ns(self, installation.lan_nodes().len(), installation.time.masters().len());
         round_up(self.guard + LATE + Duration::from_nanos(said_ns + link.largest_ns()))
     }
 

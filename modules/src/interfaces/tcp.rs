@@ -30,6 +30,33 @@ pub struct ClassPassed {
     pub lost: Vec<CarriedLoss>,
 }
 
+/// The system time of a node that has it from the TCP router.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondTime {
+    /// Raised with each step of time.
+    pub epoch: u64,
+    /// System time when this was said, ns since 1970.
+    pub now_ns: u64,
+    /// How far off it may be then, ns; none: nobody knows.
+    pub error_ns: Option<u64>,
+}
+
+/// When a client took part no more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondOutage {
+    /// From then on, system time, ns since 1970.
+    pub began_ns: u64,
+    /// Until then; none: it is not over.
+    pub ended_ns: Option<u64>,
+}
+
+impl BeyondOutage {
+    /// How long it took, or has taken until `now_ns`.
+    pub fn duration(&self, now_ns: u64) -> std::time::Duration {
+        std::time::Duration::from_nanos(self.ended_ns.unwrap_or(now_ns).saturating_sub(self.began_ns))
+    }
+}
+
 /// A node's client of the TCP router. Counts are since it began, and only grow.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct BeyondLink {
@@ -47,6 +74,12 @@ pub struct BeyondLink {
     pub round_trip_ns: Option<u64>,
     /// How far off the system time that the server tells is at most here, ns; none: it does not know it.
     pub time_error_ns: Option<u64>,
+    /// The node's system time, if it is what the server tells.
+    pub time: Option<BeyondTime>,
+    /// How often it took part no more.
+    pub outages: u64,
+    /// When that was last; none: never.
+    pub outage: Option<BeyondOutage>,
     /// Bytes of memory that what waits takes up.
     pub waiting_bytes: u64,
     /// Classes that sent something there, the most urgent first.
@@ -83,16 +116,42 @@ pub struct BeyondClients {
     pub address: String,
     /// Time since it began, ms.
     pub uptime_ms: u64,
-    /// The connections that are there.
+    /// The connections that are there; of many the first.
     pub clients: Vec<BeyondClient>,
+    /// Connections besides these.
+    pub more: u64,
     /// Clients that took part and do not any more.
     pub left: u64,
     /// Connections that might not take part, or not any more.
     pub refused: u64,
     /// Who was the last of them, and why; empty without one.
     pub refusal: String,
+    /// Registrations that a later one of the same client took the place of before they were looked at.
+    pub overtaken: u64,
+    /// Lines of output that were not said one by one, since there were too many of their cause.
+    pub held_lines: u64,
     /// Classes of which something passed, the most urgent first.
     pub classes: Vec<ClassPassed>,
+}
+
+/// Names that somebody hosts, all from the first to the last.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondHost {
+    /// The first, by number.
+    pub first: u32,
+    /// The last.
+    pub last: u32,
+    /// The client that hosts them.
+    pub client: String,
+}
+
+/// All names that are registered at the TCP router.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondHosts {
+    /// By client, in the order of names.
+    pub hosts: Vec<BeyondHost>,
+    /// Further ranges, which are not told.
+    pub more: u64,
 }
 
 /// Carries packages beyond the LAN; it does so also while it is off.
@@ -105,4 +164,8 @@ pub trait Tcp {
     /// How the TCP router stands with its clients.
     #[data(2)]
     fn clients() -> BeyondClients;
+
+    /// Which names are registered at the TCP router, and by whom.
+    #[data(3)]
+    fn hosts() -> BeyondHosts;
 }

@@ -44,7 +44,7 @@ use events::Bell;
 use look::Looks;
 use program::Program;
 use rohrpost_config::{
-    Installation, Module, Node as NodeConfig, Program as Configured, TCP_CLIENT, TCP_ROUTER,
+    Installation, Module, Node as NodeConfig, Program as Configured, Reach, TCP_CLIENT, TCP_ROUTER,
     TimeSource as ConfiguredTime,
 };
 use rohrpost_mailbox::{
@@ -148,7 +148,7 @@ impl Launch {
         let (node, lock) = take_node(&node_directory(&installation.name, node_name), mode)?;
         let mut notes = leftovers::end(&node, &installation, node_name)?;
         notes.extend(missing.iter().map(ToString::to_string));
-        let time = begin_time(&node, &installation)?;
+        let time = begin_time(&node, &installation, node_name)?;
         leftovers::note_config(&node, &installation, node_name)?;
         let tool = ToolLink::join_as_launch(&installation, &node, node_name, PATIENCE)?;
         let counter = Counter::open(&tool.link).map_err(ClientError::from)?;
@@ -465,7 +465,11 @@ fn passes(error: &NodeError) -> bool {
     }
 }
 
-fn begin_time(node: &Arc<Node>, installation: &Installation) -> Result<TimeKeeper, NodeError> {
+fn begin_time(node: &Arc<Node>, installation: &Installation, name: &str) -> Result<TimeKeeper, NodeError> {
+    // Likewise the client of the TCP router, where that tells the time.
+    if installation.node(name).is_some_and(|node| node.reach == Reach::Tcp) {
+        return TimeKeeper::await_master(node);
+    }
     let (source, pace) = match installation.time {
         ConfiguredTime::Local => (TimeSource::Local, 1.0),
         // The router writes the master's time into the page as soon as it knows it; until then nobody is without a time, launch

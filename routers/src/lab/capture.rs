@@ -55,21 +55,34 @@ impl Capture {
 
     /// Hands out each UDP datagram that has crossed since. Never waits.
     pub fn drain(&mut self, mut seen: impl FnMut(Crossing<'_>)) {
+        let ahead_ns = self.ahead_ns;
+        self.drain_stamped(|stamp_ns, frame| {
+            if let (Some(stamp_ns), Some((source, port, datagram))) = (stamp_ns, datagram(frame)) {
+                seen(Crossing { at_ns: stamp_ns.saturating_sub(ahead_ns), source, port, datagram });
+            }
+        });
+    }
+
+    /// Hands out each frame that has crossed since, whatever is in it. Never waits.
+    pub fn drain_frames(&mut self, mut seen: impl FnMut(&[u8])) {
+        self.drain_stamped(|_, frame| seen(frame));
+    }
+
+    fn drain_stamped(&mut self, mut seen: impl FnMut(Option<u64>, &[u8])) {
         let mut control = [0; CONTROL_BYTES];
         loop {
             let mut parts = [IoSliceMut::new(&mut self.frame)];
             let (socket, flags) = (self.socket.as_raw_fd(), MsgFlags::MSG_DONTWAIT);
             let Ok(message) = recvmsg::<LinkAddr>(socket, &mut parts, Some(&mut control), flags) else { return };
             let mut stamps = message.cmsgs().into_iter().flatten();
-            let stamp = stamps.find_map(|message| match message {
+            let stamp_ns = stamps.find_map(|message| match message {
                 ControlMessageOwned::ScmTimestampns(stamp) => u64::try_from(stamp.num_nanoseconds()).ok(),
                 _ => None,
             });
             let came_in = message.address.is_some_and(|address| address.pkttype() != OUTGOING);
             let bytes = message.bytes;
-            let datagram = self.frame.get(..bytes).filter(|_| came_in).and_then(datagram);
-            if let (Some(stamp_ns), Some((source, port, datagram))) = (stamp, datagram) {
-                seen(Crossing { at_ns: stamp_ns.saturating_sub(self.ahead_ns), source, port, datagram });
+            if let Some(frame) = self.frame.get(..bytes).filter(|_| came_in) {
+                seen(stamp_ns, frame);
             }
         }
     }

@@ -11,6 +11,7 @@
 //! A thread goes into the namespace of a node ([`Lab::enter`]) and comes out again; sockets that it makes and processes that it starts
 //! meanwhile stay in. Whoever is not root goes into a user namespace first ([`become_able`]).
 
+mod beyond;
 mod capture;
 mod namespace;
 
@@ -130,11 +131,7 @@ impl Lab {
             let (own, far) = (End { device: node.port, name: &name }, End { device: LAN, name: DEVICE });
             told(&format!("make the link of {at}"), hub.add_veth(own, BRIDGE, far, &node.namespace, mtu))?;
             told(&format!("set the link of {at} up"), hub.set_up(node.port, true))?;
-            let (mut inside, address) = (node.namespace.netlink()?, node.spec.address);
-            told(&format!("set the loopback of {at} up"), inside.set_up(LOOPBACK, true))?;
-            told(&format!("give {at} the address {address}"), inside.add_address(LAN, address, None))?;
-            told(&format!("set the device of {at} up"), inside.set_up(LAN, true))?;
-            told(&format!("give {at} its route"), inside.add_route_to_all(LAN, address))?;
+            self.set_up(node, node.spec.address)?;
         }
         Ok(())
     }

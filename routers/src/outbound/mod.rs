@@ -304,15 +304,15 @@ impl Outbound {
     }
 
     fn reaches(&self, peer: NodeIndex) -> bool {
-        self.acquaintances.as_ref().is_none_or(|all| all.known() & 1 << peer != 0)
+        self.acquaintances.as_ref().is_none_or(|all| all.reached() & 1 << peer != 0)
     }
 
     /// Whoever is known since just now is told at once that we are there.
     fn look_who_is_known(&mut self) {
         let Some(all) = &self.acquaintances else { return };
-        let known = all.known();
-        if known != self.reached {
-            (self.reached, self.alive_ns) = (known, 0);
+        let reached = all.reached();
+        if reached != self.reached {
+            (self.reached, self.alive_ns) = (reached, 0);
         }
     }
 

@@ -73,6 +73,7 @@ pub struct Queue {
     quota_blocks: u32,
     ticket: u64,
     used_blocks: u32,
+    len: usize,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -103,6 +104,7 @@ impl Queue {
             quota_blocks: quota_blocks as u32,
             ticket: 0,
             used_blocks: 0,
+            len: 0,
         };
         for place in 0..count as u32 {
             queue.by_peer.append(&mut queue.free, place);
@@ -113,6 +115,11 @@ impl Queue {
     /// Whether nothing waits.
     pub fn is_empty(&self) -> bool {
         self.levels == 0
+    }
+
+    /// Packages that wait.
+    pub fn len(&self) -> usize {
+        self.len
     }
 
     /// Bytes of memory in use.
@@ -139,6 +146,7 @@ impl Queue {
         self.entries[place as usize] = Entry { waiting, ticket: self.ticket, body };
         self.ticket += 1;
         self.used_blocks += needed;
+        self.len += 1;
         let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
         self.by_peer.append(&mut self.peers[peer][level], place);
         self.busy[level] |= 1 << peer;
@@ -255,6 +263,7 @@ impl Queue {
         }
         sender.used -= body.blocks();
         self.used_blocks -= body.blocks();
+        self.len -= 1;
         self.blocks.free(body);
         self.by_peer.prepend(&mut self.free, place.0);
         (waiting, self.blocks.beginning(&body, waiting.head.len))

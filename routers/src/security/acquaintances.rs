@@ -74,6 +74,8 @@ pub struct Acquaintances {
     known: AtomicU64,
     /// Peers of whose life datagrams said something else, one bit each.
     doubts: AtomicU64,
+    /// Peers for which a reply waits for a slot, one bit each: nothing is sealed to them before it has left.
+    unsaid: AtomicU64,
     /// By [`Port`].
     rejections: [Arc<Rejections>; 2],
 }
@@ -107,9 +109,9 @@ impl Acquaintances {
     /// If the incarnation is 0.
     pub fn new(who: Who, keys: KeyRing) -> Arc<Self> {
         assert_ne!(who.incarnation, 0, "a life has an incarnation");
-        let any = |node| End { node, incarnation: 0 };
         let seals = |from, to| {
-            keys.derive_all(&Binding { purpose: Purpose::Hello, system: who.system, from: any(from), to: any(to) })
+            let (from, to) = (End::any(from), End::any(to));
+            keys.derive_all(&Binding { purpose: Purpose::Hello, system: who.system, from, to })
         };
         let peer = |node| Peer {
             hello_to: seals(who.own, node),
@@ -123,7 +125,7 @@ impl Acquaintances {
         let peers = (0..who.nodes).map(peer).collect();
         let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(who.nodes)));
         let none = || AtomicU64::new(0);
-        Arc::new(Self { peers, who, keys, known: none(), doubts: none(), rejections })
+        Arc::new(Self { peers, who, keys, known: none(), doubts: none(), unsaid: none(), rejections })
     }
 
     /// What was not taken at a port.
@@ -135,6 +137,24 @@ impl Acquaintances {
     pub fn known(&self) -> u64 {
         // ORDERING (F): who finds a peer here finds its life, and so can seal to it. Pairs with (E).
         self.known.load(Ordering::Acquire)
+    }
+
+    /// The peers of [`Self::known`] that can open what is sealed to them.
+    pub fn reached(&self) -> u64 {
+        // ORDERING (H): who finds that a reply has left finds so after it has. Pairs with (G).
+        self.known() & !self.unsaid.load(Ordering::Acquire)
+    }
+
+    /// A reply to a peer is to leave in a slot: until then it may not be able to open what is sealed to it. Whether none
+    /// waited before.
+    pub fn reply_waits(&self, peer: NodeIndex) -> bool {
+        self.unsaid.fetch_or(1 << peer, Ordering::Relaxed) & 1 << peer == 0
+    }
+
+    /// It has left, or is lost: then the peer asks again.
+    pub fn reply_left(&self, peer: NodeIndex) {
+        // ORDERING (G): the reply was handed over before. Pairs with (H).
+        self.unsaid.fetch_and(!(1 << peer), Ordering::Release);
     }
 
     /// The life of a peer that is known to live, if there is one.
@@ -197,8 +217,10 @@ impl Acquaintances {
         next.store(sequence + 1, Ordering::Relaxed);
     }
 
-    /// Key of what one end's life seals to the other's.
+    /// Key of what one end's life seals to the other's. Time it seals to the node: who begins in time slots must hear it before anybody knows that it
+    /// lives, and takes nothing for proven that was said before the hello by which the other's life began.
     pub(super) fn binding(&self, port: Port, from: End, to: End) -> Binding {
+        let to = if port == Port::Time { End::any(to.node) } else { to };
         Binding { purpose: port.purpose(), system: self.who.system, from, to }
     }
 

@@ -31,6 +31,10 @@ pub struct Said {
     pub to: NodeIndex,
     /// How long it is.
     pub bytes: usize,
+    /// It answers one.
+    pub is_reply: bool,
+    /// A life begins when it has left.
+    pub begins: bool,
 }
 
 /// One, in the thread that receives packages.
@@ -95,7 +99,8 @@ impl Gate {
             Ok(Opened::Hello(head, greeting)) => {
                 if inbound.may_greet(now_ns, came.source, &head, deliver) {
                     let greeted = self.greeter.greet(now_ns, &head, &greeting, reply);
-                    return greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes });
+                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: greeted.begins };
+                    return greeted.reply_bytes.map(said);
                 }
             }
             Err(NotOpened::Bad(why @ (BadFrame::Foreign | BadFrame::Damaged(_) | BadFrame::Sealed))) => {
@@ -112,6 +117,15 @@ impl Gate {
     /// From which sequence on the present life of a peer is heard; what is missing from there on is lost.
     pub fn first(&self, peer: NodeIndex) -> u64 {
         self.opening.first(peer)
+    }
+
+    /// Has a hello wait for a slot: `put` says whether there was room. Nothing is sealed to a life that begins by it before it has left; but if it
+    /// is lost, nothing waits for it.
+    pub fn waits(&self, said: Said, put: impl FnOnce() -> bool) {
+        let waits = said.begins && self.all.reply_waits(said.to);
+        if !put() && waits {
+            self.all.reply_left(said.to);
+        }
     }
 
     /// Lets the life begin that what was taken last has shown to live; whether one does. To be done when the reply has left.
@@ -136,7 +150,7 @@ impl Gate {
         self.peers[usize::from(to)].at_ns = Some(now_ns);
         self.all.doubted(to);
         self.greeter.refresh(now_ns, to);
-        self.all.ask(to, datagram).map(|bytes| Said { to, bytes })
+        self.all.ask(to, datagram).map(|bytes| Said { to, bytes, is_reply: false, begins: false })
     }
 
     fn is_to_be_asked(&mut self, peer: NodeIndex, now_ns: u64, stats: &Stats) -> bool {

@@ -116,6 +116,13 @@ pub(super) struct End {
     pub(super) incarnation: u64,
 }
 
+impl End {
+    /// Whatever life the node has.
+    pub(super) fn any(node: NodeIndex) -> Self {
+        Self { node, incarnation: 0 }
+    }
+}
+
 /// All that a derived key is bound to: no two of these have one key.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Binding {

@@ -10,8 +10,8 @@
 //!  ══ packages, time: sealed by A's present life to B's present life ══▶
 //! ```
 //!
-//! A *hello* (one of these three) is sealed from node to node, everything else from life to life: so nothing that was recorded in another life of
-//! either end opens in this one. A challenge serves once, and not for long, then there is another; and a hello says from which
+//! A *hello* (one of these three) is sealed from node to node, packages from life to life, time from life to node: so nothing that was recorded in
+//! another life of either end is taken in this one. A challenge serves once, and not for long, then there is another; and a hello says from which
 //! sequence on its life will be heard, so nothing that a life had sent before is taken either.
 //!
 //! ```text
@@ -28,10 +28,12 @@ mod greeter;
 mod hello;
 mod keys;
 mod opening;
+mod overheard;
 mod random;
 mod seal;
 mod sealing;
 mod tally;
+mod waiting;
 
 pub use acquaintances::{Acquaintances, Port, Who};
 pub use gate::{ASK_EVERY_NS, Gate, Said};
@@ -43,6 +45,7 @@ pub use random::{NoRandom, random};
 pub use seal::TAG_BYTES;
 pub use sealing::{Sealing, Unacquainted};
 pub use tally::{Rejections, TELL_EVERY_NS, Tally};
+pub use waiting::{HELLO_SLOT_BYTES, Waiting};
 
 /// Bytes of a datagram that carries a hello.
 pub const HELLO_DATAGRAM_BYTES: usize = crate::frame::HEAD_BYTES + HELLO_BYTES + TAG_BYTES;

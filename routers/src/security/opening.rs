@@ -4,6 +4,7 @@ use super::HELLO_DATAGRAM_BYTES;
 use super::acquaintances::{Acquaintances, Known, Port};
 use super::hello::Hello;
 use super::keys::End;
+use super::overheard::Overheard;
 use super::seal::{self, Seal};
 use crate::broken::broken;
 use crate::frame::{BadFrame, FrameHead, Kind, NodeIndex};
@@ -102,6 +103,8 @@ pub struct Opening {
     all: Arc<Acquaintances>,
     port: Port,
     peers: Box<[Known<Heard>]>,
+    /// By node: lives of it that are not known to live.
+    overheard: Box<[Overheard]>,
 }
 
 /// A peer's present life as it is heard.
@@ -117,7 +120,9 @@ struct Heard {
 impl Opening {
     /// For a port; there is one.
     pub fn new(all: &Arc<Acquaintances>, port: Port) -> Self {
-        Self { peers: (0..all.who.nodes).map(|_| Known::default()).collect(), all: all.clone(), port }
+        let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
+        let overheard = (0..all.who.nodes).map(|_| Overheard::default()).collect();
+        Self { peers, overheard, all: all.clone(), port }
     }
 
     /// Opens a datagram where it lies. Its head can be believed then, but not before.
@@ -131,14 +136,13 @@ impl Opening {
             return Err(Rejection::Unsealed.into());
         }
         let key = all.keys.place(key_id).ok_or(Rejection::OtherKey)?;
-        let is_ours = all.is_peer(head.from) && head.to == all.who.own && head.system == all.who.system;
-        if !is_ours {
+        if !self.is_ours(&head) {
             return Err(Rejection::NotOurs.into());
         }
         if head.kind == Kind::Hello {
             return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));
         }
-        let heard = Self::heard(&mut self.peers, all, self.port, head.from);
+        let heard = Self::heard(&mut self.peers, &self.overheard, all, self.port, head.from);
         let heard = heard.filter(|heard| heard.incarnation == head.incarnation).ok_or_else(|| {
             all.doubt(head.from);
             Rejection::OtherLife
@@ -151,6 +155,47 @@ impl Opening {
         let arrival = heard.window.arrive(head.sequence, &mut 0);
         debug_assert!(arrival != Arrival::Copy || broken!(OpensTwice));
         Ok(Opened::Frame(head, text))
+    }
+
+    /// Whether a datagram of time says that it is of another life of its node than the known one, or none is known: then it can be overheard.
+    pub fn is_strange(&mut self, datagram: &[u8]) -> bool {
+        let Ok((head, _)) = FrameHead::read(datagram) else { return false };
+        let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != Kind::Hello;
+        let heard = |opening: &mut Self| {
+            let Self { peers, overheard, all, port } = opening;
+            let heard = Self::heard(peers, overheard, all, *port, head.from);
+            heard.is_some_and(|heard| heard.incarnation == head.incarnation)
+        };
+        is_theirs && !heard(self)
+    }
+
+    /// Opens a datagram that [`Self::is_strange`]: some life of its node has said it to this node at some time. For each life that is named a key is
+    /// derived, which costs about as much as to open a datagram.
+    ///
+    /// # Errors
+    /// [`NotOpened`]
+    pub fn overhear<'a>(&mut self, datagram: &'a mut [u8]) -> Result<(FrameHead, &'a [u8]), NotOpened> {
+        let (head, key_id) = FrameHead::read(datagram)?;
+        if key_id == 0 {
+            return Err(Rejection::Unsealed.into());
+        }
+        let key = self.all.keys.place(key_id).ok_or(Rejection::OtherKey)?;
+        if !self.is_ours(&head) {
+            return Err(Rejection::NotOurs.into());
+        }
+        self.all.doubt(head.from);
+        let all = &self.all;
+        let text = self.overheard[usize::from(head.from)].open((&head, key), datagram, || {
+            let peer = End { node: head.from, incarnation: head.incarnation };
+            all.keys.derive(key, &all.binding(Port::Time, peer, all.own()))
+        });
+        Ok((head, text.ok_or(Rejection::Forged)?))
+    }
+
+    /// Whether it says that it comes from another node of ours, to this one.
+    fn is_ours(&self, head: &FrameHead) -> bool {
+        let all = &self.all;
+        all.is_peer(head.from) && head.to == all.who.own && head.system == all.who.system
     }
 
     /// From which sequence on the life of a peer is heard that was opened last; what is missing from there on is lost.
@@ -173,17 +218,20 @@ impl Opening {
 
     fn heard<'a>(
         peers: &'a mut [Known<Heard>],
+        overheard: &[Overheard],
         all: &Acquaintances,
         port: Port,
         from: NodeIndex,
     ) -> Option<&'a mut Heard> {
         peers[usize::from(from)].of(all, from, |life| {
             let peer = End { node: from, incarnation: life.incarnation };
+            // What was overheard is not proven a second time.
+            let first = life.next[port as usize].max(overheard[usize::from(from)].next(life.incarnation));
             Heard {
                 incarnation: life.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
-                first: life.next[port as usize],
-                window: Window::going_on(life.next[port as usize]),
+                first,
+                window: Window::going_on(first),
             }
         })
     }

@@ -16,18 +16,31 @@ pub struct Sealing {
     all: Arc<Acquaintances>,
     port: Port,
     peers: Box<[Known<Way>]>,
+    /// By node and place of the key: what any life of it opens. Empty where nothing is sealed to who is not known.
+    strangers: Box<[Vec<Seal>]>,
 }
 
 /// To a peer's present life.
 struct Way {
-    key_id: u8,
+    /// Place of the key.
+    key: usize,
     seal: Seal,
 }
+
+/// Of so many datagrams to a peer one is sealed with the other key while there are two: its next life may have only that.
+const OTHER_KEY_EVERY: u64 = 4;
 
 impl Sealing {
     /// For a port; there is one.
     pub fn new(all: &Arc<Acquaintances>, port: Port) -> Self {
-        Self { peers: (0..all.who.nodes).map(|_| Known::default()).collect(), all: all.clone(), port }
+        let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
+        Self { peers, strangers: Box::default(), all: all.clone(), port }
+    }
+
+    /// Of time in time slots: seals to whoever has a key, known or not. Whoever begins there must hear it before it may ask who lives.
+    pub fn of_slots(all: &Arc<Acquaintances>) -> Self {
+        let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), End::any(node)));
+        Self { strangers: (0..all.who.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
     }
 
     /// Seals a datagram where it lies: 36 bytes for the head, what follows it, and [`TAG_BYTES`](super::TAG_BYTES) of room.
@@ -53,11 +66,27 @@ impl Sealing {
         let (to, sequence) = frame::place_of(datagram);
         let port = self.port;
         let all = &self.all;
-        let way = Self::way(&mut self.peers, all, port, to).ok_or(Unacquainted)?;
+        let way = Self::way(&mut self.peers, all, port, to);
+        let (key, seal) = match self.strangers.get(usize::from(to)) {
+            Some(seals) => {
+                let key = Self::key_to_stranger(way.map(|way| way.key), seals.len(), sequence);
+                (key, &seals[key])
+            }
+            None => way.map(|way| (way.key, &way.seal)).ok_or(Unacquainted)?,
+        };
         all.use_up(port, to, sequence);
-        frame::write_key(way.key_id, datagram);
-        way.seal.close(seal::of_sequence(sequence), datagram);
+        frame::write_key(all.keys.id(key), datagram);
+        seal.close(seal::of_sequence(sequence), datagram);
         Ok(())
+    }
+
+    /// Which key a peer has whose life may be over, or is not known: mostly that of the known life, else each in turn.
+    fn key_to_stranger(known: Option<usize>, keys: usize, sequence: u64) -> usize {
+        match known {
+            Some(key) if !sequence.is_multiple_of(OTHER_KEY_EVERY) => key,
+            Some(key) => keys - 1 - key,
+            None => sequence as usize % keys,
+        }
     }
 
     /// Takes back what [`Self::close`] did last to a datagram that could not be sent: what is in it can be read again.
@@ -76,7 +105,7 @@ impl Sealing {
         peers[usize::from(to)].of(all, to, |life| {
             let peer = End { node: to, incarnation: life.incarnation };
             let seal = all.keys.derive(life.key, &all.binding(port, all.own(), peer));
-            Way { key_id: all.keys.id(life.key), seal }
+            Way { key: life.key, seal }
         })
     }
 

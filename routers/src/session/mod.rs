@@ -41,6 +41,8 @@ pub const AGE_MAX_NS: u64 = 1_900_000_000;
 pub const ASK_EVERY_NS: u64 = 1_000_000_000;
 /// An end of which nothing came for so long is gone.
 pub const SILENT_AFTER_NS: u64 = 3_500_000_000;
+/// The same where it is known to be slow: in the middle of a frame, or by how little leaves. What is lost on the way takes seconds there.
+pub const SLOW_SILENT_AFTER_NS: u64 = 8_000_000_000;
 /// An end that has taken nothing of what is ready for so long is gone.
 pub const STALLED_AFTER_NS: u64 = 10_000_000_000;
 /// From the beginning of a connection to its welcome, at most; however busily bytes come.

@@ -44,6 +44,12 @@ pub(super) struct Outgoing {
     ready: Vec<u8>,
     /// Of `ready`, bytes that the stream has taken.
     taken: usize,
+    /// Of `ready`, bytes of a frame whose beginning was taken before.
+    begun: usize,
+    /// Of `ready`, bytes up to the end of the last frame that was put before packages.
+    hurried: usize,
+    /// Bytes that the stream has taken since the connection began.
+    sent: u64,
     queue: Option<Box<Queue>>,
     quota_bytes: usize,
     empty_looks: u8,
@@ -51,7 +57,7 @@ pub(super) struct Outgoing {
 
 impl Outgoing {
     pub(super) fn new(quota_bytes: usize) -> Self {
-        Self { ready: Vec::new(), taken: 0, queue: None, quota_bytes, empty_looks: 0 }
+        Self { ready: Vec::new(), taken: 0, begun: 0, hurried: 0, sent: 0, queue: None, quota_bytes, empty_looks: 0 }
     }
 
     /// Bytes for the stream.
@@ -62,9 +68,10 @@ impl Outgoing {
     /// The stream has taken so many.
     pub(super) fn took(&mut self, bytes: usize) {
         self.taken += bytes;
+        self.sent += bytes as u64;
         if self.taken >= self.ready.len() {
             self.ready.clear();
-            self.taken = 0;
+            (self.taken, self.begun, self.hurried) = (0, 0, 0);
             self.ready.shrink_to(BATCH_BYTES);
         }
     }
@@ -72,6 +79,11 @@ impl Outgoing {
     /// Whether packages wait.
     pub(super) fn has_waiting(&self) -> bool {
         self.queue.as_ref().is_some_and(|queue| !queue.is_empty())
+    }
+
+    /// Packages that wait.
+    pub(super) fn waiting(&self) -> usize {
+        self.queue.as_ref().map_or(0, |queue| queue.len())
     }
 
     /// Bytes of memory.
@@ -84,12 +96,27 @@ impl Outgoing {
         if !broken!(SendsCutAgain) {
             self.ready.clear();
         }
-        self.taken = 0;
+        (self.taken, self.begun, self.hurried, self.sent) = (0, 0, 0, 0);
     }
 
     /// Appends a frame that is no package. The caller bounds how many.
     pub(super) fn say(&mut self, message: &Message<'_>) {
         message.write(&mut self.ready);
+    }
+
+    /// The same, before all packages that have not begun to leave. What has left when [`sent`](Self::sent) has come so far.
+    pub(super) fn hurry(&mut self, message: &Message<'_>) -> u64 {
+        let mut frame = Vec::new();
+        message.write(&mut frame);
+        let at = if broken!(AsksLast) { self.ready.len() } else { self.next_frame().max(self.hurried) };
+        self.hurried = at + frame.len();
+        self.ready.splice(at..at, frame);
+        self.sent + (self.hurried - self.taken) as u64
+    }
+
+    /// Bytes that the stream has taken since the connection began.
+    pub(super) fn sent(&self) -> u64 {
+        self.sent
     }
 
     /// A package is to leave. `shift_ns` goes from our clock to the session's; none as long as nothing may leave.
@@ -158,9 +185,22 @@ impl Outgoing {
         }
     }
 
+    /// Of `ready`, where the first frame begins of which nothing was taken.
+    fn next_frame(&self) -> usize {
+        let mut at = self.begun;
+        while let Some(length) = self.ready[at..].first_chunk().filter(|_| at < self.taken) {
+            at += HEAD_BYTES + u32::from_le_bytes(*length) as usize;
+        }
+        at
+    }
+
     fn forget_taken(&mut self) {
-        self.ready.drain(..self.taken);
-        self.taken = 0;
+        if self.taken > 0 {
+            self.begun = self.next_frame() - self.taken;
+            self.hurried = self.hurried.saturating_sub(self.taken);
+            self.ready.drain(..self.taken);
+            self.taken = 0;
+        }
     }
 
     fn make_ready(&mut self, shift_ns: i64, parcel: &Parcel<'_>, fates: &mut impl Fates) {

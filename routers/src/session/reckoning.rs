@@ -32,6 +32,8 @@ pub struct Bounded {
 pub struct Reckoning {
     kept: [Option<Sample>; KEPT],
     next: usize,
+    /// Answers that were read.
+    answers: u64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +64,13 @@ impl Reckoning {
         let sample = Sample { answer: *answer, heard_ns: now_ns, ways_ns: ways_ns.saturating_sub(there_ns) };
         self.kept[self.next] = Some(sample);
         self.next = (self.next + 1) % KEPT;
+        self.answers += 1;
         true
+    }
+
+    /// How many answers were read.
+    pub fn answers(&self) -> u64 {
+        self.answers
     }
 
     /// The shortest way there and back of those that are kept, ns.
@@ -131,6 +139,7 @@ mod tests {
             let (heard_ns, answer) = exchange(asked_ns, way, way);
             reckoning.heard(heard_ns, &answer);
         }
+        assert_eq!(reckoning.answers(), 3, "also those that are worse than the best");
         assert!(reckoning.session(3_000_000).unwrap().error_ns < 12_000, "that of 10 µs each way");
         let (heard_ns, answer) = exchange(20_000_000_000, 400_000, 400_000);
         reckoning.heard(heard_ns, &answer);
@@ -141,6 +150,8 @@ mod tests {
     #[test]
     fn an_answer_to_a_question_of_the_future_is_none() {
         let (_, answer) = exchange(10_000, 5, 5);
-        assert!(!Reckoning::default().heard(9_999, &answer));
+        let mut reckoning = Reckoning::default();
+        assert!(!reckoning.heard(9_999, &answer));
+        assert_eq!(reckoning.answers(), 0);
     }
 }

@@ -95,14 +95,29 @@ impl Table {
         self.steps[..after].last().and_then(|(_, client)| *client)
     }
 
+    /// Ranges of all clients.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether nobody hosts anything.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Systems of which some names are hosted.
     pub fn systems(&self) -> &[u8] {
         &self.systems
     }
 
+    /// All ranges, each with who hosts it.
+    pub fn hosted(&self) -> impl Iterator<Item = (ClientIndex, Range)> {
+        self.entries.iter().map(|entry| (entry.client, entry.range))
+    }
+
     /// Ranges that a client hosts.
     pub fn ranges_of(&self, client: ClientIndex) -> impl Iterator<Item = Range> {
-        self.entries.iter().filter(move |entry| entry.client == client).map(|entry| entry.range)
+        self.hosted().filter(move |(host, _)| *host == client).map(|(_, range)| range)
     }
 
     fn flatten(&mut self) {
@@ -216,7 +231,8 @@ mod tests {
             for (first, length, client) in ranges {
                 let wanted = range([1, first, 0, 0], [1, first + length, 255, 255]);
                 let client = ClientIndex(client);
-                let mut all: Vec<Range> = table.ranges_of(client).collect();
+                let own = table.entries.iter().filter(|entry| entry.client == client);
+                let mut all: Vec<Range> = own.map(|entry| entry.range).collect();
                 all.push(wanted);
                 let before = table.entries.len();
                 if table.register(client, 1, all.into_iter()).is_err() {

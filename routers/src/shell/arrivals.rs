@@ -3,7 +3,7 @@
 use super::ages::Ages;
 use super::answers::Answers;
 use super::news::News;
-use super::slots::{REFUSAL_BYTES, Refusal};
+use super::slots::{Answer, REFUSAL_BYTES};
 use super::socket::{InSocket, Received};
 use super::threads::{Awake, Shared};
 use super::ways::Ways;
@@ -14,7 +14,6 @@ use crate::security::{Gate, HELLO_DATAGRAM_BYTES, Said};
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
-use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
@@ -38,7 +37,7 @@ pub(super) struct Arrivals {
     /// Where datagrams are sealed: opens them, and knows who lives.
     pub(super) guard: Option<Gate>,
     /// Where there are time slots, refusals and hellos leave through them.
-    pub(super) refusals: Option<SyncSender<Refusal>>,
+    pub(super) answers: Option<SyncSender<Answer>>,
 }
 
 impl Arrivals {
@@ -64,7 +63,11 @@ impl Arrivals {
             }
             self.ask(now_ns);
             while let Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.desk) {
-                self.say(to, bytes, refusal);
+                match &self.answers {
+                    // With no room in the line it is lost, and said again a second later.
+                    Some(slots) => drop(slots.try_send(Answer::Refusal { to, bytes, datagram: refusal })),
+                    None => self.socket.answer(to, &refusal[..bytes]),
+                }
             }
             if now_ns >= ring_ns {
                 ring_ns = now_ns + RING_EVERY_NS;
@@ -81,8 +84,8 @@ impl Arrivals {
             return inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: datagram }, desk);
         };
         let mut reply = [0; REFUSAL_BYTES];
-        if let Some(Said { to, bytes }) = gate.take(now_ns, came, datagram, inbound, desk, &mut reply) {
-            self.say(self.settings.nodes[usize::from(to)].address, bytes, reply);
+        if let Some(said) = gate.take(now_ns, came, datagram, inbound, desk, &mut reply) {
+            self.say(said, reply);
         }
         // After the last word: what leaves before it would not be taken.
         if self.guard.as_mut().is_some_and(|gate| gate.begin(now_ns)) {
@@ -95,17 +98,20 @@ impl Arrivals {
     fn ask(&mut self, now_ns: u64) {
         let mut question = [0; REFUSAL_BYTES];
         while let Some(gate) = &mut self.guard
-            && let Some(Said { to, bytes }) = gate.ask(now_ns, &self.stats, &mut question)
+            && let Some(said) = gate.ask(now_ns, &self.stats, &mut question)
         {
-            self.say(self.settings.nodes[usize::from(to)].address, bytes, question);
+            self.say(said, question);
         }
     }
 
-    fn say(&self, to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES]) {
-        match &self.refusals {
-            // With no room in the line it is lost, and said again a second later.
-            Some(slots) => drop(slots.try_send(Refusal { to, bytes, datagram })),
-            None => self.socket.answer(to, &datagram[..bytes]),
+    /// Says a hello. In time slots it waits for one, and what is sealed to a life that begins by it waits for the hello.
+    fn say(&self, said: Said, datagram: [u8; REFUSAL_BYTES]) {
+        let Some(slots) = &self.answers else {
+            return self.socket.answer(self.settings.nodes[usize::from(said.to)].address, &datagram[..said.bytes]);
+        };
+        // With no room in the line it is lost: whoever is not known is asked again.
+        if let Some(gate) = &self.guard {
+            gate.waits(said, || slots.try_send(Answer::Hello { said, datagram }).is_ok());
         }
     }
 }

@@ -40,7 +40,7 @@ pub use socket::{SocketError, listen};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
-use crate::security::{self, Acquaintances, Gate, KeyRing, NoRandom, Port, Rejections, Sealing, Who};
+use crate::security::{self, Acquaintances, Gate, KeyRing, NoRandom, Port, Rejections, Sealing, Waiting, Who};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{Discipline, Table};
@@ -212,7 +212,7 @@ impl Shell {
             settings: settings.clone(),
             stats: stats.clone(),
             guard: all.as_ref().zip(seed).map(|(all, seed)| Gate::new(all, seed)),
-            refusals: None,
+            answers: None,
         };
         // From here on, whatever fails ends what has begun.
         let mut shell = Self {
@@ -230,7 +230,7 @@ impl Shell {
             acquaintances: all,
         };
         if shell.settings.tdma.is_some() {
-            arrivals.refusals = Some(shell.send_in_slots(name, departures, clock.ok_or(ShellError::NoTime)?)?);
+            arrivals.answers = Some(shell.send_in_slots(name, departures, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
             let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.acquaintances.as_ref()));
@@ -255,26 +255,28 @@ impl Shell {
         Ok(shell)
     }
 
-    /// Starts the thread that sends in time slots, from what else would send as packages come; the way there for refusals.
+    /// Starts the thread that sends in time slots, from what else would send as packages come; the way there for refusals and hellos.
     fn send_in_slots(
         &mut self,
         name: Name,
         departures: Departures,
         clock: ClockParts,
-    ) -> Result<SyncSender<slots::Refusal>, ShellError> {
+    ) -> Result<SyncSender<slots::Answer>, ShellError> {
         let settings = self.settings.clone();
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
-        let works = Works::new(clock)?.sealed(self.acquaintances.as_ref()).in_slots(table.for_clock());
+        let works = Works::new(clock)?.sealed_in_slots(self.acquaintances.as_ref()).in_slots(table.for_clock());
         let spin_ns = slots::spin_ns(table.cycle_ns());
-        let (refusals, line) = sync_channel(slots::REFUSALS);
+        let (answers, waiting) = sync_channel(slots::ANSWERS);
+        let hellos = self.acquaintances.as_ref().map(Waiting::new);
+        let line = slots::Line::new(waiting, hellos, self.socket.clone(), settings.clone());
         let discipline = Discipline::new(table, spin_ns);
         let own = slots::Own { router: name, network: settings.network };
-        let slots = Slots::new(own, departures, works, discipline, self.socket.clone(), line);
+        let slots = Slots::new(own, departures, works, discipline, line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
-        Ok(refusals)
+        Ok(answers)
     }
 
     /// Where there are time slots, ordinary traffic may cross the network through them alone. Without the right to a device it is told, and all

@@ -83,7 +83,7 @@ impl Divisions {
         {
             return true;
         }
-        if [one, other].iter().any(|sends| sends.basis == Basis::Heard { is_misled: true }) {
+        if [one, other].iter().any(|sends| sends.basis.is_misled()) {
             return true;
         }
         if one.term == other.term {

@@ -37,6 +37,10 @@ impl World<'_> {
                 self.book.saw("bad link");
                 self.links[from][to].quality = quality;
             }
+            Fault::Echo { to, delay_ns } => {
+                self.book.saw("echoed");
+                self.stations[to].echo_ns = Some(delay_ns);
+            }
             Fault::Absent { node, module } => self.mailboxes(node, module, |mailbox| mailbox.absent += 1),
             Fault::Full { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full += 1),
             Fault::ModuleRestart { node, module } => {
@@ -102,6 +106,7 @@ impl World<'_> {
             Fault::Full { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full -= 1),
             Fault::ModuleRestart { node, module } => self.restart_module(node, module),
             Fault::Unsendable { node } => self.stations[node].host.unsendable -= 1,
+            Fault::Echo { to, .. } => self.stations[to].echo_ns = None,
             Fault::Step { .. } | Fault::Foreign { .. } | Fault::Replay { .. } => {}
         }
     }

@@ -14,7 +14,7 @@ use crate::intake::{Intake, Transit};
 use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, TAG_BYTES};
+use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, HELLO_SLOT_BYTES, Said, TAG_BYTES};
 use crate::settings::{NodeSettings, Settings};
 use crate::stats::{Cause, Side, Stats};
 use crate::tdma::Permit;
@@ -39,6 +39,18 @@ const LISTEN_NS: u64 = 100_000_000;
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
 const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
+
+/// Says a hello, or has it wait for a slot.
+fn say(io: &Io<'_>, seals: &mut PackageSeals, line: &mut VecDeque<Sent>, said: Said, datagram: &[u8]) {
+    if io.plan.slots.is_none() {
+        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
+    }
+    let PackageSeals { gate, waiting, .. } = seals;
+    gate.waits(said, || {
+        waiting.put(io.now.monotonic_ns, said, datagram);
+        true
+    });
+}
 
 /// Address of a node.
 pub fn address(node: usize) -> IpAddr {
@@ -105,6 +117,11 @@ pub struct Packages {
 }
 
 impl Packages {
+    /// What it counts.
+    pub fn stats(&self) -> &Stats {
+        &self.stats
+    }
+
     /// A life that begins now.
     pub fn new(settings: &Settings, now_ns: u64) -> Self {
         let stats = Stats::new(settings, now_ns);
@@ -190,7 +207,8 @@ impl Packages {
         };
         io.book.leaves(io.now, io.life, &bytes);
         if io.plan.slots.is_some() {
-            io.book.is_strict(io.now, io.life, &bytes);
+            let reaches = |to| self.seals.as_ref().is_none_or(|seals| seals.knows(to));
+            io.book.is_strict(io.now, io.life, &bytes, reaches);
         } else {
             io.book.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
         }
@@ -203,11 +221,8 @@ impl Packages {
         let Some(seals) = &mut self.seals else { return };
         while let Some(said) = seals.gate.ask(io.now.monotonic_ns, &self.stats, &mut self.buffer) {
             io.book.saw("asked");
-            self.refusals.push_back(Sent {
-                port: PORT,
-                to: said.to.into(),
-                bytes: Rc::from(&self.buffer[..said.bytes]),
-            });
+            let to_say = &self.buffer[..said.bytes];
+            say(io, seals, &mut self.refusals, said, to_say);
         }
     }
 
@@ -226,7 +241,7 @@ impl Packages {
         let (mut bytes, mut reply) = (arrived.bytes.to_vec(), [0; HELLO_DATAGRAM_BYTES]);
         let inbound = &mut self.inbound;
         if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
-            self.refusals.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(&reply[..said.bytes]) });
+            say(io, seals, &mut self.refusals, said, &reply[..said.bytes]);
         }
         seals.gate.begin(now_ns);
         if bytes.len() < HEAD_BYTES + TAG_BYTES { arrived.bytes.clone() } else { opened(&bytes) }
@@ -277,6 +292,17 @@ impl Packages {
                 inbound::Output::Wait { until_ns } => return until_ns.min(ask_ns),
             }
         }
+    }
+
+    /// With time slots, where all is sealed: sends a hello in one, to this node before others; whether there was any.
+    pub(super) fn say_in(&mut self, io: &mut Io<'_>, first: Option<NodeIndex>, permit: &mut Permit) -> bool {
+        let (Some(seals), now_ns) = (&mut self.seals, io.now.monotonic_ns) else { return false };
+        let fits = permit.carries_hello() && permit.fits(now_ns, HELLO_SLOT_BYTES);
+        let Some((said, datagram)) = fits.then(|| seals.waiting.take(now_ns, first)).flatten() else { return false };
+        permit.takes(now_ns, HELLO_SLOT_BYTES);
+        io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
+        seals.waiting.left(said);
+        true
     }
 
     /// With time slots: sends in one what must be said, and then what is most important, as long as it fits.

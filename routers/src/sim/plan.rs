@@ -171,6 +171,13 @@ pub enum Fault {
         /// Which.
         module: Name,
     },
+    /// Somebody repeats all that a node is told of the time, so much later.
+    Echo {
+        /// Who.
+        to: usize,
+        /// See above.
+        delay_ns: u64,
+    },
     /// The socket of a router does not take every other datagram.
     Unsendable {
         /// Where.
@@ -315,7 +322,9 @@ impl Plan {
     /// The same network with datagrams that are sealed.
     #[must_use]
     pub fn sealed(self) -> Self {
-        Self { sealed: true, ..self }
+        let mut plan = Self { sealed: true, ..self };
+        plan.seal_slots();
+        plan
     }
 
     /// A network in which nothing goes wrong.

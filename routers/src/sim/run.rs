@@ -72,7 +72,7 @@ fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayer
         let mut ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
         if plan.sealed {
             let all = seals::acquaintances(&settings);
-            (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all));
+            (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all, plan.slots.is_some()));
         }
         change(&mut ticking);
         if let Some(slots) = &plan.slots {

@@ -5,7 +5,7 @@ use super::faults::damage;
 use crate::frame::{self, FrameHead};
 use crate::security::{
     Acquaintances, Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, Port, Rejection, Sealing,
-    TAG_BYTES, Who,
+    TAG_BYTES, Waiting, Who,
 };
 use crate::settings::Settings;
 use std::num::NonZeroU8;
@@ -24,6 +24,8 @@ pub(super) fn acquaintances(settings: &Settings) -> Arc<Acquaintances> {
 pub(super) struct PackageSeals {
     pub(super) gate: Gate,
     pub(super) sealing: Sealing,
+    /// Hellos that wait for a slot.
+    pub(super) waiting: Waiting,
     all: Arc<Acquaintances>,
 }
 
@@ -32,12 +34,13 @@ impl PackageSeals {
     pub(super) fn new(all: &Arc<Acquaintances>, incarnation: u64) -> Self {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
-        Self { gate: Gate::new(all, seed), sealing: Sealing::new(all, Port::Packages), all: all.clone() }
+        let (gate, sealing) = (Gate::new(all, seed), Sealing::new(all, Port::Packages));
+        Self { gate, sealing, waiting: Waiting::new(all), all: all.clone() }
     }
 
     /// Whether something can be sealed to a node.
     pub(super) fn knows(&self, node: u8) -> bool {
-        self.all.known() & 1 << node != 0
+        self.all.reached() & 1 << node != 0
     }
 
     /// From which sequence on the life is heard that said a datagram, as it said when it began.
@@ -58,14 +61,19 @@ pub(super) struct TimeSeals {
 }
 
 impl TimeSeals {
-    pub(super) fn new(all: &Arc<Acquaintances>) -> Self {
-        Self { sealing: Sealing::new(all, Port::Time), opening: Opening::new(all, Port::Time) }
+    pub(super) fn new(all: &Arc<Acquaintances>, in_slots: bool) -> Self {
+        let sealing = if in_slots { Sealing::of_slots(all) } else { Sealing::new(all, Port::Time) };
+        Self { sealing, opening: Opening::new(all, Port::Time) }
     }
 
-    /// The datagram as it was before it was sealed, if it was sealed to this life.
-    pub(super) fn open(&mut self, datagram: &[u8]) -> Option<Rc<[u8]>> {
+    /// The datagram as it was before it was sealed, if it was sealed to this node, and whether by a life that is known to live. `overhears`: whether
+    /// others are of any use.
+    pub(super) fn open(&mut self, datagram: &[u8], overhears: bool) -> Option<(Rc<[u8]>, bool)> {
         let mut bytes = datagram.to_vec();
-        matches!(self.opening.open(&mut bytes), Ok(Opened::Frame(..))).then(|| opened(&bytes))
+        if overhears && self.opening.is_strange(&bytes) {
+            return self.opening.overhear(&mut bytes).is_ok().then(|| (opened(&bytes), false));
+        }
+        matches!(self.opening.open(&mut bytes), Ok(Opened::Frame(..))).then(|| (opened(&bytes), true))
     }
 
     /// The same, sealed; none if nobody is known there.

@@ -177,11 +177,13 @@ impl Book {
         }
     }
 
-    /// In time slots nothing leaves while something more important waits, whoever it is for and however large.
-    pub fn is_strict(&mut self, now: Now, life: u32, datagram: &[u8]) {
+    /// In time slots nothing leaves while something more important waits, whoever it is for and however large: of those that something can be
+    /// sealed to.
+    pub fn is_strict(&mut self, now: Now, life: u32, datagram: &[u8], reaches: impl Fn(u8) -> bool) {
         let last = self.levels(datagram).map(|(_, last)| last);
         let waiting = self.sending.get(&life).into_iter().flat_map(|sending| sending.waiting.values());
-        let first = waiting.filter_map(|waiting| waiting.packages.first()).min().copied();
+        let may_leave = |(_, _, number): &&(usize, u64, u32)| reaches(self.packages[*number as usize].to_node);
+        let first = waiting.filter_map(|waiting| waiting.packages.iter().find(may_leave)).min().copied();
         if let (Some(last), Some((first, _, number))) = (last, first)
             && first < last
         {

@@ -4,8 +4,10 @@ use super::chance::Chance;
 use super::divided::Divisions;
 use super::host::COMMAND_SLOTS;
 use super::link::Quality;
-use super::plan::{DRAIN_NS, EPOCH_PAUSE_NS, MS, Plan, RECOVERY_NS, S, US, WELL_NS};
+use super::plan::{DRAIN_NS, EPOCH_PAUSE_NS, Fault, MS, Plan, Planned, RECOVERY_NS, S, US, WELL_NS};
 use crate::frame::NodeIndex;
+use crate::security::TAG_BYTES;
+use crate::tdma::GATE_NS;
 use crate::time::{JOINING_SYNCS, TIME_BYTES, Term};
 use rohrpost_config::wire::HAND_OVER;
 use rohrpost_config::{Tdma, TimeSlot};
@@ -22,6 +24,9 @@ const DEAF_NS: u64 = 200 * MS;
 const LATE_PPM: u32 = 2000;
 /// A thread wakes so late at most, unless it is frozen.
 const LATE_NS_MAX: u64 = 5 * MS;
+/// Where datagrams are sealed, who joins needs so much longer: it hears some Syncs more, and hellos pass to and fro.
+const SEALED_JOINS_NS: u64 = 400 * MS;
+const SEALED_JOINS_CYCLES: u64 = 48;
 /// Bytes of the largest datagram there may be, with all around it.
 const TIME_WIRE_BYTES: usize = TIME_BYTES + AROUND_BYTES;
 
@@ -49,20 +54,21 @@ impl Slots {
         self.masters.get(usize::from(term.rank())).map(|master| usize::from(*master)).filter(|_| !term.is_none())
     }
 
-    /// The window of a node in which a moment of system time is, from its beginning to its guard, system ns.
-    pub fn window(&self, node: usize, system_ns: u64) -> Option<Range<u64>> {
+    /// The window of a node in which a moment of system time is, from its beginning to its guard, system ns; and how late it may be begun.
+    pub fn window(&self, node: usize, system_ns: u64) -> Option<(Range<u64>, u64)> {
         let ns = |duration: Duration| duration.as_nanos() as u64;
         let table = &self.table;
         let (cycle, in_cycle_ns) = (system_ns / ns(table.cycle), system_ns % ns(table.cycle));
         let sync_ns = ns(table.synchronisation);
         let rank = self.masters.iter().position(|master| usize::from(*master) == node);
-        let synchronisation = rank.map(|rank| (rank as u64 * sync_ns, sync_ns));
+        let synchronisation = rank.map(|rank| (rank as u64 * sync_ns, sync_ns, sync_ns));
         let own = table.slots.iter().filter(|slot| usize::from(slot.node) == node);
         let own = own.filter(|slot| cycle % u64::from(slot.period) == u64::from(slot.phase));
-        let mut all = own.map(|slot| (ns(slot.offset), ns(slot.length))).chain(synchronisation);
-        let (offset_ns, length_ns) = all.find(|(offset, length)| (*offset..offset + length).contains(&in_cycle_ns))?;
+        let mut all = own.map(|slot| (ns(slot.offset), ns(slot.length), GATE_NS)).chain(synchronisation);
+        let is_there = |(offset, length, _): &(u64, u64, u64)| (*offset..offset + length).contains(&in_cycle_ns);
+        let (offset_ns, length_ns, late_ns) = all.find(is_there)?;
         let begin_ns = system_ns - in_cycle_ns + offset_ns;
-        Some(begin_ns..begin_ns + length_ns - ns(table.guard))
+        Some((begin_ns..begin_ns + length_ns - ns(table.guard), late_ns))
     }
 
     /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late nor so often
@@ -130,10 +136,36 @@ impl Plan {
         self.time();
         // Who joins hears some Syncs before it asks, and so long a master is given to answer.
         let joins_ns = 2 * u64::from(JOINING_SYNCS) * self.shape.interval_ns + DEAF_NS;
+        let joins_ns =
+            joins_ns + if self.sealed { SEALED_JOINS_NS + SEALED_JOINS_CYCLES * self.shape.interval_ns } else { 0 };
         self.timed_ns += joins_ns;
         self.stepped_ns = self.timed_ns + EPOCH_PAUSE_NS + joins_ns;
         self.traffic_end_ns = self.stepped_ns + RECOVERY_NS + WELL_NS;
         self.end_ns = self.traffic_end_ns + DRAIN_NS;
+    }
+
+    /// What seals takes its part of each slot; and who joins must get to know the others first.
+    pub(super) fn seal_slots(&mut self) {
+        let Some(slots) = &mut self.slots else { return };
+        // As the table was made: over two links a frame of time is on its way for a quarter of the guard at most.
+        let least_ns = 8 * takes_ns(TIME_WIRE_BYTES + TAG_BYTES, slots.table.link_bytes_s);
+        slots.table.guard = slots.table.guard.max(Duration::from_nanos(least_ns));
+        self.time_slots();
+        self.echo();
+    }
+
+    /// Somebody repeats what a node is told, to its next lives too; one of them begins meanwhile.
+    fn echo(&mut self) {
+        let mut chance = Chance::new(self.seed ^ 0xec_40);
+        for _ in 0..chance.between(1, 3) {
+            let to = chance.below(self.nodes.len() as u64) as usize;
+            let (from_ns, delay_ns) = (chance.below(self.mended_ns / 2), chance.scale(10 * MS, S / 2));
+            let until_ns = chance.between(from_ns, self.mended_ns - S / 2);
+            self.faults.push(Planned { from_ns, until_ns, fault: Fault::Echo { to, delay_ns } });
+            let dies_ns = chance.between(from_ns, until_ns);
+            let until_ns = dies_ns + chance.scale(5 * MS, S / 4);
+            self.faults.push(Planned { from_ns: dies_ns, until_ns, fault: Fault::Restart { node: to } });
+        }
     }
 
     /// What slots carry well: a large package is through long before it is too old. Commands that wait behind it come all at once: no more

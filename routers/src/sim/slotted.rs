@@ -9,7 +9,7 @@ use super::ticking::{self, Ticking};
 use super::wire::{Basis, Says};
 use crate::frame::{FrameHead, Kind};
 use crate::intake::Intake;
-use crate::tdma::{Carries, Discipline, Kind as WindowKind, Next, Permit, Planned, Table, Verdict};
+use crate::tdma::{Carries, Discipline, Kind as WindowKind, Next, Permit, Planned, Table, UNPROVEN_CYCLES, Verdict};
 use std::collections::VecDeque;
 
 /// The thread wakes so long before its call, to spin.
@@ -30,6 +30,8 @@ pub struct Slotted {
     sent: [u64; PORTS],
     /// First datagrams of windows: socket, how many went before, and when they were handed over.
     firsts: VecDeque<(Port, u64, u64)>,
+    /// When the window began in which it last said a hello by what it had overheard, local ns.
+    asked_ns: Option<u64>,
 }
 
 impl Slotted {
@@ -46,6 +48,7 @@ impl Slotted {
             is_open: false,
             sent: [0; PORTS],
             firsts: VecDeque::new(),
+            asked_ns: None,
         }
     }
 
@@ -75,11 +78,11 @@ impl Slotted {
     /// Sends what there is, time first.
     fn send(&mut self, io: &mut Io<'_>, mut permit: Permit) {
         let before = io.sent.len();
-        let says = self.says(io);
-        let is_sure = !matches!(says.basis, Basis::Heard { .. });
+        let says = self.says(io, permit.carries);
         self.watch(io, &says);
         io.book.wire.goes_by(io.now, io.node, says);
         self.time.poll_in(io, Some(&mut permit));
+        self.greet(io, &mut permit);
         if permit.carries == Carries::All {
             self.packages.poll_in(io, &mut self.intake, &mut permit);
         }
@@ -91,19 +94,38 @@ impl Slotted {
         }
         for sent in &io.sent[before..] {
             self.sent[sent.port] += 1;
-            if self.time.replaces_in_vain(sent) {
-                let text = format!("node {} sends in the place of a master that it has heard", io.node);
-                io.book.broken(io.now, Promise::OneMaster, text);
-            }
-            if !is_sure && !asks(sent) {
-                let text = format!("node {} is not sure of the time, and sends more than questions", io.node);
+            if !may_send(says.basis, sent) {
+                let text = format!("node {} is not sure of the time, and sends more than questions: {says:?}", io.node);
                 io.book.broken(io.now, Promise::SilentWhenUnsure, text);
             }
         }
     }
 
+    /// Says a hello that waits; by what it has only overheard, seldom.
+    fn greet(&mut self, io: &mut Io<'_>, permit: &mut Permit) {
+        let overheard = self.time.overheard(io.now, allowance_ns(io.plan)).filter(|_| permit.carries == Carries::Hello);
+        let says = self.packages.say_in(io, overheard.as_ref().map(|voice| voice.from), permit);
+        if !says || overheard.is_none() {
+            return;
+        }
+        self.time.asked_overheard(io.now);
+        io.book.saw(if overheard.is_some_and(|voice| voice.is_misled) {
+            "asked by an echo"
+        } else {
+            "asked by what was overheard"
+        });
+        let least_ns = UNPROVEN_CYCLES * self.discipline.table().cycle_ns();
+        if let Some(before_ns) = self.asked_ns.replace(permit.begin_ns)
+            && permit.begin_ns - before_ns < least_ns
+        {
+            let text =
+                format!("node {} says hellos at {before_ns} and {} by what it overheard", io.node, permit.begin_ns);
+            io.book.broken(io.now, Promise::SilentWhenUnsure, text);
+        }
+    }
+
     /// By what this node sends now: by its own time if that may be off by half of the guard at most, as it says; else by what it heard.
-    fn says(&mut self, io: &Io<'_>) -> Says {
+    fn says(&mut self, io: &Io<'_>, carries: Carries) -> Says {
         let (now_ns, allowed_ns) = (io.now.monotonic_ns, allowance_ns(io.plan));
         let clock = self.time.clock();
         let own = clock.reckoning().filter(|own| own.bound_ns(now_ns) <= allowed_ns);
@@ -112,6 +134,11 @@ impl Slotted {
                 Says { basis: Basis::Begins { since_ns: io.now.true_ns }, term: clock.term(), reckoning: Some(own) }
             }
             Some(own) => Says { basis: Basis::Own, term: clock.reading(now_ns).term, reckoning: Some(own) },
+            None if carries == Carries::Hello => {
+                let Some(voice) = self.time.overheard(io.now, allowed_ns) else { return Says::default() };
+                let basis = Basis::Overheard { is_misled: voice.is_misled };
+                Says { basis, term: voice.term, reckoning: Some(voice.reckoning) }
+            }
             None => {
                 let reckoning = clock.coarse(now_ns);
                 let is_misled = self.time.is_misled(io.now, allowed_ns);
@@ -125,7 +152,7 @@ impl Slotted {
         let Some(reckoning) = says.reckoning else { return };
         let Some(masters_ns) = io.book.times.of_term_ns(io.now, says.term) else { return };
         let off_ns = reckoning.system_ns(io.now.monotonic_ns).abs_diff(masters_ns);
-        if off_ns > allowance_ns(io.plan) && says.basis != (Basis::Heard { is_misled: true }) {
+        if off_ns > allowance_ns(io.plan) && !says.basis.is_misled() {
             let text = format!("node {} is {off_ns} ns off the time of its master, and sends: {says:?}", io.node);
             io.book.broken(io.now, Promise::SilentWhenUnsure, text);
         }
@@ -138,6 +165,7 @@ impl Layer for Slotted {
             self.time.handle(io, arrived);
         } else {
             self.packages.handle(io, arrived);
+            self.time.clock().hears_by(self.packages.stats(), io.now.monotonic_ns, io.now.monotonic_ns);
         }
     }
 
@@ -223,7 +251,12 @@ fn allowance_ns(plan: &Plan) -> u64 {
     plan.slots.as_ref().map_or(0, |slots| slots.table.guard.as_nanos() as u64 / 2)
 }
 
-/// Whether a datagram asks what time it is.
-fn asks(sent: &Sent) -> bool {
-    FrameHead::parse(&sent.bytes).is_ok_and(|(head, _)| matches!(head.kind, Kind::Request | Kind::WarmUp))
+/// Whoever goes by what it heard asks what time it is, or who lives; by what it overheard, who lives.
+fn may_send(basis: Basis, sent: &Sent) -> bool {
+    let Ok((head, _)) = FrameHead::read(&sent.bytes) else { return false };
+    match basis {
+        Basis::Heard { .. } => matches!(head.kind, Kind::Request | Kind::WarmUp | Kind::Hello),
+        Basis::Overheard { .. } => head.kind == Kind::Hello,
+        Basis::Own | Basis::Begins { .. } => true,
+    }
 }

@@ -127,6 +127,8 @@ pub struct Station {
     pub frozen: u32,
     /// How many faults keep its modules from running.
     pub asleep: u32,
+    /// So much later comes again what it is told of the time; none: nobody repeats it.
+    pub echo_ns: Option<u64>,
     /// When its timing thread last went to sleep to wake too late, true ns.
     pub late_at_ns: u64,
     /// What came in while the router did not run, by port.
@@ -146,6 +148,7 @@ impl Station {
             down: 0,
             frozen: 0,
             asleep: 0,
+            echo_ns: None,
             late_at_ns: 0,
             sockets: Default::default(),
             wake_ns: None,

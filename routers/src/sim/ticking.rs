@@ -10,10 +10,10 @@ use crate::security::Acquaintances;
 use crate::tdma::{Permit, Table};
 use crate::time::message::Message;
 use crate::time::{
-    Allowed, Clock, JOINING_SYNCS, RATE_MAX_PPB, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings,
+    Allowed, Clock, JOINING_SYNCS, RATE_MAX_PPB, Reckoning, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings,
 };
 use rohrpost_mailbox::TimeRecord;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
@@ -50,6 +50,40 @@ struct Told {
     came_ns: u64,
 }
 
+/// Whom a node hears of which it does not know whether it lives.
+pub(super) struct Voice {
+    pub(super) from: NodeIndex,
+    pub(super) reckoning: Reckoning,
+    pub(super) term: Term,
+    pub(super) is_misled: bool,
+}
+
+/// What a frame told of the time, if it did.
+fn told(io: &Io<'_>, arrived: &Arrived, message: &Message) -> Option<Told> {
+    let (term, sent_ns) = match message {
+        Message::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
+        Message::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
+        _ => return None,
+    };
+    let now_ns = io.book.times.of_term_ns(io.now, term)?;
+    let came_ns = arrived.stamp.true_ns;
+    let way_ns = now_ns.saturating_sub(sent_ns).saturating_sub(io.now.true_ns - came_ns);
+    Some(Told { term, way_ns, came_ns })
+}
+
+/// Of as many as count for what a node goes by.
+fn note(all: &mut VecDeque<Told>, told: Told) {
+    all.push_back(told);
+    if all.len() > usize::from(JOINING_SYNCS) {
+        all.pop_front();
+    }
+}
+
+fn are_late(told: &VecDeque<Told>, now: Now, way_ns: u64) -> bool {
+    let drifted_ns = |told: &Told| (now.true_ns - told.came_ns) * 2 * RATE_MAX_PPB.unsigned_abs() / S;
+    told.iter().all(|told| told.way_ns + drifted_ns(told) > way_ns)
+}
+
 /// One life of a router's time.
 pub struct Ticking {
     clock: Clock,
@@ -59,6 +93,8 @@ pub struct Ticking {
     was_master: bool,
     /// The last frames that told the time, newest last.
     told: VecDeque<Told>,
+    /// Those of lives that had not shown that they live.
+    overheard: BTreeMap<(NodeIndex, u64), VecDeque<Told>>,
     /// Which datagrams of this layer are to be stamped, by how many went before.
     awaited: VecDeque<(u64, SentId)>,
     sent: u64,
@@ -75,6 +111,7 @@ impl Ticking {
             heard: (Term::NONE, 0),
             was_master: false,
             told: VecDeque::new(),
+            overheard: BTreeMap::new(),
             awaited: VecDeque::new(),
             sent: 0,
             seals: None,
@@ -82,8 +119,8 @@ impl Ticking {
     }
 
     /// The same, sealing what it sends.
-    pub(super) fn sealed(self, all: &Arc<Acquaintances>) -> Self {
-        Self { seals: Some(TimeSeals::new(all)), ..self }
+    pub(super) fn sealed(self, all: &Arc<Acquaintances>, in_slots: bool) -> Self {
+        Self { seals: Some(TimeSeals::new(all, in_slots)), ..self }
     }
 
     /// The same with time slots; all of its datagrams leave in windows.
@@ -118,8 +155,8 @@ impl Ticking {
     }
 
     /// Whether a datagram is a Sync in the place of a master whose own of this cycle has come.
-    pub(super) fn replaces_in_vain(&self, sent: &Sent) -> bool {
-        let Ok((head, rest)) = FrameHead::parse(&sent.bytes) else { return false };
+    fn replaces_in_vain(&self, datagram: &[u8]) -> bool {
+        let Ok((head, rest)) = FrameHead::parse(datagram) else { return false };
         match Message::parse(head.kind, rest) {
             Ok(Message::Sync(sync)) => sync.replacement && self.heard == (sync.term, sync.cycle),
             _ => false,
@@ -134,29 +171,54 @@ impl Ticking {
     /// Whether all of the last frames that told the time were on their way for longer than `way_ns`, with what clocks may have drifted since:
     /// who asks relies on one that was not.
     pub(super) fn is_misled(&self, now: Now, way_ns: u64) -> bool {
-        let drifted_ns = |told: &Told| (now.true_ns - told.came_ns) * 2 * RATE_MAX_PPB.unsigned_abs() / S;
-        self.told.iter().all(|told| told.way_ns + drifted_ns(told) > way_ns)
+        are_late(&self.told, now, way_ns)
+    }
+
+    /// By what this node would say a hello that knows no time: whom it hears, by which term, and whether it [is misled](Self::is_misled).
+    pub(super) fn overheard(&self, now: Now, way_ns: u64) -> Option<Voice> {
+        let (from, reckoning) = self.clock.overheard(now.monotonic_ns)?;
+        // Of several lives of a node it does not say by which: then any of them may mislead it.
+        let lives = self.overheard.iter().filter(|((node, _), _)| *node == from).map(|(_, told)| told);
+        let is_misled = lives.clone().any(|told| are_late(told, now, way_ns));
+        let latest = lives.filter_map(|told| told.back()).max_by_key(|told| told.came_ns);
+        Some(Voice { from, reckoning, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
+    }
+
+    /// A hello left by it.
+    pub(super) fn asked_overheard(&mut self, now: Now) {
+        self.clock.asked_overheard(now.monotonic_ns);
     }
 
     fn is_told(&mut self, io: &Io<'_>, arrived: &Arrived, message: &Message) {
-        let (term, sent_ns) = match message {
-            Message::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
-            // Who hears a master does not go by others.
-            Message::Request(hello) if hello.id == 0 && hello.timed && self.clock.role() == Role::Listening => {
-                (hello.term, hello.sent_ns)
-            }
-            _ => return,
-        };
-        let Some(now_ns) = io.book.times.of_term_ns(io.now, term) else { return };
-        let came_ns = arrived.stamp.true_ns;
-        let way_ns = now_ns.saturating_sub(sent_ns).saturating_sub(io.now.true_ns - came_ns);
-        self.told.push_back(Told { term, way_ns, came_ns });
-        if self.told.len() > usize::from(JOINING_SYNCS) {
-            self.told.pop_front();
+        // Who hears a master does not go by others.
+        let goes_by = matches!(message, Message::Sync(_)) || self.clock.role() == Role::Listening;
+        if let Some(told) = told(io, arrived, message).filter(|_| goes_by) {
+            note(&mut self.told, told);
         }
     }
 
+    /// What some life of a node said at some time.
+    fn overhear(&mut self, io: &mut Io<'_>, arrived: &Arrived, stamp: Stamp, head: &FrameHead, rest: &[u8]) {
+        let (now_ns, was_master) = (io.now.monotonic_ns, self.clock.role() == Role::Master);
+        let taken = self.clock.overhear(now_ns, stamp, head, rest);
+        io.line(|| format!("time: overhears {:?} from {}: {taken:?}", head.kind, head.from));
+        io.book.saw("time: overheard");
+        if was_master && self.clock.role() == Role::Listening {
+            io.book.saw("time: stepped back");
+        }
+        if let (Ok(()), Ok(message)) = (taken, Message::parse(head.kind, rest))
+            && let Some(told) = told(io, arrived, &message)
+        {
+            note(self.overheard.entry((head.from, head.incarnation)).or_default(), told);
+        }
+        self.look(io);
+    }
+
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, stamp: Option<SentId>, datagram: &[u8; TIME_BYTES]) {
+        if self.replaces_in_vain(datagram) {
+            let text = format!("node {} sends in the place of a master that it has heard", io.node);
+            io.book.broken(io.now, Promise::OneMaster, text);
+        }
         let bytes = match &mut self.seals {
             None => Some(Rc::from(&datagram[..])),
             Some(seals) => seals.close(datagram),
@@ -193,13 +255,17 @@ impl Ticking {
 impl Layer for Ticking {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let stamp = self.stamp(io, arrived.stamp);
-        let opened = match &mut self.seals {
-            None => Some(arrived.bytes.clone()),
-            Some(seals) => seals.open(&arrived.bytes),
-        };
-        let Some(bytes) = opened else { return io.book.saw("time: rejected") };
-        let Ok((head, rest)) = FrameHead::parse(&bytes) else { return io.book.saw("time: no frame") };
         let now_ns = io.now.monotonic_ns;
+        let overhears = self.clock.overhears(now_ns);
+        let opened = match &mut self.seals {
+            None => Some((arrived.bytes.clone(), true)),
+            Some(seals) => seals.open(&arrived.bytes, overhears),
+        };
+        let Some((bytes, is_proven)) = opened else { return io.book.saw("time: rejected") };
+        let Ok((head, rest)) = FrameHead::parse(&bytes) else { return io.book.saw("time: no frame") };
+        if !is_proven {
+            return self.overhear(io, arrived, stamp, &head, rest);
+        }
         let heard_before = self.clock.coarse(now_ns);
         let taken = self.clock.handle(now_ns, stamp, &head, rest);
         io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));

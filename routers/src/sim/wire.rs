@@ -4,7 +4,6 @@ use super::book::{Problem, Promise};
 use super::clock::Now;
 use super::plan::US;
 use super::slots::Slots;
-use crate::tdma::LATE_NS;
 use crate::time::{Reckoning, Term};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -26,11 +25,23 @@ pub enum Basis {
         /// All that it heard was on its way for too long.
         is_misled: bool,
     },
+    /// What it has heard of those who have not shown that they live: it asks whether they do.
+    Overheard {
+        /// Somebody repeats what they said once, or it was on its way for too long.
+        is_misled: bool,
+    },
     /// A time that it began: it only says so.
     Begins {
         /// Since when, true ns.
         since_ns: u64,
     },
+}
+
+impl Basis {
+    /// Whether it cannot know better.
+    pub fn is_misled(self) -> bool {
+        matches!(self, Self::Heard { is_misled: true } | Self::Overheard { is_misled: true })
+    }
 }
 
 /// By what a node sends, and by whose time.
@@ -99,10 +110,10 @@ impl Wire {
         };
         let [called_ns, begin_ns, end_ns] = local_ns.map(|local_ns| reckoning.system_ns(local_ns));
         let window = slots.window(node, called_ns + LEAD_NS.1);
-        let is_well = window.as_ref().is_some_and(|window| {
+        let is_well = window.as_ref().is_some_and(|(window, late_ns)| {
             // Who does not know its lead yet may end later by as much, who does by what it varies.
             let ends = end_ns <= window.end + LEAD_NS.1 + SLACK_NS;
-            begin_ns + SLACK_NS >= window.start && ends && called_ns <= window.start + LATE_NS + SLACK_NS
+            begin_ns + SLACK_NS >= window.start && ends && called_ns <= window.start + late_ns + SLACK_NS
         });
         let told =
             || format!("node {node}, {bytes} bytes, called at {called_ns}, from {begin_ns} to {end_ns} in {window:?}");

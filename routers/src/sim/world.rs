@@ -10,6 +10,7 @@ use super::link::Link;
 use super::modules::DATA_MAILBOXES;
 use super::plan::{MS, Plan, RECOVERY_NS, S, US};
 use super::station::{Arrived, Io, Layer, Port, Router, Sent, Station};
+use super::ticking;
 use super::times::Times;
 use super::trace::Trace;
 use super::wire::{LEAD_NS, Wire};
@@ -204,7 +205,12 @@ impl<'a> World<'a> {
             Event::Wake { node } if self.stations[node].wake_ns == Some(self.now_ns) => self.wake(node),
             // There was another, earlier one.
             Event::Wake { .. } => {}
-            Event::Arrive { to, arrived } => self.arrive(to, arrived),
+            Event::Arrive { to, arrived } => {
+                if let Some(delay_ns) = self.stations[to].echo_ns.filter(|_| arrived.port == ticking::PORT) {
+                    self.at(self.now_ns + delay_ns, Event::Again { to, life: None, arrived: arrived.clone() });
+                }
+                self.arrive(to, arrived);
+            }
             Event::Again { to, life, arrived } => {
                 if life.is_none_or(|life| self.living[to] == life) {
                     self.arrive(to, arrived);

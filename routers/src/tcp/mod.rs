@@ -10,12 +10,15 @@
 
 mod client;
 mod desk;
+mod hush;
+mod pace;
 mod seal;
 mod seen;
 mod server;
 mod stream;
 
 pub use client::{ClientError, ClientParts, ClientShell};
-pub use seal::{AUTHORITY, ClientSeal, Holder, SealError, ServerSeal};
-pub use seen::{Class, Link, LinkState, Member, Members};
+pub use seal::{AUTHORITY, Authority, ClientSeal, Holder, PREFIX, SealError, Sealed, ServerSeal, is_about};
+pub use seen::{Class, Link, LinkState, MEMBERS_MAX, Member, Members, Outage};
 pub use server::{ServerError, ServerParts, ServerShell};
+pub use stream::{Moved, Stream};

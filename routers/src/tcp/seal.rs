@@ -9,7 +9,7 @@
 use rustls::client::{Resumption, WebPkiServerVerifier};
 use rustls::crypto::ring;
 use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
 use rustls::server::{NoServerSessionStorage, WebPkiClientVerifier};
 use rustls::{
     AlertDescription, CertificateError, ClientConfig, Connection, Error, RootCertStore, ServerConfig, version,
@@ -22,9 +22,11 @@ use std::sync::Arc;
 const REALM: &str = "rohrpost";
 const ROUTER: &str = "tcp-router";
 const SYSTEM: &str = "system-";
+/// What the name of an authority begins with.
+pub const PREFIX: &str = "Rohrpost installation ";
 /// The authority that has signed all of an installation.
 pub const AUTHORITY: &str = "ca";
-/// Plain and sealed bytes that a connection keeps until the socket takes them.
+/// Plain and sealed bytes that a connection keeps until the socket takes them, at most.
 const KEPT_BYTES: usize = 32 * 1024;
 
 /// Who shows a certificate.
@@ -68,11 +70,75 @@ impl Holder {
 #[derive(Debug, thiserror::Error)]
 pub enum SealError {
     /// A file is not there, or holds something else.
-    #[error("{0}: {1}; `rohrpost certify` makes it")]
+    #[error("{0}: {1}; `rohrpost keys new` with the configuration makes it")]
     File(PathBuf, String),
     /// They do not belong together.
-    #[error("the certificates in {0} do not fit together: {1}; `rohrpost certify` makes new ones")]
+    #[error(
+        "the certificates in {0} do not fit together: {1}; `rohrpost keys rotate` with the configuration makes new ones"
+    )]
     Unfit(PathBuf, String),
+}
+
+/// Who has signed the certificates of an installation.
+pub struct Authority {
+    /// What people call it.
+    pub name: String,
+    certificate: CertificateDer<'static>,
+}
+
+impl Authority {
+    /// Reads its certificate.
+    ///
+    /// # Errors
+    /// [`SealError::File`]
+    pub fn load(path: &Path) -> Result<Self, SealError> {
+        let pem = std::fs::read(path).map_err(|error| SealError::File(path.into(), error.to_string()))?;
+        Self::read(path, &pem)
+    }
+
+    /// Reads what is in its certificate, or will be.
+    ///
+    /// # Errors
+    /// [`SealError::File`]
+    pub fn read(path: &Path, pem: &[u8]) -> Result<Self, SealError> {
+        let bad = |error: &dyn std::fmt::Display| SealError::File(path.into(), error.to_string());
+        let certificate = CertificateDer::from_pem_slice(pem).map_err(|error| bad(&error))?;
+        let anchor = webpki::anchor_from_trusted_cert(&certificate).map_err(|error| bad(&error))?;
+        // Its subject has one part, a common name, which is behind all that says so.
+        let subject = String::from_utf8_lossy(&anchor.subject);
+        let at = subject.find(PREFIX).ok_or_else(|| bad(&"it is no authority of Rohrpost's"))?;
+        let name = subject[at..].into();
+        Ok(Self { name, certificate })
+    }
+
+    /// Whether this public key is its own.
+    pub fn has_key(&self, public: &[u8]) -> bool {
+        webpki::anchor_from_trusted_cert(&self.certificate)
+            .is_ok_and(|anchor| anchor.subject_public_key_info.ends_with(public))
+    }
+
+    /// Whether it has signed a certificate, which holds now.
+    pub fn has_signed(&self, path: &Path) -> bool {
+        let Ok(shown) = CertificateDer::from_pem_file(path) else { return false };
+        let (Ok(shown), Ok(anchor)) =
+            (webpki::EndEntityCert::try_from(&shown), webpki::anchor_from_trusted_cert(&self.certificate))
+        else {
+            return false;
+        };
+        let algorithms = ring::default_provider().signature_verification_algorithms.all;
+        let (anchors, now) = ([anchor], UnixTime::now());
+        let usages = [webpki::KeyUsage::client_auth(), webpki::KeyUsage::server_auth()];
+        usages
+            .into_iter()
+            .any(|usage| shown.verify_for_usage(algorithms, &anchors, &[], now, usage, None, None).is_ok())
+    }
+}
+
+/// Whether a certificate is about this public key.
+pub fn is_about(certificate: &Path, public: &[u8]) -> bool {
+    CertificateDer::from_pem_file(certificate).is_ok_and(|shown| {
+        webpki::EndEntityCert::try_from(&shown).is_ok_and(|shown| shown.subject_public_key_info().ends_with(public))
+    })
 }
 
 /// What a client begins its connections with.
@@ -129,7 +195,11 @@ impl ClientSeal {
         Ok(Self(Arc::new(config)))
     }
 
-    pub(super) fn begin(&self) -> io::Result<Sealed> {
+    /// The seal of one connection.
+    ///
+    /// # Errors
+    /// What TLS says.
+    pub fn begin(&self) -> io::Result<Sealed> {
         let name = ServerName::try_from(Holder::Router.dns_name()).map_err(io::Error::other)?;
         let connection = rustls::ClientConnection::new(self.0.clone(), name).map_err(io::Error::other)?;
         Ok(Sealed::new(connection.into()))
@@ -166,7 +236,7 @@ impl ServerSeal {
 
 /// One sealed connection, without its socket.
 #[derive(Debug)]
-pub(super) struct Sealed(Box<Connection>);
+pub struct Sealed(Box<Connection>);
 
 impl Sealed {
     fn new(mut connection: Connection) -> Self {
@@ -191,10 +261,20 @@ impl Sealed {
         Ok(())
     }
 
-    /// Takes bytes to be sealed; how many.
-    pub(super) fn write(&mut self, bytes: &[u8], socket: &mut impl io::Write) -> io::Result<usize> {
-        let taken = io::Write::write(&mut self.0.writer(), bytes)?;
+    /// Takes bytes to be sealed, as long as the socket takes what was sealed before; how many. What was sealed together is opened together,
+    /// and nothing goes before it: of a slow connection that is little.
+    pub(super) fn write(&mut self, bytes: &[u8], together: usize, socket: &mut impl io::Write) -> io::Result<usize> {
+        let mut taken = 0;
         self.flush(socket)?;
+        while taken < bytes.len() && !self.0.wants_write() {
+            let piece = &bytes[taken..bytes.len().min(taken + together)];
+            let sealed = io::Write::write(&mut self.0.writer(), piece)?;
+            if sealed == 0 {
+                break;
+            }
+            taken += sealed;
+            self.flush(socket)?;
+        }
         if taken == 0 { Err(io::ErrorKind::WouldBlock.into()) } else { Ok(taken) }
     }
 
@@ -226,7 +306,7 @@ impl Sealed {
 
 /// Why there is no sealed connection, and what would be right.
 fn words(error: &Error) -> String {
-    const NEW: &str = "make new ones with `rohrpost certify`";
+    const NEW: &str = "make new ones with `rohrpost keys rotate`";
     const FOREIGN: &str =
         "another authority has signed it than `ca.pem` here: use the certificates of one installation at both ends";
     match error {

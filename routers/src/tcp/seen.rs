@@ -1,11 +1,16 @@
 //! How a client and the server are, as their threads last said: for whoever publishes it.
 
 use crate::session::{Cause, Counts};
-use rohrpost_mailbox::Priority;
+use rohrpost_mailbox::{Name, Priority, TimeRecord};
 use std::sync::{Mutex, PoisonError};
 
 /// So often it is said anew.
 pub(super) const SAY_EVERY_NS: u64 = 200_000_000;
+
+/// Members that are said one by one: with what else is said they must fit into a package.
+pub const MEMBERS_MAX: usize = 300;
+/// Ranges of a client that are told by name.
+pub(super) const HOSTS_MAX: usize = 64;
 
 /// What a class did at one end.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -43,6 +48,31 @@ pub enum LinkState {
     Up,
 }
 
+/// When a client that took part did not.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Outage {
+    /// How often that was.
+    pub count: u64,
+    /// When the last one began, and when it ended if it is over, monotonic ns.
+    pub last: Option<(u64, Option<u64>)>,
+}
+
+impl Outage {
+    /// It takes part.
+    pub(super) fn ends(&mut self, now_ns: u64) {
+        if let Some((_, ended @ None)) = &mut self.last {
+            *ended = Some(now_ns);
+        }
+    }
+
+    /// It takes no part any more.
+    pub(super) fn begins(&mut self, now_ns: u64) {
+        if self.last.is_none_or(|(_, ended)| ended.is_some()) {
+            (self.last, self.count) = (Some((now_ns, None)), self.count + 1);
+        }
+    }
+}
+
 /// A client, as it sees itself.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Link {
@@ -56,6 +86,10 @@ pub struct Link {
     pub round_trip_ns: Option<u64>,
     /// How far off system time by the server is at most, ns; none if the server does not know it.
     pub time_error_ns: Option<u64>,
+    /// Times that it took no part any more.
+    pub outage: Outage,
+    /// The node's system time, if the server tells it.
+    pub time: Option<TimeRecord>,
     /// Bytes of memory that what waits takes up.
     pub waiting_bytes: u64,
     /// What went to the server.
@@ -77,6 +111,8 @@ pub struct Member {
     pub is_member: bool,
     /// Ranges of names that it hosts.
     pub ranges: u64,
+    /// The first of them, each from the first to the last name in it.
+    pub hosts: Vec<(Name, Name)>,
     /// Time since its connection was made, ns.
     pub age_ns: u64,
     /// Time since something came from it, ns.
@@ -88,14 +124,20 @@ pub struct Member {
 /// All that the server has to say.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Members {
-    /// Connections that are there.
+    /// Connections that are there; of many the first.
     pub members: Vec<Member>,
+    /// Connections besides these.
+    pub more: u64,
     /// Clients that took part and do not any more.
     pub left: u64,
     /// Connections that were told why they may not take part, or not any more.
     pub refused: u64,
     /// Who was the last of them, and why; empty without one.
     pub refusal: String,
+    /// Registrations that a later one of the same client took the place of before they were looked at.
+    pub overtaken: u64,
+    /// Lines that were not said one by one, since there were too many of their cause.
+    pub held: u64,
     /// What went through.
     pub classes: Vec<Class>,
 }

@@ -1,17 +1,17 @@
 //! One connection of a session: bytes in and out, sealed or not, without waiting.
 
+use super::pace::{Holding, Pace};
 use super::seal::{Holder, Sealed};
+use nix::libc;
+use rohrpost_mailbox::monotonic_ns;
 use socket2::{Domain, Protocol, SockRef, Socket, Type};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 
-/// What the kernel takes before it has sent it: what is more important than that waits for no more.
-const UNSENT_BYTES: u32 = 32 * 1024;
-
 /// What came of reading or writing.
 #[derive(Debug)]
-pub(super) enum Moved {
+pub enum Moved {
     /// So many bytes, at least one.
     Bytes(usize),
     /// None for now.
@@ -22,14 +22,54 @@ pub(super) enum Moved {
 
 /// A connection.
 #[derive(Debug)]
-pub(super) struct Stream {
-    socket: TcpStream,
+pub struct Stream {
+    socket: Paced,
     sealed: Option<Sealed>,
+    pace: Pace,
+}
+
+/// A socket whose kernel is asked before each piece whether it holds enough already: it asks itself only before it begins a piece of its
+/// own, which may have 64 KiB.
+#[derive(Debug)]
+struct Paced {
+    socket: TcpStream,
+    /// None: as much as the kernel takes.
+    piece_bytes: Option<usize>,
+}
+
+impl Read for Paced {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        self.socket.read(into)
+    }
+}
+
+impl Write for Paced {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let Some(piece) = self.piece_bytes else { return self.socket.write(bytes) };
+        let mut taken = 0;
+        while taken < bytes.len() {
+            let piece = &bytes[taken..bytes.len().min(taken + piece)];
+            // Nothing is put behind it into the same piece of the kernel's.
+            match SockRef::from(&self.socket).send_with_flags(piece, libc::MSG_EOR | libc::MSG_NOSIGNAL) {
+                Ok(bytes) => taken += bytes,
+                Err(_) if taken > 0 => break,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(taken)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 impl Stream {
     /// Begins to connect; when it may be written to, [`Stream::connected`] says how that ended.
-    pub(super) fn connect(to: SocketAddr, sealed: Option<Sealed>) -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn connect(to: SocketAddr, sealed: Option<Sealed>) -> io::Result<Self> {
         let socket = Socket::new(Domain::for_address(to), Type::STREAM, Some(Protocol::TCP))?;
         socket.set_nonblocking(true)?;
         match socket.connect(&to.into()) {
@@ -43,39 +83,75 @@ impl Stream {
     pub(super) fn new(socket: TcpStream, sealed: Option<Sealed>) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         socket.set_nodelay(true)?;
-        SockRef::from(&socket).set_tcp_notsent_lowat(UNSENT_BYTES)?;
-        Ok(Self { socket, sealed })
+        let pace = Pace::default();
+        SockRef::from(&socket).set_tcp_notsent_lowat(pace.unsent_bytes() as u32)?;
+        Ok(Self { socket: Paced { socket, piece_bytes: pace.piece_bytes() }, sealed, pace })
     }
 
     /// Whether the connection that was begun is made.
-    pub(super) fn connected(&self) -> io::Result<()> {
-        match self.socket.take_error()? {
+    ///
+    /// # Errors
+    /// Why it is not.
+    pub fn connected(&self) -> io::Result<()> {
+        match self.socket.socket.take_error()? {
             Some(error) => Err(error),
-            None => self.socket.peer_addr().map(drop),
+            None => self.socket.socket.peer_addr().map(drop),
         }
     }
 
-    pub(super) fn read(&mut self, into: &mut [u8]) -> Moved {
+    /// Takes what has come.
+    pub fn read(&mut self, into: &mut [u8]) -> Moved {
         moved(match &mut self.sealed {
             Some(sealed) => sealed.read(into, &mut self.socket),
             None => self.socket.read(into),
         })
     }
 
-    pub(super) fn write(&mut self, bytes: &[u8]) -> Moved {
-        moved(match &mut self.sealed {
-            Some(sealed) => sealed.write(bytes, &mut self.socket),
+    /// Hands on bytes, as many as are taken.
+    pub fn write(&mut self, bytes: &[u8]) -> Moved {
+        let moved = moved(match &mut self.sealed {
+            Some(sealed) => sealed.write(bytes, self.pace.unsent_bytes(), &mut self.socket),
             None => self.socket.write(bytes),
-        })
+        });
+        let taken = if let Moved::Bytes(taken) = moved { taken } else { 0 };
+        let is_all = taken == bytes.len() && !self.has_unsent();
+        if let Some(holding) = self.pace.wrote(taken, is_all, monotonic_ns) {
+            self.hold(holding);
+        }
+        moved
+    }
+
+    /// What the kernel keeps of this connection. If it does not like that, it goes on as before.
+    fn hold(&mut self, Holding { unsent, held }: Holding) {
+        self.socket.piece_bytes = self.pace.piece_bytes();
+        let socket = SockRef::from(&self.socket.socket);
+        let _ = socket.set_tcp_notsent_lowat(unsent as u32);
+        if let Some(held) = held {
+            // The kernel takes twice as much, for what it needs besides; of pieces like these that is little.
+            let _ = socket.set_send_buffer_size(held as usize / 2);
+        }
+    }
+
+    /// The way there and back takes so long, ns, as far as that is known.
+    pub(super) fn set_round_trip(&mut self, round_trip_ns: Option<u64>) {
+        self.pace.set_round_trip(round_trip_ns);
+    }
+
+    /// Whether what is lost on the way takes seconds to be made good.
+    pub(super) fn is_slow(&self) -> bool {
+        self.pace.is_slow()
     }
 
     /// Hands on what was taken and has not left.
-    pub(super) fn flush(&mut self) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// When the connection is over.
+    pub fn flush(&mut self) -> io::Result<()> {
         self.sealed.as_mut().map_or(Ok(()), |sealed| sealed.flush(&mut self.socket))
     }
 
     /// Whether something that was taken has not left.
-    pub(super) fn has_unsent(&self) -> bool {
+    pub fn has_unsent(&self) -> bool {
         self.sealed.as_ref().is_some_and(Sealed::has_unsent)
     }
 
@@ -92,7 +168,7 @@ impl Stream {
     /// Nothing more is sent; what was said can still be read.
     pub(super) fn end(&self) {
         // It may be closed at the other end already.
-        let _ = self.socket.shutdown(Shutdown::Write);
+        let _ = self.socket.socket.shutdown(Shutdown::Write);
     }
 }
 
@@ -109,6 +185,6 @@ fn moved(result: io::Result<usize>) -> Moved {
 
 impl AsFd for Stream {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
+        self.socket.socket.as_fd()
     }
 }

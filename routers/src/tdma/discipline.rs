@@ -1,11 +1,11 @@
 //! When this node sends, and why not.
 
-use super::LATE_NS;
+use super::GATE_NS;
 use super::lead::Lead;
 use super::permit::{Carries, Permit};
 use super::table::{Kind, Table, Window};
 use crate::broken::broken;
-use crate::time::{Clock, JOINING_SYNCS, Reckoning, Role, Stamp, SyncCounts};
+use crate::time::{Clock, JOINING_SYNCS, Reckoning, Role, Stamp, SyncCounts, TIME_BYTES};
 
 /// What comes next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -34,6 +34,8 @@ pub struct Planned {
     pub begin_ns: u64,
     /// The last local ns before its guard.
     pub end_ns: u64,
+    /// For what the time is good enough by which it was planned.
+    pub carries: Carries,
 }
 
 /// Why a node does not send.
@@ -48,6 +50,9 @@ pub enum Silent {
         /// Syncs that count, so far.
         heard: u8,
     },
+    /// It has no system time, and hears those only who have not shown that they live.
+    #[error("joining: hears the time, and asks whether who says it lives")]
+    Asking,
     /// It is master, by a time that others may not go by yet.
     #[error(
         "new master without system time of its own: in the first {JOINING_SYNCS} cycles it sends nothing but Syncs"
@@ -71,7 +76,7 @@ pub enum Silent {
 pub enum Verdict {
     /// Use it.
     Send(Permit),
-    /// The clock was bent meanwhile: ask for the next window anew.
+    /// The clock was bent meanwhile, or the node goes by another one's time: ask for the next window anew.
     Early,
     /// The wake-up came too late: somebody else's window is too near.
     Late,
@@ -98,6 +103,8 @@ pub struct Counts {
     pub datagrams: u64,
     /// Bytes of these on the wire, all heads counted.
     pub wire_bytes: u64,
+    /// Hellos that left by the time of who had not shown that it lives.
+    pub unproven: u64,
     /// Synchronisation windows of a reigning master not used because the wake-up came too late.
     pub synchronisations_late: u64,
     /// Changes of role.
@@ -105,6 +112,9 @@ pub struct Counts {
     /// What was sent and heard of synchronisation.
     pub syncs: SyncCounts,
 }
+
+/// By the time of who has not shown that it lives a hello leaves in one of so many cycles: that time may be any.
+pub const UNPROVEN_CYCLES: u64 = 4;
 
 /// Says when this node sends. Holds no clock: that is asked each time.
 #[derive(Debug)]
@@ -117,6 +127,8 @@ pub struct Discipline {
     silent: Option<Silent>,
     /// Slots before this are done with, system time of this epoch; none while there is no time.
     done: Option<(u64, u64)>,
+    /// Not before this a hello leaves by what is overheard, local ns.
+    hello_from_ns: u64,
 }
 
 impl Discipline {
@@ -130,6 +142,7 @@ impl Discipline {
             role: Role::Listening,
             silent: Some(Silent::NoTime),
             done: None,
+            hello_from_ns: 0,
         }
     }
 
@@ -166,12 +179,18 @@ impl Discipline {
             self.counts.roles += 1;
         }
         let sure = self.reckon(now_ns, clock);
-        let basis = sure.as_ref().ok().map(|(reckoning, _)| *reckoning);
-        self.pass(now_ns, basis.or_else(|| clock.reckoning()).or_else(|| clock.coarse(now_ns)), sure.is_ok());
-        let time_only = matches!(sure, Ok((_, Carries::Time)));
-        self.silent = time_only.then(|| self.why_silent(now_ns, clock));
+        let proven = sure.as_ref().ok().filter(|(_, carries)| *carries != Carries::Hello);
+        let basis = proven.map(|(reckoning, _)| *reckoning);
+        self.pass(now_ns, basis.or_else(|| clock.reckoning()).or_else(|| clock.coarse(now_ns)), basis.is_some());
+        let carries_all = matches!(sure, Ok((_, Carries::All)) | Err(_));
+        self.silent = (!carries_all).then(|| self.why_silent(now_ns, clock));
         let planned = sure.and_then(|(reckoning, carries)| {
-            let from_ns = self.done.map_or_else(|| reckoning.system_ns(now_ns), |(_, done_ns)| done_ns);
+            let from_ns = match (carries, self.done) {
+                // What was done by another time says nothing of one that is overheard.
+                (Carries::Hello, _) => reckoning.system_ns(now_ns.max(self.hello_from_ns)),
+                (_, Some((_, done_ns))) => done_ns,
+                (_, None) => reckoning.system_ns(now_ns),
+            };
             let window = self.next_window(from_ns, clock, carries);
             window.and_then(|window| self.plan(window, &reckoning, carries)).ok_or(Silent::NoSlot)
         });
@@ -187,10 +206,15 @@ impl Discipline {
     /// Whether a planned window may be used: to be asked at its call, when all that came was handed to the clock. Once for each window,
     /// unless it is early.
     pub fn judge(&mut self, planned: &Planned, now_ns: u64, clock: &Clock) -> Verdict {
-        let verdict = self.look(planned.window, now_ns, clock);
+        let verdict = self.look(planned, now_ns, clock);
         let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
-        match verdict {
+        match &verdict {
             Verdict::Early => return verdict,
+            // A window of a time that is overheard says nothing of what was done by another.
+            _ if planned.carries == Carries::Hello => {
+                self.hello_from_ns = planned.end_ns;
+                return verdict;
+            }
             Verdict::Late if is_slot => self.counts.late += 1,
             Verdict::Late => self.counts.synchronisations_late += 1,
             Verdict::Silent(_) if is_slot => self.counts.silent += 1,
@@ -204,9 +228,14 @@ impl Discipline {
     pub fn close(&mut self, permit: &Permit) {
         self.counts.datagrams += permit.datagrams();
         self.counts.wire_bytes += permit.wire_bytes();
+        if permit.carries == Carries::Hello && permit.datagrams() > 0 {
+            self.counts.unproven += 1;
+            let pause_ns = UNPROVEN_CYCLES * self.table.cycle_ns();
+            self.hello_from_ns = permit.begin_ns.saturating_add(if broken!(AsksWithoutPause) { 0 } else { pause_ns });
+        }
         if let Kind::Slot { .. } = permit.window.kind {
             *match (permit.carries, permit.datagrams()) {
-                (Carries::Time, _) => &mut self.counts.silent,
+                (Carries::Time | Carries::Hello, _) => &mut self.counts.silent,
                 (Carries::All, 0) => &mut self.counts.empty,
                 (Carries::All, _) => &mut self.counts.used,
             } += 1;
@@ -225,7 +254,9 @@ impl Discipline {
         let own = clock.reckoning().filter(|own| is_sure(own) || broken!(SendsWhenUnsure));
         let coarse = || clock.coarse(now_ns).filter(is_sure).map(|coarse| (coarse, Carries::Time));
         let carries = if clock.is_beginning() { Carries::Time } else { Carries::All };
-        own.map(|own| (own, carries)).or_else(coarse).ok_or_else(|| self.why_silent(now_ns, clock))
+        let overheard = || clock.overheard(now_ns).map(|(_, reckoning)| (reckoning, Carries::Hello));
+        let carries = own.map(|own| (own, carries)).or_else(coarse).or_else(overheard);
+        carries.ok_or_else(|| self.why_silent(now_ns, clock))
     }
 
     /// Why this node does not go by its own time.
@@ -236,6 +267,7 @@ impl Discipline {
                 Silent::BoundTooLarge { bound_ns: own.bound_ns(now_ns), allowance_ns: self.table.allowance_ns() }
             }
             (None, Some(heard)) => Silent::Joining { heard },
+            (None, None) if clock.overheard(now_ns).is_some() => Silent::Asking,
             (None, None) => Silent::NoTime,
         }
     }
@@ -247,7 +279,7 @@ impl Discipline {
             return;
         };
         let system_ns = reckoning.system_ns(now_ns);
-        let reached_ns = system_ns.saturating_sub(LATE_NS);
+        let reached_ns = system_ns.saturating_sub(GATE_NS);
         let done_ns = match self.done {
             // Who has followed a master that was far off may have been far ahead.
             Some((epoch, done_ns))
@@ -281,20 +313,26 @@ impl Discipline {
         let begin_ns = reckoning.first_ns(window.begin_ns - soon_ns)?;
         let end_ns = reckoning.last_ns(window.end_ns)?;
         let call_ns = begin_ns.saturating_sub(self.lead.ns());
-        Some(Planned { window, wake_ns: call_ns.saturating_sub(self.spin_ns), call_ns, begin_ns, end_ns })
+        Some(Planned { window, wake_ns: call_ns.saturating_sub(self.spin_ns), call_ns, begin_ns, end_ns, carries })
     }
 
-    fn look(&self, window: Window, now_ns: u64, clock: &Clock) -> Verdict {
+    fn look(&self, planned: &Planned, now_ns: u64, clock: &Clock) -> Verdict {
+        let window = planned.window;
         let (reckoning, carries) = match self.reckon(now_ns, clock) {
             Ok(sure) => sure,
             Err(why) => return Verdict::Silent(why),
         };
+        // Of what is overheard and what is not, the windows of one are not those of the other.
+        if (carries == Carries::Hello) != (planned.carries == Carries::Hello) {
+            return Verdict::Early;
+        }
         // No such window after an epoch began in another time.
         let Some(planned) = self.plan(window, &reckoning, carries) else { return Verdict::Late };
         if now_ns < planned.call_ns {
             return Verdict::Early;
         }
-        if now_ns > planned.begin_ns.saturating_add(LATE_NS) && !broken!(NoLateGate) {
+        let is_slot = matches!(window.kind, Kind::Slot { .. });
+        if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS) && !broken!(NoLateGate) {
             return Verdict::Late;
         }
         let (bound_ns, allowance_ns) = (reckoning.bound_ns(planned.end_ns), self.table.allowance_ns());
@@ -310,6 +348,8 @@ impl Discipline {
             Kind::Synchronisation { .. } => return Verdict::Idle,
         };
         let Planned { begin_ns, end_ns, .. } = planned;
-        Verdict::Send(Permit::new(window, begin_ns, end_ns, carries, self.lead.ns(), *self.table.wire()))
+        let permit = Permit::new(window, begin_ns, end_ns, carries, self.lead.ns(), *self.table.wire());
+        // When in its window a Sync leaves does not matter: it says so itself.
+        if is_slot || permit.fits(now_ns, TIME_BYTES) { Verdict::Send(permit) } else { Verdict::Late }
     }
 }

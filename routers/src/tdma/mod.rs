@@ -35,10 +35,12 @@ pub mod table;
 mod tests;
 pub mod wire;
 
-pub use discipline::{Counts, Discipline, Next, Planned, Silent, Verdict};
+pub use discipline::{Counts, Discipline, Next, Planned, Silent, UNPROVEN_CYCLES, Verdict};
 pub use permit::{Carries, Permit};
 pub use table::{Kind, Owner, Table, Window};
 pub use wire::Wire;
 
-/// A window whose wake-up comes so much after its beginning is not used.
+/// Bounds reckon with slots that are begun so much after their beginning.
 pub const LATE_NS: u64 = rohrpost_config::LATE.as_nanos() as u64;
+/// A slot whose wake-up comes so much after its beginning is not used.
+pub const GATE_NS: u64 = rohrpost_config::GATE.as_nanos() as u64;

@@ -10,7 +10,9 @@ use rohrpost_config::wire::HAND_OVER;
 /// What a window may be used for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Carries {
-    /// Datagrams of time alone: it is a synchronisation window, or the node knows the time by others' Syncs only.
+    /// A hello alone: the node knows the time by those only who have not shown that they live.
+    Hello,
+    /// Datagrams of time, and a hello in a slot: it is a synchronisation window, or the node knows the time by others' Syncs only.
     Time,
     /// All that waits, time first.
     All,
@@ -104,9 +106,15 @@ impl Permit {
         self.wire_bytes
     }
 
+    /// Whether a hello may leave in it.
+    pub fn carries_hello(&self) -> bool {
+        matches!(self.window.kind, Kind::Slot { .. })
+    }
+
     /// What the clock may send in it.
     pub fn allowed(&self) -> Allowed {
         match self.window.kind {
+            _ if self.carries == Carries::Hello && !broken!(TellsUnproven) => Allowed::Nothing,
             Kind::Synchronisation { .. } => {
                 Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns }
             }

@@ -9,6 +9,7 @@
 //! A *window* is what one node may send in, without a pause: that of its synchronisation, or a slot. Here it ends where its guard begins.
 //! The owner of the table has seen to it that windows do not overlap (`rohrpost check`).
 
+use super::discipline::UNPROVEN_CYCLES;
 use super::wire::Wire;
 use crate::broken::broken;
 use crate::frame::NodeIndex;
@@ -187,7 +188,14 @@ impl Table {
             replies_in_synchronisation: self.share.replies_in_synchronisation,
             delay_max_ns: self.guard_ns / 2,
             allowance_ns: self.allowance_ns(),
+            hello_every_ns: self.cycle_ns.saturating_mul(UNPROVEN_CYCLES.max(self.rarest_cycles())),
         }
+    }
+
+    /// Each node that has slots has one at least once in so many cycles.
+    fn rarest_cycles(&self) -> u64 {
+        let periods = |node| self.slots.iter().filter(move |slot| slot.node == node).map(|slot| slot.period);
+        self.slots.iter().filter_map(|slot| periods(slot.node).min()).max().unwrap_or(1)
     }
 
     fn own_slots(&self) -> impl Iterator<Item = (usize, &Slot)> {

@@ -1,6 +1,7 @@
 //! A node's part in keeping time: what the thread with the socket hands it and asks of it.
 
 mod master;
+mod overhearing;
 mod slave;
 mod slots;
 
@@ -147,20 +148,24 @@ impl Clock {
     /// # Errors
     /// [`Ignored`]: it changed nothing.
     pub fn handle(&mut self, now_ns: u64, received: Stamp, head: &FrameHead, rest: &[u8]) -> Result<(), Ignored> {
-        let ours =
-            head.system == self.settings.system && head.digest == self.settings.digest && head.to == self.settings.own;
-        if !ours || head.from == self.settings.own || head.from >= self.settings.nodes {
+        if !self.is_ours(head) {
             return Err(Ignored::Stranger);
         }
         match Message::parse(head.kind, rest)? {
             Message::WarmUp => {
-                self.speaks_in_slots(received, head);
+                self.hears(head.from, head.incarnation, received.ns);
                 Ok(())
             }
             Message::Sync(sync) => self.sync(now_ns, received, head, &sync),
             Message::Request(request) => self.request(received, head.from, &request),
             Message::Reply(reply) => self.reply(now_ns, received, head, &reply),
         }
+    }
+
+    /// Whether it comes from another node of this system, for this one.
+    fn is_ours(&self, head: &FrameHead) -> bool {
+        let TimeSettings { system, own, nodes, digest, .. } = self.settings;
+        (head.system, head.digest, head.to) == (system, digest, own) && head.from != own && head.from < nodes
     }
 
     /// When a datagram that [`Step::Send`] asked to be stamped left.

@@ -1,6 +1,7 @@
 //! Who is master: the order, the silence after which the next takes over, and which of two masters yields.
 
 use super::message::{Request, Sync};
+use super::overheard::Overheard;
 use super::{TAKEOVER_HALF_INTERVALS, Term};
 use crate::broken::broken;
 use crate::frame::NodeIndex;
@@ -80,6 +81,10 @@ pub(super) struct Election {
     highest_epoch: u64,
     /// When somebody that has time said that it hears no master.
     timed_heard_ns: Option<u64>,
+    /// Until when somebody was heard that may have time, if it lives: as long as that is a reason to wait.
+    overheard_ns: u64,
+    /// As long as it was no reason to wait any more: who begins a time does so this much after who could before it; else 0.
+    apart_ns: u64,
     /// This node stood still before.
     awake_since_ns: u64,
 }
@@ -99,6 +104,8 @@ impl Election {
             highest: Term::NONE,
             highest_epoch: 0,
             timed_heard_ns: None,
+            overheard_ns: 0,
+            apart_ns: 0,
             awake_since_ns: 0,
         }
     }
@@ -226,14 +233,14 @@ impl Election {
         }
     }
 
-    /// Something else came than a Sync. Whether it was of the master that this node follows.
-    pub(super) fn speaks(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) -> bool {
+    /// Something else came than a Sync. If it was of the master that this node follows: when that was heard last, local ns.
+    pub(super) fn speaks(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) -> Option<u64> {
         match &mut self.state {
             State::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
                 master.heard_ns = master.heard_ns.max(received_ns);
-                true
+                Some(master.heard_ns)
             }
-            _ => false,
+            _ => None,
         }
     }
 
@@ -269,6 +276,22 @@ impl Election {
     /// Somebody that has time sent in the place of the master.
     pub(super) fn replaced(&mut self, received_ns: u64) {
         self.timed_heard_ns = Some(received_ns);
+    }
+
+    /// Somebody was heard that may live.
+    pub(super) fn overhears(&mut self, overheard: &Overheard) {
+        (self.overheard_ns, self.apart_ns) = (overheard.until_ns(), overheard.apart_ns());
+    }
+
+    /// Whether this node, as a master, would yield to a Sync if its sender is known to live.
+    pub(super) fn would_yield(&self, from: NodeIndex, sync: &Sync, followed: bool) -> bool {
+        let is_masters = self.masters.get(usize::from(sync.term.rank())) == Some(&from) && !sync.replacement;
+        matches!(self.state, State::Master(own) if is_masters && (sync.followed, sync.term) > (followed, own))
+    }
+
+    /// It is no master any more, and hears none.
+    pub(super) fn steps_back(&mut self, now_ns: u64) {
+        (self.state, self.quiet_since_ns, self.lost) = (State::Listening, now_ns, None);
     }
 
     pub(super) fn speaks_of(&mut self, term: Term, epoch: u64) {
@@ -337,13 +360,20 @@ impl Election {
         // Who has no time leaves it to who has, as long as there is one.
         let recently_ns = self.interval_ns.saturating_mul(4);
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
-        let waits = self.before(last) + if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
+        let waits = if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
+        // Who is deaf to others until they are known to live leaves the time to get known to who begins before it.
+        let is_deaf = (origin, self.state) == (Origin::New, State::Listening) && self.apart_ns > 0;
+        let apart_ns = if is_deaf { self.apart_ns.saturating_add(self.begins_after_ns) } else { self.interval_ns };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
+        let staggered_ns = staggered_ns.saturating_add(apart_ns.saturating_mul(self.before(last) as u64));
         let takes_over_ns = since_ns.max(self.awake_since_ns).saturating_add(patience_ns);
         let begins_ns = match (origin, self.begins_after_ns, self.state) {
             (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => 0,
             (Origin::New, begins_ns, State::Slave(master)) => master.heard_ns.saturating_add(begins_ns),
-            (Origin::New, begins_ns, _) => since_ns.max(self.timed_heard_ns.unwrap_or(0)).saturating_add(begins_ns),
+            (Origin::New, begins_ns, _) => {
+                let heard_ns = self.timed_heard_ns.unwrap_or(0).max(self.overheard_ns);
+                since_ns.max(heard_ns).saturating_add(begins_ns)
+            }
         };
         Some(takes_over_ns.max(begins_ns).saturating_add(staggered_ns))
     }

@@ -42,6 +42,9 @@
 //! cycle, those before it in the next, if nobody did. At the third in a row it takes over there and then, unless anything else of the
 //! master came. Others turn to it when they have missed two.
 //!
+//! Where datagrams are sealed, who joins hears frames whose sender has not shown that it lives: [`Clock::overhear`] takes what they say for when to ask,
+//! and for a reason not to begin a time yet, for a while.
+//!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
 #[cfg_attr(
@@ -52,9 +55,11 @@ mod broken;
 mod clock;
 mod coarse;
 mod election;
+mod follower;
 mod history;
 mod line;
 pub mod message;
+mod overheard;
 mod reckoning;
 #[cfg(test)]
 mod tests;
@@ -64,6 +69,7 @@ mod types;
 pub use broken::Broken;
 pub use clock::{Allowed, Clock};
 pub use coarse::JOINING_SYNCS;
+pub use follower::Follower;
 pub use reckoning::Reckoning;
 pub use types::{Exchange, Ignored, InSlots, Reading, Role, SentId, Step, SyncCounts, TimeSettings};
 

@@ -76,6 +76,9 @@ pub enum Ignored {
     /// A reply to a question that nobody asked, or that was answered.
     #[error("no such question")]
     Unasked,
+    /// Of who has not shown that it lives, and of no use.
+    #[error("of a router that has not shown that it lives")]
+    Unproven,
     /// The frames arrived before they left: a wrong stamp.
     #[error("frames that arrived before they left")]
     NegativeDelay,
@@ -130,6 +133,8 @@ pub struct InSlots {
     pub delay_max_ns: u64,
     /// Who sends may be off by so much at most, ns.
     pub allowance_ns: u64,
+    /// Each node may say a hello at least this often, ns.
+    pub hello_every_ns: u64,
 }
 
 /// What was sent and heard of synchronisation in time slots.

@@ -4,6 +4,20 @@ use super::{NODES, PATIENCE, Segment, label};
 use rohrpost_mailbox::{Receiver, SendError, Sender};
 use std::time::{Duration, Instant};
 
+/// A round of packages comes so much after the one before: a few in each cycle, at any moment of it.
+pub(crate) const PAUSE: Duration = Duration::from_micros(2300);
+
+/// These nodes speak to each other for so many rounds, and lose nothing.
+pub(crate) fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
+    let mut mouths = mouths(segment, nodes);
+    for id in 0..rounds {
+        mouths.iter_mut().for_each(|mouth| mouth.say(id));
+        ears.listen();
+        std::thread::sleep(PAUSE);
+    }
+    ears.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
+}
+
 /// Speaks from one node to another.
 pub(crate) struct Mouth {
     from: u8,

@@ -113,8 +113,18 @@ impl System {
         let [before, after] = [own.0.raw() - 1, own.1.raw() + 1].map(Name::from_raw);
         let beyond = vec![(Name::new(1, 1, 0, 0), before), (after, Name::from_raw(u32::MAX))];
         let (tcp, faults) = (Name::new(id, 64, 0, 0), Arc::new(Words));
-        let parts =
-            ClientParts { node: &node, name: tcp, server, settings, hosts: vec![own], beyond, faults, access, seal };
+        let parts = ClientParts {
+            node: &node,
+            name: tcp,
+            server,
+            settings,
+            hosts: vec![own],
+            beyond,
+            faults,
+            access,
+            seal,
+            keeps_time: false,
+        };
         let client = ClientShell::start(parts).unwrap();
         let participant = Participant::join(&node, module(id)).unwrap();
         let shape = Shape { slots: 64, body_bytes_max: 1024, ..Shape::default() };
@@ -142,6 +152,11 @@ impl System {
     pub(crate) fn hear(&mut self) -> Option<u32> {
         let package = self.heard.try_receive()?;
         Some(u32::from_le_bytes(package.body().try_into().unwrap()))
+    }
+
+    /// The next body that came.
+    pub(crate) fn hear_bytes(&mut self) -> Option<Vec<u8>> {
+        self.heard.try_receive().map(|package| package.body().to_vec())
     }
 
     pub(crate) fn hear_within(&mut self, what: &str) -> u32 {

@@ -8,20 +8,20 @@ use tempfile::TempDir;
 
 /// When a certificate holds.
 #[derive(Clone, Copy)]
-enum Holds {
+pub(crate) enum Holds {
     Now,
     UntilLongAgo,
     NotYet,
 }
 
 /// An authority of its own, with a folder of certificates.
-struct Authority {
+pub(crate) struct Authority {
     folder: TempDir,
     issuer: Issuer<'static, KeyPair>,
 }
 
 impl Authority {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let (folder, key) = (tempfile::tempdir().unwrap(), KeyPair::generate().unwrap());
         let mut params = CertificateParams::default();
         params.is_ca = IsCa::Ca(rcgen::BasicConstraints::Unconstrained);
@@ -33,7 +33,7 @@ impl Authority {
         authority
     }
 
-    fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.folder.path()
     }
 
@@ -57,7 +57,7 @@ impl Authority {
     }
 
     /// What a node of a system begins its connections with.
-    fn seal(&self, system: u8, holds: Holds) -> ClientSeal {
+    pub(crate) fn seal(&self, system: u8, holds: Holds) -> ClientSeal {
         let holder = holder(system);
         self.issue(&holder, holds);
         ClientSeal::load(self.path(), &holder).unwrap()
@@ -148,5 +148,5 @@ fn files_that_are_not_there_are_named() {
         matches!(&error, SealError::File(path, _) if path.ends_with("base.system-4.pem") || path.ends_with("base.system-4.key")),
         "{error}"
     );
-    assert!(error.to_string().contains("`rohrpost certify`"), "{error}");
+    assert!(error.to_string().contains("`rohrpost keys "), "{error}");
 }

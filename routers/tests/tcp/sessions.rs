@@ -11,10 +11,10 @@ use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
 /// A client that says what it likes.
-struct Raw(TcpStream);
+pub(crate) struct Raw(pub(crate) TcpStream);
 
 impl Raw {
-    fn new(server: SocketAddr, system: u8, common: u64) -> Self {
+    pub(crate) fn new(server: SocketAddr, system: u8, common: u64) -> Self {
         let mut raw = Self(TcpStream::connect(server).unwrap());
         raw.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
         raw.say(&Message::Hello(Hello {
@@ -30,13 +30,13 @@ impl Raw {
         raw
     }
 
-    fn say(&mut self, message: &Message<'_>) {
+    pub(crate) fn say(&mut self, message: &Message<'_>) {
         let mut bytes = Vec::new();
         message.write(&mut bytes);
         self.0.write_all(&bytes).unwrap();
     }
 
-    fn hosts(&mut self, system: u8) {
+    pub(crate) fn hosts(&mut self, system: u8) {
         let range = Range { first: module(system), last: module(system).with_local(255) };
         let mut bytes = Vec::new();
         self.say(&Message::Register(Ranges::new(1, &[range], &mut bytes)));
@@ -240,4 +240,7 @@ fn what_is_for_all_systems_comes_once_to_each() {
         assert_eq!(heard, [7, 8]);
         assert_eq!(system.hear(), None);
     }
+    // Two of those for each, one for all, and its copy that goes no further than its own node.
+    let came = || systems[0].client.link().out.iter().map(|class| (class.packages, class.passed)).collect::<Vec<_>>();
+    wait("all are counted", || (came() == [(4, 4)]).then_some(()));
 }

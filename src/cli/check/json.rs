@@ -2,8 +2,8 @@
 
 use rohrpost::Name;
 use rohrpost::config::{
-    Bound, Errors, FlowBound, Installation, MailboxSpec, MissingProgram, Module, Network, Program, RestartPolicy,
-    Scheduling, Start, Tdma, TimeSource, bounds,
+    Bound, Errors, FlowBound, Installation, MailboxSpec, MissingProgram, Module, Network, Program, Reach,
+    RestartPolicy, Scheduling, Start, Tdma, TimeSource, bounds,
 };
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -27,8 +27,12 @@ pub(super) fn installation(installation: &Installation, only: Option<&str>, miss
     });
     let nodes = installation.nodes.iter().filter(|node| only.is_none_or(|name| name == node.name)).map(|node| {
         let modules: Vec<Value> = installation.modules_on(&node.name).map(|it| module(installation, it)).collect();
+        let network = match node.reach {
+            Reach::Lan => "lan",
+            Reach::Tcp => "tcp",
+        };
         json!({
-            "name": node.name, "address": node.address, "mode": format!("{:04o}", node.mode),
+            "name": node.name, "network": network, "address": node.address, "mode": format!("{:04o}", node.mode),
             "tools": [node.tools.start(), node.tools.end()], "modules": modules,
         })
     });

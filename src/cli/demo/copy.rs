@@ -1,7 +1,8 @@
 //! The configuration of a demo: the folder's own, or a copy with what the command line says written in. A copy keeps each line
 //! where it was, and messages name the file that it was made from.
 
-use super::{Arguments, GUI};
+use super::{Arguments, GUI, Joined};
+use crate::cli::keys::certificates::{self, Which};
 use crate::cli::{Failure, check};
 use rohrpost::config::{Installation, Keys, Program};
 use rohrpost_routers::security::random;
@@ -12,10 +13,14 @@ const SIMULATION: &str = include_str!("../../../config/demo.toml");
 const LOG: &str = include_str!("../../../config/demo-log.toml");
 const NODES: &str = include_str!("../../../config/demo-nodes.toml");
 const TDMA: &str = include_str!("../../../config/demo-tdma.toml");
+const TCP: &str = include_str!("../../../config/demo-tcp.toml");
 const BUILDING: &str = include_str!("../../../config/building.map");
 
-/// Folder of the keys, beside the copy.
+/// Folders of keys and certificates, beside the copy.
 const KEYS: &str = "keys";
+const CERTIFICATES: &str = "certificates";
+/// The certificates of a run hold for so many days.
+const DAYS: u32 = 1;
 
 /// What runs. A copy is written into `temporary`.
 pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<Installation, Failure> {
@@ -25,6 +30,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     let (name, text) = match (&arguments.log, arguments.nodes) {
         (Some(_), _) => ("demo-log.toml", LOG),
         (None, Some(2..)) if arguments.tdma => ("demo-tdma.toml", TDMA),
+        (None, Some(2..)) if arguments.gui == Joined::Tcp => ("demo-tcp.toml", TCP),
         (None, Some(2..)) => ("demo-nodes.toml", NODES),
         (None, _) => ("demo.toml", SIMULATION),
     };
@@ -50,6 +56,9 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
         error.to_string().replace(&copy.display().to_string(), &shown.display().to_string())
     };
     let mut installation = check::load(&copy).map_err(named)?;
+    if arguments.secure && installation.tcp.is_some() {
+        certificates::make(&installation, Which::Missing, DAYS)?;
+    }
     installation.shown = shown;
     Ok(installation)
 }
@@ -71,6 +80,10 @@ fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Argume
         // Also if the file has keys of its own: the demo's are for this run.
         network.insert("security", value("keys"));
         network.insert("keys", value(KEYS));
+        if let Some(tcp) = document.get_mut("tcp").and_then(Item::as_table_like_mut) {
+            tcp.insert("security", value("tls"));
+            tcp.insert("certificates", value(CERTIFICATES));
+        }
     }
     let modules = document.get_mut("module").and_then(Item::as_array_of_tables_mut).ok_or("no [[module]]")?;
     for (entry, module) in modules.iter_mut().zip(installation.modules.iter().filter(|module| module.is_in_file())) {

@@ -1,4 +1,4 @@
-//! The lives of the routers: which one died, when, and when the next was there.
+//! The lives of routers: which one died, when, and when the next was there.
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -23,34 +23,39 @@ pub(super) struct Death {
 
 /// A node whose router is watched.
 struct Watched {
+    /// By its place in the configuration.
+    index: usize,
     node: Arc<Node>,
     router: Name,
     /// The process that is ready; none until there is one.
     pid: Option<u32>,
 }
 
-/// Watches the routers of all nodes, in the tables of the nodes' memory: nobody is asked, so nobody is disturbed.
+/// Watches routers, one of each node at most, in the tables of the nodes' memory: nobody is asked, so nobody is disturbed.
 pub(super) struct Lives {
     nodes: Vec<Watched>,
     pub(super) deaths: Vec<Death>,
 }
 
 impl Lives {
-    /// Of nodes that run.
-    pub(super) fn of(installation: &Installation) -> Result<Self, NodeError> {
-        let watched = |config: &rohrpost::config::Node| {
-            let node = Node::open(&node_directory(&installation.name, &config.name))?;
-            Ok(installation.router_of(&config.name).map(|router| Watched { node, router, pid: None }))
+    /// Of nodes that run; which router of each.
+    pub(super) fn of(installation: &Installation, router: impl Fn(&str) -> Option<Name>) -> Result<Self, NodeError> {
+        let watched = |(index, config): (usize, &rohrpost::config::Node)| {
+            let router = router(&config.name)?;
+            let node = Node::open(&node_directory(&installation.name, &config.name));
+            Some(node.map(|node| Watched { index, node, router, pid: None }))
         };
-        let nodes: Result<Vec<Option<Watched>>, NodeError> = installation.nodes.iter().map(watched).collect();
-        let mut lives = Self { nodes: nodes?.into_iter().flatten().collect(), deaths: Vec::new() };
+        let nodes: Result<Vec<Watched>, NodeError> =
+            installation.nodes.iter().enumerate().filter_map(watched).collect();
+        let mut lives = Self { nodes: nodes?, deaths: Vec::new() };
         lives.look();
         Ok(lives)
     }
 
     /// Looks who has died, and who has come back.
     pub(super) fn look(&mut self) {
-        for (index, watched) in self.nodes.iter_mut().enumerate() {
+        for watched in &mut self.nodes {
+            let index = watched.index;
             match watched.pid {
                 Some(pid) if !is_alive(pid) => {
                     watched.pid = None;
@@ -70,7 +75,7 @@ impl Lives {
 
     /// Kills the router of a node, as a crash would.
     pub(super) fn kill(&self, node: usize) -> Option<u32> {
-        let pid = self.nodes.get(node)?.pid?;
+        let pid = self.nodes.iter().find(|watched| watched.index == node)?.pid?;
         // Found alive a moment ago, and its number is not given to others so soon.
         kill(Pid::from_raw(pid.cast_signed()), Signal::SIGKILL).ok().map(|()| pid)
     }

@@ -1,9 +1,10 @@
 //! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
 
 use super::account::{self, Balance};
+use super::beyond;
 use super::losses::Losses;
-use super::takeover::{Seen, Watch};
-use super::{Arguments, FIRST_FUNCTION, copy, drawn};
+use super::takeover::{Seen, Victim, Watch};
+use super::{Arguments, FIRST_FUNCTION, Joined, copy, drawn};
 use crate::cli::launch::{Nodes, lab};
 use crate::cli::speech::Speech;
 use crate::cli::summary::print_classes;
@@ -39,10 +40,11 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     // Before the first thread, of which the speech has two.
     let lab = lab(&installation)?;
     let speech = Speech::begin()?;
-    installation.security_text().iter().for_each(|security| speech.say(security));
+    installation.security_texts().iter().for_each(|security| speech.say(security));
     let mut nodes = Nodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
-    let kill_after = long.map(|long| long / 2).filter(|_| arguments.kill_master);
-    let summary = watch(&mut nodes, &installation, long, kill_after).map(|seen| summary(&installation, &seen?));
+    let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == Joined::Tcp)];
+    let victims = victims.into_iter().filter(|(_, is_one)| *is_one).map(|(victim, _)| victim).collect();
+    let summary = watch(&mut nodes, &installation, long, victims).map(|seen| summary(&installation, &seen?));
     let code = nodes.stop();
     speech.settle();
     let Some(summary) = summary else { return Ok(ExitCode::FAILURE) };
@@ -57,7 +59,7 @@ fn watch(
     nodes: &mut Nodes<'_>,
     installation: &Arc<Installation>,
     long: Option<Duration>,
-    kill_after: Option<Duration>,
+    victims: Vec<Victim>,
 ) -> Option<Result<Seen, Failure>> {
     while !nodes.all_run() {
         if !nodes.watch(Duration::MAX) {
@@ -70,7 +72,7 @@ fn watch(
         Err(error) => return Some(Err(error)),
     };
     let after = |time: Option<Duration>| time.map(|time| Instant::now() + time);
-    let (deadline, mut kill_at) = (after(long), after(kill_after));
+    let (deadline, mut kill_at) = (after(long), after(long.map(|long| long / 2).filter(|_| !victims.is_empty())));
     let is_over = |at: Option<Instant>| at.is_some_and(|at| Instant::now() >= at);
     while !is_over(deadline) {
         let next = kill_at.or(deadline);
@@ -80,7 +82,7 @@ fn watch(
         }
         if is_over(kill_at) {
             kill_at = None;
-            watch.kill_master();
+            victims.iter().for_each(|victim| watch.kill(*victim));
         }
     }
     Some(watch.end())
@@ -102,6 +104,7 @@ fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, boo
     let losses = Losses::ask(installation, &mut tool);
     let kept = in_slots(installation, &mut tool)?;
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
+    let beyond = beyond::ask(installation, &mut tool)?;
     tool.close();
     let balance = Balance::of(&links, installation.classes.tool().0, &died);
     let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
@@ -111,6 +114,7 @@ fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, boo
     text += &account::by_class(installation, &links);
     text += "\nOn the wire:\n\n";
     text += &account::by_link(&links);
+    text += &beyond::text(installation, &beyond, seen.tcp_router_died());
     if !kept.is_empty() {
         text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
         text += &slots::kept(&kept);
@@ -133,7 +137,7 @@ fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, boo
     for error in &errors {
         text += &format!("{error}\n");
     }
-    Ok((text, errors.is_empty() && clocks_hold && balance.holds() && seen.is_well()))
+    Ok((text, errors.is_empty() && clocks_hold && balance.holds() && seen.is_well() && beyond::is_well(&beyond)))
 }
 
 /// What the mailboxes of all nodes did.
@@ -234,7 +238,7 @@ fn of_routers<T: DeserializeOwned>(
     data: DataPort<T>,
 ) -> Result<Vec<T>, Failure> {
     let mut all = Vec::new();
-    for node in &installation.nodes {
+    for node in installation.lan_nodes() {
         let router = installation.router_of(&node.name).ok_or("no router")?;
         let write = |body: &mut Vec<u8>| append(body, &(data.number,));
         let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);

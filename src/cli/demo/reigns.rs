@@ -1,6 +1,7 @@
 //! Who has told the time, as seen on the bridge: from when to when, as master or in the place of one.
 
-use rohrpost_routers::frame::{FrameHead, NodeIndex};
+use super::ears::Ears;
+use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::lab::Crossing;
 use rohrpost_routers::time::Term;
 use rohrpost_routers::time::message::{Message, Sync};
@@ -32,16 +33,21 @@ impl Reign {
 }
 
 /// One after the other.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Reigns {
+    ears: Ears,
     list: VecDeque<Reign>,
 }
 
 impl Reigns {
+    /// Nobody has told the time yet.
+    pub(super) fn heard_with(ears: Ears) -> Self {
+        Self { ears, ..Self::default() }
+    }
+
     /// Notes a datagram, if it tells the time.
     pub(super) fn note(&mut self, crossing: &Crossing<'_>) {
-        let Ok((head, rest)) = FrameHead::parse(crossing.datagram) else { return };
-        if let Ok(Message::Sync(sync)) = Message::parse(head.kind, rest) {
+        if let Some((head, Message::Sync(sync))) = self.ears.hear(crossing.datagram) {
             self.told(head.from, crossing.at_ns, &sync);
         }
     }

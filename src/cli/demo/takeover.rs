@@ -2,6 +2,7 @@
 //!
 //! A thread looks at the bridge and at the nodes' tables. It asks nobody, so that nothing crosses the network for it.
 
+use super::ears::Ears;
 use super::lives::{Death, Lives};
 use super::reigns::{Reign, Reigns};
 use crate::cli::Failure;
@@ -23,10 +24,19 @@ const READ_LOOKS: u32 = 10;
 
 /// The thread that watches.
 pub(super) struct Watch {
-    /// Each word kills the master's router; without this end, the thread ends.
-    kill: Sender<()>,
+    /// Who is to be killed; without this end, the thread ends.
+    kill: Sender<Victim>,
     thread: JoinHandle<Seen>,
     installation: Arc<Installation>,
+}
+
+/// Whom to kill.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Victim {
+    /// The router of the present master of time.
+    Master,
+    /// The TCP router.
+    TcpRouter,
 }
 
 /// What it has seen.
@@ -34,6 +44,8 @@ pub(super) struct Seen {
     installation: Arc<Installation>,
     began_ns: u64,
     lives: Lives,
+    /// Of the TCP router.
+    beyond: Lives,
     reigns: Reigns,
     /// Processes that were killed on purpose.
     on_purpose: Vec<u32>,
@@ -48,8 +60,11 @@ impl Watch {
         let seen = Seen {
             installation: installation.clone(),
             began_ns: monotonic_ns(),
-            lives: Lives::of(installation)?,
-            reigns: Reigns::default(),
+            lives: Lives::of(installation, |node| installation.router_of(node))?,
+            beyond: Lives::of(installation, |node| {
+                installation.tcp_router().filter(|router| installation.node_of(*router) == Some(node))
+            })?,
+            reigns: Reigns::heard_with(Ears::of(installation)?),
             on_purpose: Vec::new(),
             in_vain: 0,
         };
@@ -57,10 +72,10 @@ impl Watch {
         Ok(Self { kill, thread, installation: installation.clone() })
     }
 
-    /// Kills the router of the present master.
-    pub(super) fn kill_master(&self) {
+    /// Kills a router.
+    pub(super) fn kill(&self, victim: Victim) {
         // It ends only when told to.
-        let _ = self.kill.send(());
+        let _ = self.kill.send(victim);
     }
 
     /// Ends it.
@@ -72,26 +87,33 @@ impl Watch {
 }
 
 impl Seen {
-    fn watch(mut self, mut capture: Capture, words: &Receiver<()>) -> Self {
+    fn watch(mut self, mut capture: Capture, words: &Receiver<Victim>) -> Self {
         let mut looks = 0;
         loop {
             let word = words.recv_timeout(LOOK);
             self.lives.look();
+            self.beyond.look();
             looks += 1;
             if looks % READ_LOOKS == 0 || word != Err(RecvTimeoutError::Timeout) {
                 capture.drain(|crossing| self.reigns.note(&crossing));
             }
             match word {
-                Ok(()) => self.kill(),
+                Ok(victim) => self.kill(victim),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return self,
             }
         }
     }
 
-    fn kill(&mut self) {
-        let master = self.reigns.master_at(monotonic_ns()).map(|reign| usize::from(reign.node));
-        match master.and_then(|node| self.lives.kill(node)) {
+    fn kill(&mut self, victim: Victim) {
+        let killed = match victim {
+            Victim::Master => {
+                let master = self.reigns.master_at(monotonic_ns()).map(|reign| usize::from(reign.node));
+                master.and_then(|node| self.lives.kill(node))
+            }
+            Victim::TcpRouter => (0..self.installation.nodes.len()).find_map(|node| self.beyond.kill(node)),
+        };
+        match killed {
             Some(pid) => self.on_purpose.push(pid),
             None => self.in_vain += 1,
         }
@@ -108,14 +130,23 @@ impl Seen {
 
     /// Whether each that died came back, and was killed if it was to be.
     pub(super) fn is_well(&self) -> bool {
-        self.in_vain == 0 && self.lives.deaths.iter().all(|death| death.again.is_some())
+        self.in_vain == 0 && self.lives.deaths.iter().chain(&self.beyond.deaths).all(|death| death.again.is_some())
+    }
+
+    /// Whether the TCP router had more than one life.
+    pub(super) fn tcp_router_died(&self) -> bool {
+        !self.beyond.deaths.is_empty()
     }
 
     /// All of it in words; empty when no router died.
     pub(super) fn text(&self) -> String {
         let mut text: String = self.lives.deaths.iter().map(|death| self.event(death)).collect();
+        for death in &self.beyond.deaths {
+            text += &format!("The TCP router {}.\n", self.life(death));
+        }
         if self.in_vain > 0 {
-            text += "no router was killed, as there was no master; does [time] of the configuration have `source = \"master\"`?\n";
+            text += "no router was killed, as there was none: no master, if [time] of the configuration is without `source = \"master\"`, or no \
+                     TCP router\n";
         }
         if !self.lives.deaths.is_empty() {
             let master = self.reigns.master_at(u64::MAX).map(|reign| self.name(reign));
@@ -129,7 +160,12 @@ impl Seen {
     }
 
     fn event(&self, death: &Death) -> String {
-        let name = &self.installation.nodes[death.node].name;
+        let what = format!("The router of {} {}.\n", self.installation.nodes[death.node].name, self.life(death));
+        what + &self.takeover(death).unwrap_or_else(|| "  It was not the master.\n".into())
+    }
+
+    /// When it died, and when it was there again.
+    fn life(&self, death: &Death) -> String {
         let after = |from_ns: u64, to_ns: u64| time(Duration::from_nanos(to_ns.saturating_sub(from_ns)));
         let why = if self.on_purpose.contains(&death.pid) { "killed on purpose" } else { "not by this command" };
         let again = match death.again {
@@ -137,9 +173,7 @@ impl Seen {
             None => "not there again".into(),
         };
         let at = after(self.began_ns, death.at_ns);
-        let what =
-            format!("The router of {name} died {at} after the beginning (process {}, {why}); {again}.\n", death.pid);
-        what + &self.takeover(death).unwrap_or_else(|| "  It was not the master.\n".into())
+        format!("died {at} after the beginning (process {}, {why}); {again}", death.pid)
     }
 
     /// What became of its time, if it was the master.

@@ -13,7 +13,7 @@ use super::Failure;
 use crate::cli::speech::Speech;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::{Pid, getppid};
-use rohrpost::config::Installation;
+use rohrpost::config::{Installation, Reach};
 use rohrpost::launch::{Event, events};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
@@ -27,6 +27,8 @@ use std::time::{Duration, Instant};
 
 /// Tells a launch which process it must not outlive.
 const WITHIN: &str = "ROHRPOST_LAUNCH_ALL";
+/// Of links where no configuration says it, as of Ethernet.
+const MTU: u16 = 1500;
 /// Lines on their way from the nodes; who has more to say waits.
 const LINES_MAX: usize = 256;
 /// How a launch is told to stop, and to hurry. Two signals, since of two that are the same the kernel may deliver one.
@@ -93,14 +95,26 @@ enum Happening {
 /// # Errors
 /// When there is one node only, or the system does not allow it.
 pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
-    let address = |node: &rohrpost::config::Node| Some(NodeSpec { name: node.name.clone(), address: node.address? });
-    let specs: Option<Vec<NodeSpec>> = installation.nodes.iter().map(address).collect();
-    let (Some(network), Some(specs)) = (installation.network, specs) else {
+    if installation.nodes.len() == 1 {
         let file = installation.shown.display();
         return Err(format!("{file} has one node; launch it without --all: rohrpost launch {file}").into());
-    };
+    }
+    // One that is alone on its LAN may have no address there: then it is reached where the TCP router is.
+    let server = installation.tcp.as_ref().and_then(|tcp| Some((tcp.server.as_deref()?, tcp.address.ip())));
+    let address = |node: &rohrpost::config::Node| node.address.or_else(|| server.map(|(_, address)| address));
+    let spec = |node: &rohrpost::config::Node| Some(NodeSpec { name: node.name.clone(), address: address(node)? });
+    let specs: Vec<NodeSpec> = installation.lan_nodes().iter().filter_map(spec).collect();
     rohrpost_routers::lab::become_able()?;
-    Ok(Lab::new(&specs, network.mtu)?)
+    let mut lab = Lab::new(&specs, installation.network.map_or(MTU, |network| network.mtu))?;
+    if let Some((home, address)) = server {
+        let beyond = installation.nodes.iter().filter(|node| node.reach == Reach::Tcp);
+        let beyond: Vec<&str> = beyond.map(|node| node.name.as_str()).collect();
+        let is_on_lan = specs.iter().any(|spec| spec.address == address);
+        if !beyond.is_empty() || !is_on_lan {
+            lab.join_beyond(home, address, &beyond)?;
+        }
+    }
+    Ok(lab)
 }
 
 impl<'a> Nodes<'a> {

@@ -29,6 +29,7 @@ fn links(links: &[&BeyondLink]) -> String {
             link.server.clone(),
             state.into(),
             link.reconnects.to_string(),
+            outages(link),
             ns(link.round_trip_ns),
             link.time_error_ns.map_or("-".into(), |error_ns| format!("±{}", fine(error_ns as f64 * 1e-9))),
             sum(&link.sent),
@@ -36,9 +37,29 @@ fn links(links: &[&BeyondLink]) -> String {
             bytes(link.waiting_bytes as f64),
         ]
     };
-    let heads =
-        ["node", "TCP router", "state", ">reconnects", ">there and back", ">time", ">sent", ">received", ">memory"];
+    let heads = [
+        "node",
+        "TCP router",
+        "state",
+        ">reconnects",
+        "outages",
+        ">there and back",
+        ">time",
+        ">sent",
+        ">received",
+        ">memory",
+    ];
     if links.is_empty() { String::new() } else { table(heads, links.iter().map(row)) }
+}
+
+/// How often it took part no more, and for how long.
+fn outages(link: &BeyondLink) -> String {
+    let Some(last) = link.outage else { return "none".into() };
+    let took = match last.ended_ns {
+        Some(ended_ns) => format!("the last took {}", time(last.duration(ended_ns))),
+        None => "it is away".into(),
+    };
+    format!("{}, {took}", link.outages)
 }
 
 fn whys(links: &[&BeyondLink]) -> String {
@@ -64,7 +85,13 @@ fn clients(servers: &[&BeyondClients]) -> String {
         });
         let heads = ["client", "from", ">system", "state", ">ranges", ">since", ">heard", ">memory"];
         text += &table(heads, rows);
+        if server.more > 0 {
+            text += &format!("… and {} more\n", server.more);
+        }
         text += &format!("(TCP router at {}: {} left, {} refused)\n", server.address, server.left, server.refused);
+        if server.overtaken > 0 {
+            text += &format!("({} registrations were overtaken by later ones of the same client)\n", server.overtaken);
+        }
         if !server.refusal.is_empty() {
             text += &format!("the last that was refused: {}\n", server.refusal);
         }

@@ -93,7 +93,7 @@ fn look(round: &mut Round) -> Vec<Told> {
 }
 
 fn ask(round: &mut Round, node: String) -> Told {
-    let mut told = if round.running.installation.network.is_some() {
+    let mut told = if round.running.installation.router_of(&node).is_some() {
         ask_router(round, node)
     } else {
         Told { node, ..Told::default() }

@@ -8,7 +8,7 @@ use rohrpost_routers::security::{InstallationKey, KeyId, KeyRing, NoRandom, rand
 ///
 /// # Errors
 /// [`KeysError`]
-pub(super) fn of(installation: &Installation) -> Result<Option<KeyRing>, KeysError> {
+pub(in crate::cli) fn of(installation: &Installation) -> Result<Option<KeyRing>, KeysError> {
     let Some(folder) = &installation.keys else { return Ok(None) };
     let key = |key: &Key| InstallationKey::new(KeyId(key.id), &key.bytes);
     let Keys { newest, older } = Keys::load(&Keys::file(folder))?;

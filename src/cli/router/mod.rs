@@ -3,7 +3,7 @@
 mod clock;
 pub(super) mod faults;
 mod flows;
-mod keys;
+pub(in crate::cli) mod keys;
 mod links;
 mod slots;
 

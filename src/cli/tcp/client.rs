@@ -2,9 +2,9 @@
 
 use super::{NoSettings, PERIOD, classes, levels, short};
 use crate::cli::router::faults::Encoded;
-use rohrpost::config::Tcp as Configured;
-use rohrpost::interfaces::{BeyondLink, BeyondState, Tcp, TcpInterface};
-use rohrpost::mailbox::realtime_ns;
+use rohrpost::config::{Reach, Tcp as Configured};
+use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
+use rohrpost::mailbox::{ERROR_UNKNOWN_NS, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError};
 use rohrpost_routers::access::Access;
 use rohrpost_routers::session::client::ClientSettings;
@@ -59,6 +59,7 @@ impl Module for ClientModule {
             faults: Arc::new(Encoded::of(installation)),
             access: Access::new(&installation.access),
             seal,
+            keeps_time: installation.node(&node_name).is_some_and(|node| node.reach == Reach::Tcp),
         })?;
         context.set_period(PERIOD);
         Ok(Self { shell, node: node_name, server })
@@ -68,6 +69,8 @@ impl Module for ClientModule {
         // Without its thread it is of no use; started again, it is.
         assert!(self.shell.is_well(), "the thread of the client of the TCP router has ended");
         let link = self.shell.link();
+        let (now_ns, system) = (monotonic_ns(), context.now());
+        let told = |ns: u64| system.ns.saturating_sub(now_ns.saturating_sub(ns));
         context.publish_now(
             TcpInterface::LINK,
             &BeyondLink {
@@ -82,6 +85,12 @@ impl Module for ClientModule {
                 reconnects: link.connections.saturating_sub(1),
                 round_trip_ns: link.round_trip_ns,
                 time_error_ns: link.time_error_ns,
+                time: link.time.map(|record| time(&record, now_ns)),
+                outages: link.outage.count,
+                outage: link.outage.last.map(|(began_ns, ended_ns)| BeyondOutage {
+                    began_ns: told(began_ns),
+                    ended_ns: ended_ns.map(told),
+                }),
                 waiting_bytes: link.waiting_bytes,
                 sent: classes(&link.out),
                 received: classes(&link.inn),
@@ -89,4 +98,10 @@ impl Module for ClientModule {
         )?;
         Ok(())
     }
+}
+
+fn time(record: &TimeRecord, now_ns: u64) -> BeyondTime {
+    let there = record.at(now_ns);
+    let error_ns = u64::try_from(there.error.as_nanos()).ok().filter(|error_ns| *error_ns < ERROR_UNKNOWN_NS);
+    BeyondTime { epoch: there.epoch, now_ns: there.ns, error_ns }
 }

@@ -3,9 +3,9 @@
 use super::{NoSettings, PERIOD, classes, levels, short};
 use crate::cli::router::faults::Encoded;
 use rohrpost::config::Tcp as Configured;
-use rohrpost::interfaces::{BeyondClient, BeyondClients, Tcp, TcpInterface};
+use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondHost, BeyondHosts, Tcp, TcpInterface};
 use rohrpost::mailbox::{monotonic_ns, realtime_ns};
-use rohrpost::{Context, Module, ModuleError};
+use rohrpost::{Context, Module, ModuleError, Name};
 use rohrpost_routers::session::server::ServerSettings;
 use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
 use std::net::SocketAddr;
@@ -56,15 +56,19 @@ impl Module for ServerModule {
         // Without its thread it is of no use; started again, it is.
         assert!(self.shell.is_well(), "the thread of the TCP router has ended");
         let seen = self.shell.members();
+        context.publish_now(TcpInterface::HOSTS, &hosts(&seen.members))?;
         context.publish_now(
             TcpInterface::CLIENTS,
             &BeyondClients {
                 address: self.address.to_string(),
                 uptime_ms: monotonic_ns().saturating_sub(self.began_ns) / 1_000_000,
                 clients: seen.members.into_iter().map(client).collect(),
+                more: seen.more,
                 left: seen.left,
                 refused: seen.refused,
                 refusal: seen.refusal,
+                overtaken: seen.overtaken,
+                held_lines: seen.held,
                 classes: classes(&seen.classes),
             },
         )?;
@@ -74,6 +78,21 @@ impl Module for ServerModule {
 
 /// Connections that have not said hello yet, at least.
 const GREETINGS_MIN: u16 = 64;
+
+/// Ranges that are told at a time: with the names of their clients they fit in a package.
+const HOSTS_MAX: usize = 512;
+
+fn hosts(members: &[Member]) -> BeyondHosts {
+    let all = members.iter().flat_map(|member| member.hosts.iter().map(move |range| (range, member)));
+    let host = |((first, last), member): (&(Name, Name), &Member)| BeyondHost {
+        first: first.raw(),
+        last: last.raw(),
+        client: member.name.clone(),
+    };
+    let hosts: Vec<BeyondHost> = all.take(HOSTS_MAX).map(host).collect();
+    let ranges: u64 = members.iter().map(|member| member.ranges).sum();
+    BeyondHosts { more: ranges.saturating_sub(hosts.len() as u64), hosts }
+}
 
 fn client(member: Member) -> BeyondClient {
     BeyondClient {
@@ -85,5 +104,48 @@ fn client(member: Member) -> BeyondClient {
         age_ms: member.age_ns / 1_000_000,
         heard_ms: member.heard_ns / 1_000_000,
         bytes: member.bytes,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::tcp::NAME_BYTES_MAX;
+    use rohrpost::interfaces::{CarriedLoss, ClassPassed};
+    use rohrpost::macro_support::append;
+    use rohrpost_routers::session::Cause;
+    use rohrpost_routers::tcp::MEMBERS_MAX;
+
+    /// With more than that nothing would be shown at all.
+    #[test]
+    fn as_many_clients_as_are_told_fit_into_a_package() {
+        let most = u64::from(u32::MAX);
+        let client = BeyondClient {
+            name: "x".repeat(NAME_BYTES_MAX),
+            address: "[2001:db8:ffff:ffff:ffff:ffff:ffff:ffff]:65535".into(),
+            system: u8::MAX,
+            takes_part: true,
+            ranges: most,
+            age_ms: most,
+            heard_ms: most,
+            bytes: most,
+        };
+        let lost = Cause::ALL.map(|cause| CarriedLoss { cause: cause.word().into(), packages: most });
+        let class = ClassPassed { class: u8::MAX, packages: most, passed: most, lost: lost.into() };
+        let all = BeyondClients {
+            address: client.address.clone(),
+            uptime_ms: most,
+            clients: vec![client; MEMBERS_MAX],
+            more: most,
+            left: most,
+            refused: most,
+            refusal: "x".repeat(1000),
+            overtaken: most,
+            held_lines: most,
+            classes: vec![class; 64],
+        };
+        let mut body = Vec::new();
+        append(&mut body, &all).unwrap();
+        assert!(body.len() < rohrpost::mailbox::BODY_BYTES_MAX, "{}", body.len());
     }
 }

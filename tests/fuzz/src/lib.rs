@@ -19,12 +19,14 @@ mod impairments;
 mod lines;
 mod logs;
 mod maps;
+mod members;
 mod names;
 mod parameters;
 mod planted;
 mod routers;
 mod seals;
 mod segments;
+mod sessions;
 mod split;
 
 /// One target.
@@ -37,7 +39,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 14] = [
+pub const TARGETS: [Target; 16] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -51,6 +53,8 @@ pub const TARGETS: [Target; 14] = [
     Target { name: "frames", run: frames::run },
     Target { name: "routers", run: routers::run },
     Target { name: "seals", run: seals::run },
+    Target { name: "sessions", run: sessions::run },
+    Target { name: "members", run: members::run },
     Target { name: "impairments", run: impairments::run },
 ];
 

@@ -41,6 +41,6 @@ impl Case for Brisk {
             ],
             figures: [&[OMITTED_HOPED][..], &ALWAYS[..]].concat(),
         };
-        Ok(contest.hold(settings).0)
+        Ok(contest.hold(settings).rows)
     }
 }

@@ -62,6 +62,15 @@ const OF_BARE: [Goal; 1] = [Goal { name: "hoped 1.5", most: 1.5 }];
 /// What was seen of a contender, round after round.
 pub(super) type Seen = Vec<Observed>;
 
+/// What became of a contest.
+pub(super) struct Held {
+    pub rows: Vec<Row>,
+    /// Of each contender.
+    pub seen: Vec<Seen>,
+    /// Of the floor, round after round.
+    pub bare: Vec<Bare>,
+}
+
 /// A case of this kind.
 pub(super) struct Contest {
     /// Its name.
@@ -79,8 +88,8 @@ pub(super) struct Contest {
 }
 
 impl Contest {
-    /// Watches all, round after round. Rows, and what was seen of each contender.
-    pub(super) fn hold(&self, settings: &Settings) -> (Vec<Row>, Vec<Seen>) {
+    /// Watches all, round after round.
+    pub(super) fn hold(&self, settings: &Settings) -> Held {
         let stage = Stage::new();
         let all: Vec<RefCell<Seen>> = self.watched.iter().map(|_| RefCell::default()).collect();
         let turn = |at: usize| -> Result<Summary, Failure> {
@@ -113,8 +122,9 @@ impl Contest {
         for figure in &self.figures {
             rows.extend(self.told(figure, &seen));
         }
-        rows.extend(self.beside_bare(&seen[0], &bare.into_inner()));
-        (rows, seen)
+        let bare = bare.into_inner();
+        rows.extend(self.beside_bare(&seen[0], &bare));
+        Held { rows, seen, bare }
     }
 
     /// Slots that bare threads would have left out, and how many times as many the first contender has.

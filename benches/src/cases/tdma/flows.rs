@@ -6,14 +6,13 @@ use super::goals::{Goal, NONE, figure, spread};
 use super::observed::{ALL, watched};
 use super::plans::FLOWS;
 use crate::cases::Case;
-use crate::harness::{Failure, alone, rest};
+use crate::harness::{Failure, Machine, alone, rest};
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
 use crate::statistics::{Summary, median};
 use crate::tdma::bare::Bare;
 use crate::tdma::capture::{Arrived, Capture};
 use crate::tdma::counts::Counts;
-use crate::tdma::machine::Machine;
 use crate::tdma::plan::Declared;
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
@@ -86,9 +85,9 @@ fn steal_in_windows(all: Duration) -> Result<Vec<f64>, Failure> {
     let over = Instant::now() + all;
     let mut windows = Vec::new();
     while Instant::now() < over {
-        let before = Machine::look(&[]);
+        let before = Machine::look(&[], "");
         rest(WINDOW)?;
-        windows.push(Machine::look(&[]).steal_percent(&before));
+        windows.push(Machine::look(&[], "").steal_percent(&before));
     }
     Ok(windows)
 }

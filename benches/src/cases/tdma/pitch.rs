@@ -1,7 +1,7 @@
 //! How short a slot for 1400 B can be, and how much of its end must be kept free: tables by the shortest slots that `check` lets pass, and
 //! how far into the guard the latest frame began. A table that was not kept is none that can be had.
 
-use super::contest::{ALWAYS, Contest, Figure, Watched};
+use super::contest::{ALWAYS, Contest, Figure, Held, Watched};
 use super::goals::{Goal, NONE, figure};
 use super::observed::{Observed, Way};
 use super::plans::{SHORT_PITCH, SHORTEST_PITCH, WIDE_GUARD};
@@ -46,7 +46,7 @@ impl Case for Pitch {
             versus: Vec::new(),
             figures: [&[INTO_GUARD, OMITTED][..], &ALWAYS[..]].concat(),
         };
-        let (mut rows, seen) = contest.hold(settings);
+        let Held { mut rows, seen, .. } = contest.hold(settings);
         for ((who, plan), seen) in tables.into_iter().zip(seen) {
             let not_kept: Vec<f64> = seen.iter().map(|seen| if is_kept(&plan, seen) { 0.0 } else { 100.0 }).collect();
             rows.extend(figure(&contest.subject("%", Some("not kept")), who, &not_kept, &NONE));

@@ -1,6 +1,6 @@
 //! How far off their nominal beginning slots begin, with everything else at work, without, and with routers that the kernel denies real time.
 
-use super::contest::{ALWAYS, Contest, Figure, Seen, Watched};
+use super::contest::{ALWAYS, BARE, Contest, Figure, Held, Seen, Watched};
 use super::goals::{Goal, figure};
 use super::observed::{Observed, Way};
 use super::plans::LOADED;
@@ -9,6 +9,7 @@ use crate::harness::Failure;
 use crate::rounds::{Row, Target, Versus};
 use crate::settings::Settings;
 use crate::statistics::Summary;
+use crate::tdma::bare::Bare;
 use crate::tdma::rights::Rights;
 
 const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
@@ -91,9 +92,12 @@ impl Case for Slots {
             versus: versus.map(|(name, (p50, p99))| Versus { name, p50, p99 }).into(),
             figures: [&FIGURES[..], &ALWAYS[..]].concat(),
         };
-        let (mut rows, seen) = contest.hold(settings);
+        let Held { mut rows, seen, bare } = contest.hold(settings);
         let [loaded, _, ordinary] = seen.as_slice() else { return Ok(rows) };
-        for (what, far) in [("over 250 us off", far_off as Far), ("left out or over 250 us off", not_kept)] {
+        let not_kept_subject = contest.subject("of ordinary", Some(NOT_KEPT));
+        let floor: Vec<f64> = bare.iter().zip(ordinary).map(|(bare, ordinary)| floor(bare, ordinary)).collect();
+        rows.extend(figure(&not_kept_subject, BARE, &floor, &FEWER));
+        for (what, far) in [("over 250 us off", far_off as Far), (NOT_KEPT, not_kept)] {
             rows.extend(figure(
                 &contest.subject("of ordinary", Some(what)),
                 "loaded",
@@ -107,6 +111,14 @@ impl Case for Slots {
 
 /// Slots that were not what they should be, of how many.
 type Far = fn(&Observed) -> (u64, u64);
+
+const NOT_KEPT: &str = "left out or over 250 us off";
+
+/// What bare threads would have left out, by what is not kept without real time: no router is better.
+fn floor(bare: &Bare, ordinary: &Observed) -> f64 {
+    let (some, all) = not_kept(ordinary);
+    bare.omitted_percent() / 100.0 * all.max(1) as f64 / some.max(1) as f64
+}
 
 /// Of those that were used.
 fn far_off(seen: &Observed) -> (u64, u64) {

@@ -1,5 +1,6 @@
 //! The master is killed, again and again, while all nodes send; and then it is left alone for long, and must remain it.
 
+use super::contest::BARE;
 use super::goals::{Goal, figure, spread};
 use super::observed::ALL;
 use super::plans::LOADED;
@@ -7,6 +8,7 @@ use crate::cases::Case;
 use crate::harness::{Failure, alone, rest};
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
+use crate::tdma::bare::Bare;
 use crate::tdma::capture::Capture;
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
@@ -14,6 +16,9 @@ use crate::tdma::stage::Stage;
 use crate::tdma::takeover::{TakenOver, changes_of_master, kill_master, without_sync_percent};
 use crate::tdma::traffic::Traffic;
 use std::time::Duration;
+
+const FALSE_CHANGES: &str = "takeover, false changes";
+const PER_CYCLES: &str = "in 1e5 cycles";
 
 /// In each round.
 const KILLS: usize = 10;
@@ -47,6 +52,8 @@ struct Found {
     killed: Vec<TakenOver>,
     quiet_cycles: f64,
     false_changes: usize,
+    /// Of bare threads, each of which might have been the master, beside as many cycles.
+    standstills: Vec<f64>,
     /// Of the quiet cycles of each round, those in which the capture saw no Sync, percent.
     without_sync: Vec<f64>,
 }
@@ -73,7 +80,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
     let (kills, quiet) = if settings.quick { (KILLS_QUICK, QUIET_QUICK) } else { (KILLS, QUIET) };
     let mut routers = Routers::start(stage, &LOADED, Rights::RealTime, settings)?;
     let mut capture = Capture::start(stage)?;
-    let _traffic = Traffic::start(&routers)?;
+    let traffic = Traffic::start(&routers)?;
     routers.await_packages(&ALL, &mut capture)?;
     for kill in 0..kills {
         let taken_over = kill_master(&mut routers, &mut capture, &LOADED, (kill as f64 * GOLDEN).fract())?;
@@ -87,8 +94,11 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
     capture.check()?;
     let (frames, cycles) = (capture.since(first), quiet.as_micros() as f64 / LOADED.cycle_us as f64);
     found.false_changes += changes_of_master(&frames);
-    found.without_sync.push(without_sync_percent(&frames, cycles));
+    found.without_sync.push(without_sync_percent(&frames, Duration::from_micros(LOADED.cycle_us), cycles));
     found.quiet_cycles += cycles;
+    drop((traffic, capture, routers));
+    let bare = Bare::turn(stage, &LOADED, false, quiet)?;
+    found.standstills.push(bare.standstills as f64 * 1e5 / (cycles * f64::from(LOADED.masters)));
     Ok(())
 }
 
@@ -122,8 +132,12 @@ impl Found {
         // Who sees no master sees no change of it.
         if self.without_sync.iter().all(|percent| *percent <= WITHOUT_SYNC[0].most) {
             let changes = self.false_changes as f64 * 1e5 / cycles;
-            rows.extend(figure(&subject("takeover, false changes", "in 1e5 cycles"), "quiet", &[changes], &FALSE));
+            rows.extend(figure(&subject(FALSE_CHANGES, PER_CYCLES), "quiet", &[changes], &FALSE));
         }
+        // Each of them would be taken for dead.
+        let rounds = self.standstills.len();
+        let mean = (rounds > 0).then(|| self.standstills.iter().sum::<f64>() / rounds as f64);
+        rows.extend(figure(&subject(FALSE_CHANGES, PER_CYCLES), BARE, mean.as_slice(), &FALSE));
         rows.extend(figure(&subject("takeover, quiet", "cycles"), "quiet", &[cycles], &[]));
         rows.extend(figure(&subject("takeover, kills", "kills"), "all", &[self.killed.len() as f64], &[]));
         rows
@@ -144,7 +158,7 @@ mod tests {
         let cases = |killed: &[u8], without_sync| {
             let killed = killed.iter().map(|dead| kill(*dead)).collect();
             let rows =
-                Found { killed, quiet_cycles: 200.0, false_changes: 0, without_sync: vec![0.0, without_sync] }.rows();
+                Found { killed, quiet_cycles: 200.0, without_sync: vec![0.0, without_sync], ..Found::default() }.rows();
             let has = |case: &str| rows.iter().any(|row| row.case == case);
             let failed = rows.iter().filter(|row| row.result.is_err()).map(|row| row.who).collect::<Vec<_>>();
             let missed = rows.iter().any(|row| row.case == "takeover, cycles without Sync" && row.met() == Some(false));

@@ -4,6 +4,7 @@ mod acquaintance;
 mod gate;
 mod hostile;
 mod sealed;
+mod slots;
 
 use super::*;
 use crate::broken::{Broken, with};

@@ -1,5 +1,6 @@
 //! What comes from the server.
 
+use super::asking::Asking;
 use super::{Client, Event, Host, Package, REGISTER_AGAIN_NS, Registration, State, Told};
 use crate::broken::broken;
 use crate::session::counts::Cause;
@@ -11,6 +12,7 @@ impl Client {
     /// Takes bytes of the server's stream, split anywhere.
     pub fn received(&mut self, now_ns: u64, mut bytes: &[u8], host: &mut impl Host) {
         self.heard_ns = now_ns;
+        self.asking.heard();
         let mut splitter = std::mem::take(&mut self.splitter);
         while matches!(self.state, State::Greeting { .. } | State::Member) {
             let message = match splitter.next(now_ns, LENGTH_MAX, &mut bytes) {
@@ -52,7 +54,8 @@ impl Client {
         }
         self.reckoning.heard(now_ns, &welcome.time);
         self.state = State::Member;
-        (self.joined_ns, self.asks, self.ask_ns) = (Some(now_ns), 0, now_ns);
+        self.joined_ns = Some(now_ns);
+        self.asking = Asking::begin(now_ns);
     }
 
     fn registered(&mut self, now_ns: u64, verdict: &Verdict<'_>, host: &mut impl Host) {
@@ -106,14 +109,14 @@ impl Client {
         self.over(now_ns, Told::Damaged, Event::Damaged(bad), host);
     }
 
-    /// The connection is to be closed.
+    /// The connection is to be closed. Why is told last: it is what people are to know.
     fn over(&mut self, now_ns: u64, told: Told, event: Event<'_>, host: &mut impl Host) {
-        if self.told != Some(told) {
-            host.event(event);
-        }
         if self.is_up() {
             self.down_ns = now_ns;
             host.event(Event::Down);
+        }
+        if self.told != Some(told) {
+            host.event(event);
         }
         self.told = Some(told);
         self.state = State::Over;

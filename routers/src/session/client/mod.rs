@@ -6,6 +6,7 @@
 //!   └──────────────────────────── waits longer each time ◀─────────────────────────────────────┘
 //! ```
 
+mod asking;
 mod backoff;
 mod incoming;
 
@@ -16,20 +17,17 @@ use super::frame::{Carried, Hello, Message, Range, Ranges, Reason, Refusal, Verd
 use super::outgoing::{Fates, Outgoing, Parcel, is_stale};
 use super::reckoning::{Bounded, Reckoning};
 use super::splitter::Splitter;
-use super::{ASK_EVERY_NS, Answers, GREETING_MAX_NS, LOOK_EVERY_NS, SILENT_AFTER_NS, STALLED_AFTER_NS, WAIT_MAX_NS};
-use super::{answer_to, without_hurry};
+use super::{Answers, GREETING_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS, WAIT_MAX_NS, answer_to, without_hurry};
 use crate::broken::broken;
 use crate::report::NotDelivered;
+use asking::Asking;
 use backoff::Backoff;
-use rohrpost_mailbox::{Head, TimeRecord};
+use rohrpost_mailbox::{Head, Name, Priority, TimeRecord};
 
 /// A connection is made within so long, or not at all.
 const CONNECT_MAX_NS: u64 = 5_000_000_000;
 /// A connection that holds for so long is no failure.
 const LASTING_NS: u64 = 5_000_000_000;
-/// The first questions for the time follow each other closer: one of them is quick.
-const FIRST_ASKS: u32 = 5;
-const FIRST_ASK_EVERY_NS: u64 = 100_000_000;
 /// What the server objected to is registered again after so long: who had it may have gone.
 const REGISTER_AGAIN_NS: u64 = 500_000_000;
 /// A look that comes so late says that this client stood still itself.
@@ -150,6 +148,7 @@ pub struct Client {
     splitter: Splitter,
     outgoing: Outgoing,
     is_blocked: bool,
+    is_slow: bool,
     reckoning: Reckoning,
     /// Whose clocks that is about.
     server_life: u64,
@@ -163,8 +162,7 @@ pub struct Client {
     down_ns: u64,
     heard_ns: u64,
     moved_ns: u64,
-    ask_ns: u64,
-    asks: u32,
+    asking: Asking,
     look_ns: u64,
 }
 
@@ -189,6 +187,7 @@ impl Client {
             splitter: Splitter::default(),
             outgoing: Outgoing::new(settings.quota_bytes),
             is_blocked: false,
+            is_slow: false,
             reckoning: Reckoning::default(),
             server_life: 0,
             out: Counts::default(),
@@ -198,8 +197,7 @@ impl Client {
             down_ns: now_ns,
             heard_ns: now_ns,
             moved_ns: now_ns,
-            ask_ns: 0,
-            asks: 0,
+            asking: Asking::default(),
             look_ns: 0,
             settings,
         }
@@ -208,6 +206,10 @@ impl Client {
     /// It hosts other names from now on.
     pub fn host(&mut self, now_ns: u64, ranges: Vec<Range>) {
         self.ranges = ranges;
+        if self.is_up() {
+            // What comes from now on waits for the answer.
+            self.down_ns = now_ns;
+        }
         self.registration = Registration::Due(now_ns);
     }
 
@@ -251,6 +253,11 @@ impl Client {
         self.reckoning.system(now_ns)
     }
 
+    /// How many answers the server gave about its clocks in this life of it.
+    pub fn answers(&self) -> u64 {
+        self.reckoning.answers()
+    }
+
     /// Bytes of memory that what waits takes up.
     pub fn bytes(&self) -> usize {
         self.outgoing.bytes() + self.splitter.bytes()
@@ -290,7 +297,7 @@ impl Client {
         if !broken!(RegistersOnce) {
             self.registration = Registration::Due(now_ns);
         }
-        self.is_blocked = false;
+        (self.is_blocked, self.is_slow) = (false, false);
         self.outgoing.cut();
     }
 
@@ -306,11 +313,17 @@ impl Client {
         if bytes > 0 {
             self.moved_ns = now_ns;
         }
+        self.asking.sent(now_ns, self.outgoing.sent());
     }
 
     /// The stream takes bytes again.
     pub fn writable(&mut self) {
         self.is_blocked = false;
+    }
+
+    /// Whether the stream is known to take so little that an answer may be long on its way.
+    pub fn set_slow(&mut self, is_slow: bool) {
+        self.is_slow = is_slow;
     }
 
     /// A package is to go to the server.
@@ -329,6 +342,20 @@ impl Client {
                 outgoing.accept(shift_ns, &Parcel { head: &head, body, published_ns, hops, level }, ledger);
             }
         });
+    }
+
+    /// A package for all systems came to this node without the server, or was lost here. That nobody has its mailbox open is a loss only
+    /// where this client hosts the name: the server counts on it then, and says nothing.
+    pub fn reached_itself(&mut self, to: Name, priority: Priority, delivered: Result<(), NotDelivered>) {
+        let hosts = self.ranges.iter().any(|range| range.has(to));
+        if delivered == Err(NotDelivered::NoMailbox) && !hosts {
+            return;
+        }
+        self.out.came(priority);
+        match delivered {
+            Ok(()) => self.out.passed(priority),
+            Err(why) => self.out.lost(priority, why.into()),
+        }
     }
 
     /// What to do next.
@@ -350,6 +377,7 @@ impl Client {
                 return Output::Close;
             }
         }
+        self.ask(now_ns);
         if self.is_blocked {
             return Output::Wait { until_ns: self.look_ns };
         }
@@ -369,7 +397,8 @@ impl Client {
     }
 
     fn is_gone(&self, now_ns: u64) -> bool {
-        let is_silent = now_ns.saturating_sub(self.heard_ns) > SILENT_AFTER_NS;
+        let is_slow = self.is_slow || self.splitter.waits_since().is_some();
+        let is_silent = self.asking.is_silent(now_ns, self.heard_ns, self.moved_ns, is_slow);
         let is_stalled = now_ns.saturating_sub(self.moved_ns) > STALLED_AFTER_NS;
         match self.state {
             State::Greeting { until_ns } => now_ns >= until_ns,
@@ -389,6 +418,14 @@ impl Client {
         self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.look(now_ns, cause, ledger));
     }
 
+    /// Asks for the time, also while the stream takes nothing: packages that have not begun to leave go behind the question.
+    fn ask(&mut self, now_ns: u64) {
+        if self.state == State::Member && self.asking.is_due(now_ns) {
+            let end = self.outgoing.hurry(&Message::Ask(now_ns));
+            self.asking.asks(now_ns, end);
+        }
+    }
+
     fn refill(&mut self, now_ns: u64, host: &mut impl Host) {
         if self.state != State::Member || !self.outgoing.ready().is_empty() {
             return;
@@ -398,11 +435,6 @@ impl Client {
             self.registration = Registration::Asked;
             let mut bytes = Vec::new();
             self.outgoing.say(&Message::Register(Ranges::new(self.number, &self.ranges, &mut bytes)));
-        }
-        if now_ns >= self.ask_ns {
-            self.asks = self.asks.saturating_add(1);
-            self.ask_ns = now_ns + if self.asks < FIRST_ASKS { FIRST_ASK_EVERY_NS } else { ASK_EVERY_NS };
-            self.outgoing.say(&Message::Ask(now_ns));
         }
         if let Some(shift_ns) = self.shift_ns(now_ns) {
             self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.refill(now_ns, shift_ns, ledger));
@@ -415,7 +447,7 @@ impl Client {
             Registration::Asked | Registration::Holds => u64::MAX,
         };
         match self.state {
-            State::Member => self.look_ns.min(self.ask_ns).min(registers_ns),
+            State::Member => self.look_ns.min(self.asking.next_ns).min(registers_ns),
             _ => self.look_ns,
         }
     }

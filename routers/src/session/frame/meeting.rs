@@ -216,7 +216,7 @@ impl std::fmt::Display for Refusal<'_> {
             Reason::Stalled => write!(f, "nothing was read here for too long"),
             Reason::Ending => write!(f, "the TCP router ends"),
             Reason::Certificate => {
-                write!(f, "the certificate here does not fit: {text}; use that of this node (`rohrpost certify`)")
+                write!(f, "the certificate here does not fit: {text}; use that of this node (`rohrpost keys new`)")
             }
         }
     }

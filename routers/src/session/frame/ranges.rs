@@ -88,7 +88,14 @@ impl Iterator for Ranges<'_> {
             |at: usize| Name::from_raw(u32::from_le_bytes([range[at], range[at + 1], range[at + 2], range[at + 3]]));
         Some(Range { first: name(0), last: name(4) })
     }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let count = self.bytes.len() / RANGE_BYTES;
+        (count, Some(count))
+    }
 }
+
+impl ExactSizeIterator for Ranges<'_> {}
 
 /// Why a client does not host what it says.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]

@@ -1,6 +1,6 @@
 //! Packages: from the client that sends to the one that hosts the name.
 
-use super::member::{Asked, Member};
+use super::member::{Asked, Member, RoundTrip};
 use super::{Host, Server};
 use crate::broken::broken;
 use crate::session::counts::{Cause, Counts};
@@ -37,7 +37,8 @@ impl Server {
         let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
         let hops = if broken!(KeepsHops) { carried.hops } else { carried.hops.saturating_add(1) };
         let carried = Carried { head, published_ns, hops, ..*carried };
-        let is_own = self.table.client_of(head.from) == Some(from) || head.from == Name::NONE;
+        let hosts = self.table.client_of(head.from) == Some(from) || head.from == Name::NONE;
+        let is_own = hosts || self.is_to_host(from, head.from);
         let objection = if !is_own && !broken!(TakesForeignNames) {
             Some(Cause::Foreign)
         } else if carried.hops > HOPS_MAX {
@@ -70,16 +71,21 @@ impl Server {
             return;
         };
         let systems: Vec<u8> = self.table.systems().to_vec();
-        let mut copies = 0;
-        for system in systems.into_iter().filter(|system| *system != own || !reaches_own || broken!(ToOwnTwice)) {
+        // Who hosts the name in its own system itself knows whether anybody is there: that is counted at its end.
+        let mut is_reached = false;
+        for system in systems {
             let to = in_system(carried.head.to, system);
-            let Some(client) = self.table.client_of(to).filter(|client| *client != from) else { continue };
-            copies += 1;
+            let Some(client) = self.table.client_of(to) else { continue };
+            is_reached = true;
+            let reaches_itself = client == from || system == own && reaches_own && !broken!(ToOwnTwice);
+            if reaches_itself {
+                continue;
+            }
             self.counts.came(carried.head.priority);
             let copy = Carried { head: Head { to, ..carried.head }, ..*carried };
             self.hand_over(now_ns, client, &copy, host);
         }
-        if copies == 0 {
+        if !is_reached {
             self.lose(now_ns, carried, Cause::NoRoute, host);
         }
     }
@@ -110,10 +116,13 @@ impl Server {
         if let Some(asked) = member.asked.take() {
             let time = time_answer(now_ns, &asked, time);
             let welcome = Message::Welcome(Welcome { common, life, time });
-            member.outgoing.say(&if asked.by_hello { welcome } else { Message::Answer(time) });
+            if asked.by_hello {
+                member.round_trip = RoundTrip::Since(now_ns);
+            }
+            member.outgoing.hurry(&if asked.by_hello { welcome } else { Message::Answer(time) });
         }
         if let Some(judged) = member.judged.take() {
-            member.outgoing.say(&Message::Registered(Verdict { holder: &judged.holder, ..judged.verdict }));
+            member.outgoing.hurry(&Message::Registered(Verdict { holder: &judged.holder, ..judged.verdict }));
         }
         if let Some(refused) = member.refused.take() {
             let ((yours, ours), text) = (refused.digests, refused.text.as_str());

@@ -1,14 +1,10 @@
 //! What comes from clients, and who may take part.
 
-use super::member::{Asked, Judged, Refused, State};
+use super::member::{Asked, Refused, RoundTrip, State};
 use super::{Event, Host, Server};
 use crate::broken::broken;
-use crate::session::frame::{
-    BadFrame, GREETING_LENGTH_MAX, Hello, LENGTH_MAX, Message, NAME_BYTES_MAX, Ranges, Reason,
-};
-use crate::session::frame::{Range, Verdict};
+use crate::session::frame::{BadFrame, GREETING_LENGTH_MAX, Hello, LENGTH_MAX, Message, NAME_BYTES_MAX, Reason};
 use crate::session::{ClientIndex, LOOK_EVERY_NS};
-use rohrpost_mailbox::Name;
 
 /// Who is refused has so long to read why.
 const LEAVE_WITHIN_NS: u64 = 5 * LOOK_EVERY_NS;
@@ -25,6 +21,9 @@ impl Server {
     pub fn received(&mut self, now_ns: u64, client: ClientIndex, mut bytes: &[u8], host: &mut impl Host) {
         let Some(member) = self.member_mut(client) else { return };
         member.heard_ns = now_ns;
+        if let RoundTrip::Since(welcomed_ns) = member.round_trip {
+            member.round_trip = RoundTrip::Takes(now_ns.saturating_sub(welcomed_ns));
+        }
         let mut splitter = std::mem::take(&mut member.splitter);
         loop {
             let length_max = match self.member(client).map(|member| member.state) {
@@ -52,7 +51,7 @@ impl Server {
         let Some(member) = self.member_mut(client) else { return };
         match (member.state, message) {
             (State::Greeting, Message::Hello(hello)) => self.greet(now_ns, client, hello, host),
-            (State::Member, Message::Register(ranges)) => self.register(client, *ranges, host),
+            (State::Member, Message::Register(ranges)) => self.register(now_ns, client, *ranges, host),
             (State::Member, Message::Package(carried)) => self.carry(now_ns, client, carried, host),
             (State::Member, Message::Ask(asked_ns)) => {
                 // Of several questions the last is answered: that bounds what waits.
@@ -111,25 +110,6 @@ impl Server {
             digests: (hello.system_digest, digest),
             holder: holder.to_owned(),
         })
-    }
-
-    fn register(&mut self, client: ClientIndex, ranges: Ranges<'_>, host: &mut impl Host) {
-        let Some(system) = self.member(client).map(|member| member.system) else { return };
-        let nothing = Range { first: Name::NONE, last: Name::NONE };
-        let mut verdict = Verdict { number: ranges.number, objection: None, range: nothing, holder: "" };
-        let mut holder = String::new();
-        if let Err(conflict) = self.table.register(client, system, ranges) {
-            verdict = Verdict { objection: Some(conflict.objection), range: conflict.range, ..verdict };
-            let held_by = conflict.holder.and_then(|holder| self.member(holder));
-            holder = held_by.map(|member| member.name.clone()).unwrap_or_default();
-        }
-        if let Some(member) = self.member_mut(client) {
-            if verdict.objection.is_some() {
-                host.event(Event::Objected { name: &member.name, verdict: &Verdict { holder: &holder, ..verdict } });
-            }
-            member.judged = Some(Judged { verdict, holder });
-        }
-        self.is_due(client);
     }
 
     fn refuse_bad(&mut self, now_ns: u64, client: ClientIndex, bad: BadFrame, host: &mut impl Host) {

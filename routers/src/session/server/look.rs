@@ -5,7 +5,8 @@ use super::{Event, Host, Server};
 use crate::broken::broken;
 use crate::session::counts::Cause;
 use crate::session::frame::Reason;
-use crate::session::{ClientIndex, FRAME_MAX_NS, GREETING_MAX_NS, LOOK_EVERY_NS, SILENT_AFTER_NS, STALLED_AFTER_NS};
+use crate::session::{ClientIndex, FRAME_MAX_NS, GREETING_MAX_NS, LOOK_EVERY_NS};
+use crate::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
 
 /// A look that comes so late says that the server stood still itself: that nothing was heard says nothing then.
 const STOOD_STILL_NS: u64 = 4 * LOOK_EVERY_NS;
@@ -31,13 +32,14 @@ impl Server {
                 self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.look(now_ns, Cause::Stale, ledger));
             }
         }
+        self.look_at_registrations(now_ns, host);
     }
 
     /// A member is none any more: nobody else waits for it from now on.
     pub(super) fn leave(&mut self, now_ns: u64, client: ClientIndex, why: Option<Reason>, host: &mut impl Host) {
         let Some(member) = self.member(client).filter(|member| member.is_member()) else { return };
         host.event(Event::Left { name: &member.name, why });
-        if !broken!(KeepsNames) {
+        if member.registrations.ranges > 0 && !broken!(KeepsNames) {
             self.table.remove(client);
         }
         if !broken!(ForgetsGone) {
@@ -49,14 +51,16 @@ impl Server {
 /// Why a client may not go on.
 fn objection(now_ns: u64, member: &Member) -> Option<(Reason, &'static str)> {
     let since = |past_ns: u64| now_ns.saturating_sub(past_ns);
+    let frame_ns = member.splitter.waits_since();
+    let silent_after_ns = if frame_ns.is_some() { SLOW_SILENT_AFTER_NS } else { SILENT_AFTER_NS };
     match member.state {
         State::Leaving { .. } => None,
         State::Greeting if broken!(GreetsForEver) => None,
         State::Greeting => (since(member.began_ns) > GREETING_MAX_NS).then_some((Reason::Silent, "no hello")),
-        State::Member if since(member.heard_ns) > SILENT_AFTER_NS && !broken!(WaitsForSilent) => {
+        State::Member if since(member.heard_ns) > silent_after_ns && !broken!(WaitsForSilent) => {
             Some((Reason::Silent, ""))
         }
-        State::Member if member.splitter.waits_since().is_some_and(|began_ns| since(began_ns) > FRAME_MAX_NS) => {
+        State::Member if frame_ns.is_some_and(|began_ns| since(began_ns) > FRAME_MAX_NS) => {
             Some((Reason::Silent, "a frame did not end"))
         }
         State::Member => (since(member.moved_ns) > STALLED_AFTER_NS).then_some((Reason::Stalled, "")),

@@ -1,5 +1,6 @@
 //! One connection, as the server knows it.
 
+use super::registering::Registrations;
 use crate::session::frame::{Hello, Reason, Verdict};
 use crate::session::outgoing::Outgoing;
 use crate::session::splitter::Splitter;
@@ -43,6 +44,18 @@ pub(super) struct Refused {
     pub(super) text: String,
 }
 
+/// The way there and back: a client says something as soon as it reads its welcome.
+#[derive(Clone, Copy, Default, Debug)]
+pub(super) enum RoundTrip {
+    /// There was no welcome.
+    #[default]
+    Unknown,
+    /// It left then, ns.
+    Since(u64),
+    /// It takes so long, ns.
+    Takes(u64),
+}
+
 #[derive(Debug)]
 pub(super) struct Member {
     pub(super) state: State,
@@ -58,8 +71,10 @@ pub(super) struct Member {
     pub(super) splitter: Splitter,
     pub(super) outgoing: Outgoing,
     pub(super) asked: Option<Asked>,
+    pub(super) registrations: Registrations,
     pub(super) judged: Option<Judged>,
     pub(super) refused: Option<Refused>,
+    pub(super) round_trip: RoundTrip,
     /// When the connection began, ns.
     pub(super) began_ns: u64,
     /// When something came last, ns.
@@ -86,8 +101,10 @@ impl Member {
             splitter: Splitter::default(),
             outgoing: Outgoing::new(quota_bytes),
             asked: None,
+            registrations: Registrations::default(),
             judged: None,
             refused: None,
+            round_trip: RoundTrip::default(),
             began_ns: now_ns,
             heard_ns: now_ns,
             moved_ns: now_ns,
@@ -127,6 +144,7 @@ impl Member {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of::<Self>() + self.name.capacity() + self.splitter.bytes() + self.outgoing.bytes()
+        let waiting = self.splitter.bytes() + self.registrations.bytes() + self.outgoing.bytes();
+        size_of::<Self>() + self.name.capacity() + waiting
     }
 }

@@ -10,6 +10,7 @@ mod carry;
 mod intake;
 mod look;
 mod member;
+mod registering;
 
 pub use member::State;
 
@@ -18,7 +19,8 @@ use super::counts::Counts;
 use super::frame::{Reason, Verdict};
 use super::table::Table;
 use super::{Answers, LOOK_EVERY_NS};
-use member::Member;
+use member::{Member, RoundTrip};
+use registering::Registering;
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
 
@@ -54,6 +56,8 @@ pub struct View<'a> {
     pub system: u8,
     /// Whether it takes part.
     pub is_member: bool,
+    /// Ranges of names that it hosts.
+    pub ranges: usize,
     /// When the connection was made, ns.
     pub began_ns: u64,
     /// When something came last, ns.
@@ -126,6 +130,7 @@ pub struct Server {
     counts: Counts,
     /// Clients for which something is to be done.
     due: VecDeque<ClientIndex>,
+    registering: Registering,
     time: Option<TimeRecord>,
     look_ns: u64,
     looked_ns: u64,
@@ -140,6 +145,7 @@ impl Server {
             table: Table::default(),
             counts: Counts::default(),
             due: VecDeque::new(),
+            registering: Registering::default(),
             time: None,
             look_ns: 0,
             looked_ns: 0,
@@ -154,6 +160,11 @@ impl Server {
     /// Who hosts what.
     pub fn table(&self) -> &Table {
         &self.table
+    }
+
+    /// Registrations that were never looked at, since the same client sent a later one before its turn.
+    pub fn overtaken(&self) -> u64 {
+        self.registering.overtaken
     }
 
     /// System time, as answers tell it from now on.
@@ -173,6 +184,7 @@ impl Server {
             name: &member.name,
             system: member.system,
             is_member: member.is_member(),
+            ranges: member.registrations.ranges,
             began_ns: member.began_ns,
             heard_ns: member.heard_ns,
             bytes: member.bytes(),
@@ -182,6 +194,19 @@ impl Server {
     /// Bytes of memory that a client takes up; what all share is not counted.
     pub fn bytes_of(&self, client: ClientIndex) -> usize {
         self.member(client).map_or(0, |member| member.bytes())
+    }
+
+    /// The way to a client and back, ns, as its first word after its welcome showed it.
+    pub fn round_trip_ns(&self, client: ClientIndex) -> Option<u64> {
+        match self.member(client)?.round_trip {
+            RoundTrip::Takes(ns) => Some(ns),
+            RoundTrip::Unknown | RoundTrip::Since(_) => None,
+        }
+    }
+
+    /// Packages that wait for clients.
+    pub fn waiting(&self) -> usize {
+        self.present().map(|(_, member)| member.outgoing.waiting()).sum()
     }
 
     /// A connection was made. `peer` is for people. None: so many are there that it must be closed.

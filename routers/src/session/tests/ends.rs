@@ -8,8 +8,8 @@ use crate::session::server::{self, Server, State};
 use crate::session::{Answers, Cause, ClientIndex, GREETING_MAX_NS, SILENT_AFTER_NS};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
 
-const MS: u64 = 1_000_000;
-const S: u64 = 1000 * MS;
+pub(super) const MS: u64 = 1_000_000;
+pub(super) const S: u64 = 1000 * MS;
 
 pub(super) const CHECKS: &[fn()] = &[
     check_digests,
@@ -25,10 +25,10 @@ pub(super) const CHECKS: &[fn()] = &[
 
 /// Notes all that is told.
 #[derive(Default)]
-struct Notes {
-    events: Vec<String>,
-    delivered: Vec<(Head, u8)>,
-    lost: Vec<Cause>,
+pub(super) struct Notes {
+    pub(super) events: Vec<String>,
+    pub(super) delivered: Vec<(Head, u8)>,
+    pub(super) lost: Vec<Cause>,
 }
 
 impl Answers for Notes {
@@ -61,29 +61,36 @@ impl server::Host for Notes {
 }
 
 /// A server, and clients that are joined to it without delay.
-struct Ground {
-    now_ns: u64,
-    server: Server,
-    said: Notes,
-    ends: Vec<(Client, Option<ClientIndex>, Notes)>,
+pub(super) struct Ground {
+    pub(super) now_ns: u64,
+    pub(super) server: Server,
+    pub(super) said: Notes,
+    pub(super) ends: Vec<(Client, Option<ClientIndex>, Notes)>,
 }
 
 impl Ground {
     fn new(clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>) -> Self {
+        Self::with_room((16, 4), clients)
+    }
+
+    pub(super) fn with_room(
+        (clients_max, greetings_max): (u16, u16),
+        clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
+    ) -> Self {
         let now_ns = 100 * S;
-        let server = Server::new(server_settings(5));
+        let server = Server::new(server::ServerSettings { clients_max, greetings_max, ..server_settings(5) });
         let end = |(settings, ranges)| (Client::new(settings, ranges, now_ns), None, Notes::default());
         let mut ground = Self { now_ns, server, said: Notes::default(), ends: clients.into_iter().map(end).collect() };
         ground.settle();
         ground
     }
 
-    fn clients(count: usize) -> Self {
+    pub(super) fn clients(count: usize) -> Self {
         Self::new((0..count).map(|client| (client_settings(client, 100 + client as u64), ranges(client))))
     }
 
     /// Until nobody has anything to do.
-    fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         for _ in 0..20 {
             for (client, place, notes) in &mut self.ends {
                 loop {
@@ -131,7 +138,7 @@ impl Ground {
         }
     }
 
-    fn send(&mut self, from: usize, to: Name, hops: u8) {
+    pub(super) fn send(&mut self, from: usize, to: Name, hops: u8) {
         let head = Head {
             to,
             from: module(from).with_local(1),
@@ -146,7 +153,7 @@ impl Ground {
         self.settle();
     }
 
-    fn delivered(&self, client: usize) -> Vec<Name> {
+    pub(super) fn delivered(&self, client: usize) -> Vec<Name> {
         self.ends[client].2.delivered.iter().filter(|(head, _)| head.kind.0 > 0).map(|(head, _)| head.to).collect()
     }
 }
@@ -288,11 +295,30 @@ fn check_to_all() {
     ground.send(0, Name::new(ALL_SYSTEMS, 41, 0, 0), 0);
     assert_eq!(ground.said.lost, []);
     assert_eq!(ground.server.counts().lost_for(Cause::NoRoute), 1);
+    // What only the sender's own system hosts reaches that without the server.
+    ground.send(0, Name::new(ALL_SYSTEMS, 103, 0, 0), 0);
+    assert_eq!(ground.server.counts().lost_for(Cause::NoRoute), 1);
 }
 
 #[test]
 fn what_goes_to_all_systems_comes_once_to_each() {
     check_to_all();
+}
+
+#[test]
+fn what_goes_to_all_systems_is_lost_where_its_own_node_hosts_the_name_and_nobody_is_there() {
+    let mut ground = Ground::clients(1);
+    let counts = |ground: &Ground| {
+        let class = ground.ends[0].0.out().class(Priority(60));
+        (class.packages.get(), class.passed.get(), class.lost(Cause::NoMailbox))
+    };
+    let (hosted, other, nobody) = (Name::new(1, 105, 0, 0), Name::new(1, 30, 0, 0), Err(NotDelivered::NoMailbox));
+    ground.ends[0].0.reached_itself(other, Priority(60), nobody);
+    assert_eq!(counts(&ground), (0, 0, 0), "another client hosts it, or nobody: the server counts that");
+    ground.ends[0].0.reached_itself(hosted, Priority(60), nobody);
+    assert_eq!(counts(&ground), (1, 0, 1));
+    ground.ends[0].0.reached_itself(other, Priority(60), Ok(()));
+    assert_eq!(counts(&ground), (2, 1, 1));
 }
 
 fn check_age() {

@@ -4,6 +4,7 @@ mod book;
 mod ends;
 mod pipe;
 mod plan;
+mod strain;
 mod world;
 
 use crate::broken::{Broken, with};
@@ -131,13 +132,31 @@ fn check_backoff() {
     }
 }
 
+#[test]
+fn a_slow_line_stays_up_however_large_the_packages_are() {
+    check_slow_line();
+}
+
+fn check_slow_line() {
+    for seed in 0..3 {
+        let mut world = World::new(Plan::slow(seed));
+        world.run(60 * S);
+        assert_eq!(world.book.problems, [""; 0]);
+        let large = |package: &&book::Posted| package.from == 0 && package.head.len > 30_000;
+        let left = world.book.packages.iter().filter(large).filter(|package| !package.said_lost).count();
+        assert!(left > 3, "{left} large packages left by the slow line");
+        assert_eq!(world.nodes[0].attempts, 1, "seed {seed}: one connection, all the time");
+        assert!(world.nodes[0].client.is_up());
+    }
+}
+
 /// Each mistake fails a check, or breaks a promise in some network.
 #[test]
 fn every_mistake_is_noticed() {
     let mut missed = Vec::new();
     for broken in Broken::SESSION {
         let fails = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
-        let by_check = CHECKS.iter().chain(&[check_backoff as fn()]).any(fails);
+        let by_check = CHECKS.iter().chain(strain::CHECKS).chain(&[check_backoff as fn(), check_slow_line]).any(fails);
         let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).book.problems.is_empty());
         let by_network = (!by_check).then(|| (0..SEEDS).find(breaks)).flatten();
         eprintln!("{broken:?}: check {by_check}, network {by_network:?}");

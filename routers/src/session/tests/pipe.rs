@@ -39,6 +39,11 @@ impl Pipe {
         }
     }
 
+    /// It holds no more than so many bytes.
+    pub(super) fn holding(self, bytes: usize) -> Self {
+        Self { capacity: bytes, ..self }
+    }
+
     pub(super) fn has_room(&self) -> bool {
         self.held < self.capacity
     }

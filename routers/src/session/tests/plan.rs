@@ -36,6 +36,8 @@ pub(super) struct Plan {
     pub(super) stalled: Option<usize>,
     /// Bytes a ms of each client's line.
     pub(super) lines: Vec<u64>,
+    /// What both kernels hold of the first client's line, bytes; none: much. Then nobody else sends.
+    pub(super) held_bytes: Option<usize>,
     /// Packages that all clients send together, a second.
     pub(super) per_s: u64,
 }
@@ -45,11 +47,17 @@ impl Plan {
         let mut chance = Chance::new(seed);
         let clients = chance.between(3, 7) as usize;
         let lines = (0..clients).map(|_| chance.scale(20, 100_000)).collect();
-        Self { seed, clients, calm: false, stalled: None, lines, per_s: chance.scale(100, 3000) }
+        Self { seed, clients, calm: false, stalled: None, lines, held_bytes: None, per_s: chance.scale(100, 3000) }
     }
 
     pub(super) fn calm(seed: u64) -> Self {
         Self { calm: true, lines: vec![100_000; 7], per_s: 500, ..Self::rough(seed) }
+    }
+
+    /// The first client's line takes 64 kbit/s, and holds what a kernel does that knows of it.
+    pub(super) fn slow(seed: u64) -> Self {
+        let lines = vec![8, 100_000, 100_000];
+        Self { clients: 3, lines, held_bytes: Some(8 * 1024), per_s: 30, ..Self::calm(seed) }
     }
 }
 

@@ -165,7 +165,8 @@ impl World {
 
     fn post_one(&mut self) {
         let posts = &mut self.posts;
-        let from = posts.below(self.nodes.len() as u64) as usize;
+        let senders = if self.plan.held_bytes.is_some() { 1 } else { self.nodes.len() };
+        let from = posts.below(senders as u64) as usize;
         let is_forged = posts.percent(2);
         let sender = if is_forged { (from + 1) % self.nodes.len() } else { from };
         let other = posts.below(self.nodes.len() as u64) as usize;
@@ -326,6 +327,9 @@ impl World {
         let line = self.plan.lines[index];
         let (up, down) = (node.chance.fork(), node.chance.fork());
         let (mut up, mut down) = (Pipe::new(up, line, self.plan.calm), Pipe::new(down, line, self.plan.calm));
+        if let Some(bytes) = self.plan.held_bytes.filter(|_| index == 0) {
+            (up, down) = (up.holding(bytes), down.holding(bytes));
+        }
         if self.plan.stalled == Some(index) && self.now_ns >= S {
             down.stalled_until_ns = u64::MAX;
         }

@@ -52,19 +52,37 @@ struct Seals {
     tally: Tally,
 }
 
+/// A datagram of time that was opened.
+enum Heard<'a> {
+    /// Of a life that is known to live.
+    Proven(FrameHead, &'a [u8]),
+    /// Of one that may be over.
+    Overheard(FrameHead, &'a [u8]),
+}
+
 impl Seals {
-    /// What was sealed to this node; all else is counted, and told of once a second at most.
+    /// What was sealed to this node; all else is counted, and told of once a second at most. `overhears`: whether it helps if its sender may not
+    /// live any more.
     fn open<'a>(
         &mut self,
         now_ns: u64,
         source: IpAddr,
         node: Option<NodeIndex>,
+        overhears: bool,
         datagram: &'a mut [u8],
-    ) -> Option<(FrameHead, &'a [u8])> {
-        let why = match self.opening.open(datagram) {
-            Ok(Opened::Frame(head, text)) => return Some((head, text)),
-            // A hello is for the other port: the one that opens says so.
-            Ok(Opened::Hello(..)) => Rejection::NotOurs,
+    ) -> Option<Heard<'a>> {
+        let opened = if overhears && self.opening.is_strange(datagram) {
+            self.opening.overhear(datagram).map(|(head, text)| Heard::Overheard(head, text))
+        } else {
+            match self.opening.open(datagram) {
+                Ok(Opened::Frame(head, text)) => Ok(Heard::Proven(head, text)),
+                // A hello is for the other port: the one that opens says so.
+                Ok(Opened::Hello(..)) => Err(Rejection::NotOurs.into()),
+                Err(why) => Err(why),
+            }
+        };
+        let why = match opened {
+            Ok(heard) => return Some(heard),
             Err(NotOpened::Rejected(why)) => why,
             Err(NotOpened::Bad(BadFrame::Version(_))) => Rejection::Version,
             Err(NotOpened::Bad(_)) => return None,
@@ -104,13 +122,18 @@ impl Works {
 
     /// From now on it seals what it sends, and takes only what is sealed to it, if there is something to seal with.
     pub(in crate::shell) fn sealed(self, all: Option<&Arc<Acquaintances>>) -> Self {
+        self.sealing(all, |all| Sealing::new(all, Port::Time))
+    }
+
+    /// The same in time slots.
+    pub(in crate::shell) fn sealed_in_slots(self, all: Option<&Arc<Acquaintances>>) -> Self {
+        self.sealing(all, Sealing::of_slots)
+    }
+
+    fn sealing(self, all: Option<&Arc<Acquaintances>>, sealing: impl Fn(&Arc<Acquaintances>) -> Sealing) -> Self {
         let Some(all) = all else { return self };
-        let seals = Seals {
-            sealing: Sealing::new(all, Port::Time),
-            opening: Opening::new(all, Port::Time),
-            tally: Tally::new(all.rejections(Port::Time)),
-        };
-        Self { socket: self.socket.sealed(), seals: Some(seals), ..self }
+        let (opening, tally) = (Opening::new(all, Port::Time), Tally::new(all.rejections(Port::Time)));
+        Self { socket: self.socket.sealed(), seals: Some(Seals { sealing: sealing(all), opening, tally }), ..self }
     }
 
     /// From now on its clock goes by the rules of time slots.
@@ -198,13 +221,17 @@ impl Works {
     }
 
     fn hand(&mut self, now_ns: u64, source: IpAddr, stamp: Stamp, datagram: &mut [u8]) {
+        let overhears = self.clock.overhears(now_ns);
         let opened = match &mut self.seals {
-            None => FrameHead::parse(datagram).ok(),
-            Some(seals) => seals.open(now_ns, source, self.socket.node_at(source), datagram),
+            None => FrameHead::parse(datagram).ok().map(|(head, rest)| Heard::Proven(head, rest)),
+            Some(seals) => seals.open(now_ns, source, self.socket.node_at(source), overhears, datagram),
         };
         let taken = match opened {
-            Some((head, rest)) if self.socket.is_from(head.from, source) => {
+            Some(Heard::Proven(head, rest)) if self.socket.is_from(head.from, source) => {
                 self.clock.handle(now_ns, stamp, &head, rest).is_ok()
+            }
+            Some(Heard::Overheard(head, rest)) if self.socket.is_from(head.from, source) => {
+                self.clock.overhear(now_ns, stamp, &head, rest).is_ok()
             }
             _ => false,
         };

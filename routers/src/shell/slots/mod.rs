@@ -15,6 +15,7 @@ mod alarm;
 mod granted;
 mod held;
 mod intake;
+mod line;
 mod speech;
 mod state;
 
@@ -24,21 +25,22 @@ pub use state::{Snapshot, State, Used, WINDOWS};
 use super::answers::Answers;
 use super::clock::{ClockState, Works};
 use super::departures::{Departures, Wire};
-use super::socket::InSocket;
 use super::threads::Shared;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::outbound::Outbound;
+use crate::security::Said;
+use crate::stats::Stats;
 use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Permit, Planned, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
 use held::Held;
 use intake::Intake;
+pub(super) use line::Line;
 use rohrpost_config::Network;
 use rohrpost_config::wire::HAND_OVER;
 use rohrpost_mailbox::{Name, monotonic_ns};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc;
 
 /// It wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it wakes
 /// up 50 µs late on average, and to read takes 30 µs.
@@ -61,19 +63,20 @@ const MAKING_NS: u64 = 10_000;
 const _: () = assert!(MAKING_NS < HAND_OVER.as_nanos() as u64, "bounds have room for it");
 /// Room for the longest refusal.
 pub(super) const REFUSAL_BYTES: usize = 128;
-/// Refusals that wait for a slot; more are lost, and said again a second later.
-pub(super) const REFUSALS: usize = 8;
+/// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a second later.
+pub(super) const ANSWERS: usize = 32;
 
 /// How long before the call the thread that sends in time slots is to wake up, ns; then it spins.
 pub fn spin_ns(cycle_ns: u64) -> u64 {
     SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)
 }
 
-/// A refusal that the thread that receives wants to have sent.
-pub(super) struct Refusal {
-    pub(super) to: IpAddr,
-    pub(super) bytes: usize,
-    pub(super) datagram: [u8; REFUSAL_BYTES],
+/// What the thread that receives wants to have sent.
+pub(super) enum Answer {
+    /// Where nothing is sealed: to whom another configuration or version is refused.
+    Refusal { to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES] },
+    /// Where all is sealed.
+    Hello { said: Said, datagram: [u8; REFUSAL_BYTES] },
 }
 
 /// Whose thread it is.
@@ -86,17 +89,15 @@ pub(super) struct Own {
 /// What the thread has.
 pub(super) struct Slots {
     shared: Arc<Shared>,
+    /// In which the thread that receives counts.
+    stats: Arc<Stats>,
     works: Works,
     discipline: Discipline,
     intake: Intake,
     outbound: Outbound,
     answers: Answers,
     wire: Wire,
-    /// By which refusals leave.
-    socket: Arc<InSocket>,
-    refusals: mpsc::Receiver<Refusal>,
-    /// The refusal whose turn is next.
-    refusal: Option<Refusal>,
+    line: Line,
     /// Room for the largest datagram.
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
@@ -126,15 +127,8 @@ struct First {
 
 impl Slots {
     /// From what would send as packages come.
-    pub(super) fn new(
-        own: Own,
-        departures: Departures,
-        works: Works,
-        discipline: Discipline,
-        socket: Arc<InSocket>,
-        refusals: mpsc::Receiver<Refusal>,
-    ) -> Self {
-        let Departures { shared, transit, outbound, answers, wire, datagram, .. } = departures;
+    pub(super) fn new(own: Own, departures: Departures, works: Works, discipline: Discipline, line: Line) -> Self {
+        let Departures { shared, transit, outbound, answers, wire, datagram, stats, .. } = departures;
         let snapshot = Snapshot {
             counts: Counts::default(),
             silent: discipline.silent(),
@@ -146,15 +140,14 @@ impl Slots {
         let state = Arc::new(State::new(snapshot));
         Self {
             shared,
+            stats,
             works,
             discipline,
             intake: Intake::new(transit),
             outbound,
             answers,
             wire,
-            socket,
-            refusals,
-            refusal: None,
+            line,
             datagram,
             held: None,
             own,
@@ -217,6 +210,7 @@ impl Slots {
         let now_ns = monotonic_ns();
         self.tidied_ns = now_ns;
         self.drop_if_old();
+        self.line.look(now_ns);
         self.outbound.tidy(now_ns, &mut self.answers);
         let left_ns = || wake_ns.saturating_sub(self.works.now_ns());
         self.intake.relieve(&mut self.outbound, &mut self.answers, left_ns);
@@ -229,7 +223,7 @@ impl Slots {
 
     /// Hands all datagrams of time and stamps that came to the clock, and shows how it stands.
     fn look(&mut self) {
-        let Self { works, discipline, first, snapshot, looked_ns, state, .. } = self;
+        let Self { stats, works, discipline, first, snapshot, looked_ns, state, .. } = self;
         works.take(|id, stamp| {
             let Some(First { called_ns, begin_ns, .. }) = first.take_if(|first| first.id == id) else { return };
             discipline.left(called_ns, stamp);
@@ -239,6 +233,7 @@ impl Slots {
             }
         });
         let now_ns = works.now_ns();
+        works.clock.hears_by(stats, monotonic_ns(), now_ns);
         // Roles and bounds go on with time; there is nothing to be sent.
         let _ = works.clock.poll_in(now_ns, Allowed::Nothing, &mut [0; TIME_BYTES]);
         works.publish();
@@ -268,8 +263,10 @@ impl Slots {
     fn send(&mut self, mut permit: Permit, called_ns: u64) {
         self.first = None;
         self.send_time(&mut permit, called_ns);
+        if permit.carries_hello() {
+            self.answer(&mut permit);
+        }
         if permit.carries == Carries::All {
-            self.refuse(&mut permit);
             self.send_packages(&mut permit);
             self.tell_tunnel();
         }
@@ -330,15 +327,17 @@ impl Slots {
         }
     }
 
-    /// One in a slot: whoever brings refusals about must not take the slots of packages.
-    fn refuse(&mut self, permit: &mut Permit) {
-        self.refusal = self.refusal.take().or_else(|| self.refusals.try_recv().ok());
-        let now_ns = self.works.now_ns();
-        if let Some(Refusal { to, bytes, datagram }) =
-            self.refusal.take_if(|refusal| permit.fits(now_ns, refusal.bytes))
-        {
+    /// One in a slot: whoever brings refusals or hellos about must not take the slots of packages.
+    fn answer(&mut self, permit: &mut Permit) {
+        let (now_ns, asks) = (self.works.now_ns(), permit.carries == Carries::Hello);
+        let overheard = if asks { self.works.clock.overheard(now_ns) } else { None };
+        let first = overheard.map(|(from, _)| from);
+        let fits = |bytes| permit.fits(now_ns, bytes);
+        if let Some(bytes) = self.line.answer(monotonic_ns(), first, fits) {
             permit.takes(now_ns, bytes);
-            self.socket.answer(to, &datagram[..bytes]);
+            if asks {
+                self.works.clock.asked_overheard(now_ns);
+            }
         }
     }
 

@@ -6,6 +6,7 @@
 //!                   └ sleep ─┘      └──┘  deliver ─▶ mailboxes
 //! ```
 
+mod time;
 mod voice;
 
 use super::desk::Desk;
@@ -29,6 +30,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use time::Time;
 use voice::Voice;
 
 /// Packages taken from the mailbox before the socket has its turn.
@@ -73,6 +75,8 @@ pub struct ClientParts<'a> {
     pub access: Access,
     /// Its certificates; none: nothing is sealed.
     pub seal: Option<ClientSeal>,
+    /// Whether the node's system time is what the server tells.
+    pub keeps_time: bool,
 }
 
 /// A client at work; dropped, it ends. What waits in its mailbox stays there.
@@ -95,12 +99,13 @@ impl ClientShell {
     /// # Errors
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
-        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal } = parts;
+        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal, keeps_time } = parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
         let watches = Watches::new(&participant).map_err(ClientError::Watches)?;
         node.set_routes_beyond(via, &beyond)?;
+        let time = keeps_time.then(|| Time::new(node)).transpose()?;
         let (shared, system) = (Arc::new(Shared::default()), settings.system);
         let ranges = hosts.into_iter().map(|(first, last)| Range { first, last }).collect();
         let work = Work {
@@ -115,6 +120,7 @@ impl ClientShell {
             ),
             system,
             seal,
+            time,
             mailbox,
             watches,
             connection: None,
@@ -163,6 +169,8 @@ struct Work {
     /// First byte of the names of its node.
     system: u8,
     seal: Option<ClientSeal>,
+    /// Of the node, if the server tells it.
+    time: Option<Time>,
     mailbox: Receiver,
     watches: Watches,
     connection: Option<Connection>,
@@ -173,6 +181,8 @@ impl Work {
     /// Until the node ends.
     fn run(mut self) {
         let mut say_ns = 0;
+        // Whether it has written since it last looked at the socket.
+        let mut has_written = false;
         while !self.shared.ends.load(Ordering::Acquire) {
             let more = self.take();
             let now_ns = monotonic_ns();
@@ -184,12 +194,18 @@ impl Work {
                 Output::Connect => self.connect(now_ns),
                 Output::Write => {
                     self.write();
-                    // However much there is to send, what comes has its turn.
-                    self.watches.look();
+                    // However much there is to send, what comes has its turn; who sends one package looks when it sleeps.
+                    if has_written {
+                        self.watches.look();
+                    }
+                    has_written = !has_written;
                 }
                 Output::Close => self.forget(),
                 Output::Wait { .. } if more => self.watches.look(),
-                Output::Wait { until_ns } => self.sleep(until_ns.min(say_ns)),
+                Output::Wait { until_ns } => {
+                    self.sleep(until_ns.min(say_ns));
+                    has_written = false;
+                }
             }
             while let Some(ready) = self.watches.next_ready() {
                 if ready.writable {
@@ -209,7 +225,9 @@ impl Work {
             let (head, published_ns, body) = (*waiting.head(), waiting.published_ns(), waiting.body());
             if head.to.system() == ALL_SYSTEMS {
                 // Its own system is one of them. What is not on this node another client brings there.
-                let _ = self.voice.ways.send(&Head { to: in_system(head.to, self.system), ..head }, body);
+                let to = in_system(head.to, self.system);
+                let own = self.voice.ways.send(&Head { to, ..head }, body);
+                self.client.reached_itself(to, head.priority, own.map_err(Into::into));
             }
             self.client.send(monotonic_ns(), &Package { head, body, published_ns, hops: 0 }, &mut self.voice);
         }
@@ -287,6 +305,8 @@ impl Work {
             Moved::Over(error) => return self.broke(error.as_ref()),
         }
         if !all {
+            self.client.set_slow(connection.stream.is_slow());
+            connection.stream.set_round_trip(self.client.round_trip_ns());
             self.await_room(true);
         }
     }
@@ -321,20 +341,25 @@ impl Work {
         }
     }
 
-    fn say(&self, now_ns: u64) {
+    fn say(&mut self, now_ns: u64) {
         let client = &self.client;
+        if let Some(time) = &mut self.time {
+            time.told(now_ns, client.system_time(now_ns), client.answers());
+        }
         let state = match (client.is_up(), client.is_connected()) {
             (true, _) => LinkState::Up,
             (false, true) => LinkState::Joining,
             (false, false) => LinkState::Away,
         };
-        let time = client.system_time(now_ns).map(|record| record.at(now_ns).error);
+        let told = client.system_time(now_ns).map(|record| record.at(now_ns).error);
         self.shared.seen.say(Link {
             state,
             why: self.voice.why.clone(),
             connections: client.connections(),
             round_trip_ns: client.round_trip_ns(),
-            time_error_ns: time.map(|error| u64::try_from(error.as_nanos()).unwrap_or(u64::MAX)),
+            time_error_ns: told.map(|error| u64::try_from(error.as_nanos()).unwrap_or(u64::MAX)),
+            outage: self.voice.outage,
+            time: self.time.as_ref().map(|time| *time.record()),
             waiting_bytes: client.bytes() as u64,
             out: Class::all(client.out()),
             inn: Class::all(client.inn()),

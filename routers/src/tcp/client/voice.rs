@@ -7,7 +7,8 @@ use crate::session::frame::Carried;
 use crate::session::{Answers, Cause};
 use crate::shell::ways::Ways;
 use crate::tcp::desk::Desk;
-use rohrpost_mailbox::SendError;
+use crate::tcp::seen::Outage;
+use rohrpost_mailbox::{SendError, monotonic_ns};
 use std::net::SocketAddr;
 
 /// Delivers, answers, and says what happens.
@@ -20,11 +21,12 @@ pub(super) struct Voice {
     pub(super) why: String,
     /// The server has said that, or what it said is why.
     by_server: bool,
+    pub(super) outage: Outage,
 }
 
 impl Voice {
     pub(super) fn new(server: SocketAddr, ways: Ways, desk: Desk, access: Access) -> Self {
-        Self { server, ways, desk, access, why: String::new(), by_server: false }
+        Self { server, ways, desk, access, why: String::new(), by_server: false, outage: Outage::default() }
     }
 
     /// Says once why the server is not there.
@@ -70,9 +72,11 @@ impl Host for Voice {
         match event {
             Event::Up => {
                 self.why.clear();
+                self.outage.ends(monotonic_ns());
                 tracing::info!("takes part at the TCP router at {server}");
             }
             Event::Down => {
+                self.outage.begins(monotonic_ns());
                 self.says(format!("takes part at the TCP router at {server} no more; it tries again"), false)
             }
             Event::Refused(refusal) => {

@@ -5,8 +5,9 @@
 mod voice;
 
 use super::desk::Desk;
+use super::hush::Topic;
 use super::seal::{Holder, ServerSeal};
-use super::seen::{Class, Member, Members, SAY_EVERY_NS, Seen};
+use super::seen::{Class, HOSTS_MAX, MEMBERS_MAX, Member, Members, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::session::ClientIndex;
 use crate::session::server::{Output, Server, ServerSettings, View};
@@ -214,6 +215,7 @@ impl Work {
                 say_ns = now_ns + SAY_EVERY_NS;
                 self.parting.retain(|(until_ns, _)| now_ns < *until_ns);
                 self.server.set_time(self.clock.record());
+                self.host.says_held(now_ns);
                 self.say(now_ns);
             }
             if self.accept_ns.take_if(|at_ns| now_ns >= *at_ns).is_some() {
@@ -269,7 +271,8 @@ impl Work {
             Moved::Over(_) => self.broke(client),
             Moved::Nothing => drop(self.flush(client)),
             Moved::Bytes(_) if is_new && !self.is_known(client) => {
-                let error = io::Error::other("its certificate names no node; make new ones with `rohrpost certify`");
+                let error =
+                    io::Error::other("its certificate names no node; make new ones with `rohrpost keys rotate`");
                 self.unsealed(client, &error);
             }
             Moved::Bytes(bytes) => {
@@ -297,7 +300,7 @@ impl Work {
         else {
             return;
         };
-        self.host.refuses(format!("{peer} may not take part: {error}"));
+        self.host.refuses(Topic::Unsealed, format!("{peer} may not take part: {error}"));
         stream.end();
         // Closed when the place is needed, or the time is over; until then nothing is asked of it.
         if self.epoll.delete(&stream).is_ok() && self.parting.len() < PARTING_MAX {
@@ -328,6 +331,7 @@ impl Work {
             Moved::Over(_) => return self.broke(client),
         }
         if !all {
+            connection.stream.set_round_trip(self.server.round_trip_ns(client));
             self.await_room(client, true);
         }
     }
@@ -357,7 +361,9 @@ impl Work {
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
                 Err(error) => {
-                    tracing::warn!("cannot accept a connection: {error}; raise the limit of open files (ulimit -n)");
+                    let line =
+                        format!("cannot accept a connection: {error}; raise the limit of open files (ulimit -n)");
+                    self.host.says(Topic::Accept, &line);
                     self.accept_ns = Some(now_ns + ACCEPT_AGAIN_NS);
                     return self.listen_for(EpollFlags::empty());
                 }
@@ -400,6 +406,11 @@ impl Work {
     }
 
     fn say(&self, now_ns: u64) {
+        let mut hosts = vec![Vec::new(); self.connections.len()];
+        for (client, range) in self.server.table().hosted() {
+            let hosts = hosts.get_mut(usize::from(client.0)).filter(|hosts| hosts.len() < HOSTS_MAX);
+            hosts.into_iter().for_each(|hosts| hosts.push((range.first, range.last)));
+        }
         let member = |client: View<'_>| Member {
             name: client.name.to_owned(),
             peer: self
@@ -409,16 +420,20 @@ impl Work {
                 .map_or_else(String::new, |c| c.peer.clone()),
             system: client.system,
             is_member: client.is_member,
-            ranges: self.server.table().ranges_of(client.index).count() as u64,
+            ranges: client.ranges as u64,
+            hosts: hosts.get_mut(usize::from(client.index.0)).map(std::mem::take).unwrap_or_default(),
             age_ns: now_ns.saturating_sub(client.began_ns),
             heard_ns: now_ns.saturating_sub(client.heard_ns),
             bytes: client.bytes as u64,
         };
         let classes = Class::all(self.server.counts());
         let Voice { left, refused, ref refusal, .. } = self.host;
-        let refusal = refusal.clone();
-        let members = self.server.views().map(member).collect();
-        self.shared.seen.say(Members { members, left, refused, refusal, classes });
+        let (refusal, held) = (refusal.clone(), self.host.held());
+        let overtaken = self.server.overtaken();
+        let mut views = self.server.views();
+        let members = views.by_ref().take(MEMBERS_MAX).map(member).collect();
+        let more = views.count() as u64;
+        self.shared.seen.say(Members { members, more, left, refused, refusal, overtaken, held, classes });
     }
 }
 

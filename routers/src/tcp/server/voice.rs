@@ -4,10 +4,13 @@ use crate::session::frame::Reason;
 use crate::session::server::{Event, Host};
 use crate::session::{Answers, Cause};
 use crate::tcp::desk::Desk;
+use crate::tcp::hush::{Hush, Topic};
+use rohrpost_mailbox::monotonic_ns;
 
 /// Says what happens, and answers for who is not reached.
 pub(super) struct Voice {
     desk: Desk,
+    hush: Hush,
     /// Clients that took part and do not any more.
     pub(super) left: u64,
     /// Connections that might not take part.
@@ -18,14 +21,41 @@ pub(super) struct Voice {
 
 impl Voice {
     pub(super) fn new(desk: Desk) -> Self {
-        Self { desk, left: 0, refused: 0, refusal: String::new() }
+        Self { desk, hush: Hush::default(), left: 0, refused: 0, refusal: String::new() }
     }
 
     /// Says and keeps why one may not take part.
-    pub(super) fn refuses(&mut self, refusal: String) {
-        tracing::warn!("{refusal}");
+    pub(super) fn refuses(&mut self, topic: Topic, refusal: String) {
+        self.says(topic, &refusal);
         self.refused += 1;
         self.refusal = refusal;
+    }
+
+    /// Says it, unless there was such a line a moment ago.
+    pub(super) fn says(&mut self, topic: Topic, line: &str) {
+        if let Some(line) = self.hush.line(monotonic_ns(), topic, line) {
+            tell(topic, &line);
+        }
+    }
+
+    /// Says what was held back, as far as it is time.
+    pub(super) fn says_held(&mut self, now_ns: u64) {
+        while let Some((topic, line)) = self.hush.next_held(now_ns) {
+            tell(topic, &line);
+        }
+    }
+
+    /// Lines held back so far.
+    pub(super) fn held(&self) -> u64 {
+        self.hush.held
+    }
+}
+
+fn tell(topic: Topic, line: &str) {
+    match topic {
+        Topic::Joined | Topic::Left(None) => tracing::info!("{line}"),
+        Topic::Left(Some(Reason::Ending)) => tracing::debug!("{line}"),
+        _ => tracing::warn!("{line}"),
     }
 }
 
@@ -38,30 +68,32 @@ impl Answers for Voice {
 impl Host for Voice {
     fn event(&mut self, event: Event<'_>) {
         match event {
-            Event::Joined { name } => tracing::info!("{name} takes part"),
-            Event::Left { name, why: None } => {
+            Event::Joined { name } => self.says(Topic::Joined, &format!("{name} takes part")),
+            Event::Left { name, why } => {
                 self.left += 1;
-                tracing::info!("{name} takes part no more: its connection is closed");
-            }
-            Event::Left { name, why: Some(Reason::Ending) } => {
-                self.left += 1;
-                tracing::debug!("{name} is told that the TCP router ends");
-            }
-            Event::Left { name, why: Some(why) } => {
-                self.left += 1;
-                tracing::warn!("{name} takes part no more: {}", why.word());
+                let line = match why {
+                    None => format!("{name} takes part no more: its connection is closed"),
+                    Some(Reason::Ending) => format!("{name} is told that the TCP router ends"),
+                    Some(why) => format!("{name} takes part no more: {}", why.word()),
+                };
+                self.says(Topic::Left(why), &line);
             }
             Event::Refused { reason: Reason::Ending, .. } => {}
-            Event::Refused { name, reason, digests: (theirs, ours), text } => self.refuses(match reason {
-                Reason::Common | Reason::System => format!(
-                    "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
-                     (`rohrpost check`, on both)",
-                    reason.word()
-                ),
-                _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),
-                _ => format!("{name} may not take part: {}: {text}", reason.word()),
-            }),
-            Event::Objected { name, verdict } => tracing::warn!("{name} may not host what it says: {verdict}"),
+            Event::Refused { name, reason, digests: (theirs, ours), text } => {
+                let refusal = match reason {
+                    Reason::Common | Reason::System => format!(
+                        "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
+                         (`rohrpost check`, on both)",
+                        reason.word()
+                    ),
+                    _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),
+                    _ => format!("{name} may not take part: {}: {text}", reason.word()),
+                };
+                self.refuses(Topic::Refused(reason), refusal);
+            }
+            Event::Objected { name, verdict } => {
+                self.says(Topic::Objected, &format!("{name} may not host what it says: {verdict}"));
+            }
         }
     }
 }

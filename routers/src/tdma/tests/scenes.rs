@@ -136,6 +136,49 @@ pub(super) fn a_master_of_which_two_syncs_are_missing_remains_it() {
     }
 }
 
+#[test]
+fn who_wakes_up_late_in_its_window_of_synchronisation_synchronises() {
+    for (late_us, sends) in [(110, true), (170, false)] {
+        let mut world = agreed(7);
+        let counts = world.counts(0);
+        for _ in 0..2 {
+            // The window is 150 µs long without its guard.
+            world.wakes_late_to_synchronise(0, late_us * US);
+            world.run(CYCLE / 2);
+        }
+        let (late, stood_in) = (world.counts(0), world.counts(1).syncs.replacements_sent);
+        let synchronised = (late.syncs.sent - counts.syncs.sent, late.synchronisations_late, stood_in > 0);
+        assert_eq!(
+            synchronised,
+            if sends { (2, 0, false) } else { (0, 2, true) },
+            "{late_us} µs late: {}",
+            tell(&world)
+        );
+        world.run(SECOND);
+        holds(&world, 7);
+    }
+}
+
+#[test]
+fn a_master_whose_packages_come_lives() {
+    for seed in seeds() {
+        let mut world = agreed(seed);
+        let term = world.clock(0).term();
+        (world.cut[0][1], world.packages_come) = (true, true);
+        world.run(10 * CYCLE);
+        assert_eq!(
+            (world.clock(1).term(), world.clock(1).role()),
+            (term, Role::Slave),
+            "seed {seed}: {}",
+            tell(&world)
+        );
+        assert!(world.counts(1).syncs.replacements_sent >= 9, "seed {seed}: its Syncs are missing all the same");
+        world.packages_come = false;
+        let reigns = |world: &World| world.clock(1).role() == Role::Master;
+        assert!(world.run_until(4 * CYCLE, reigns), "seed {seed}: nothing comes any more: {}", tell(&world));
+    }
+}
+
 pub(super) fn two_masters_become_one() {
     for seed in seeds() {
         let mut world = agreed(seed);

@@ -2,7 +2,7 @@
 
 use super::world::{CYCLE, MASTERS, SECOND, US, table};
 use crate::frame::{FrameHead, Kind as Frame};
-use crate::tdma::{Carries, Discipline, LATE_NS, Next, Permit, Planned, Silent, Verdict};
+use crate::tdma::{Carries, Discipline, GATE_NS, LATE_NS, Next, Permit, Planned, Silent, Verdict};
 use crate::time::message::{Message, Reply, Sync};
 use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
@@ -135,7 +135,7 @@ fn a_node_listens_then_asks_then_sends() {
 
 pub(super) fn what_is_late_is_not_sent() {
     for (after_ns, sends) in
-        [(-1, None), (0, Some(true)), (LATE_NS as i64, Some(true)), (LATE_NS as i64 + 1, Some(false))]
+        [(-1, None), (0, Some(true)), (GATE_NS as i64, Some(true)), (GATE_NS as i64 + 1, Some(false))]
     {
         let mut one = Lonely::joined();
         let (_, verdict) = one.judged(after_ns);
@@ -239,7 +239,7 @@ fn slots_that_went_by_are_counted() {
     let mut one = Lonely::joined();
     one.judged(0);
     let before = one.discipline.counts(&one.clock);
-    one.now_ns += 3 * CYCLE + 2 * LATE_NS;
+    one.now_ns += 3 * CYCLE + 2 * GATE_NS;
     one.discipline.next(one.now_ns, &one.clock);
     let counts = one.discipline.counts(&one.clock);
     // Three cycles have three slots, and one that is there in each third.

@@ -2,7 +2,9 @@
 //! wire when, and whether two were at once.
 
 use crate::frame::{FrameHead, NodeIndex};
-use crate::tdma::{Carries, Counts, Discipline, Next, Planned, Silent, Table, Verdict};
+use crate::harness::settings;
+use crate::stats::Stats;
+use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Planned, Silent, Table, Verdict};
 use crate::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -78,6 +80,7 @@ pub(super) struct One {
     came: VecDeque<Letter>,
     /// It stands still until then.
     pub(super) frozen_until: u64,
+    incarnation: u64,
 }
 
 impl One {
@@ -101,7 +104,10 @@ pub(super) struct World {
     pub(super) now: u64,
     pub(super) nodes: Vec<One>,
     pub(super) wire: Vec<OnWire>,
+    /// Between whom no datagrams of time pass.
     pub(super) cut: [[bool; 3]; 3],
+    /// Whether packages come to all others, also where no datagrams of time pass.
+    pub(super) packages_come: bool,
     /// Two that were on the wire at once.
     pub(super) collisions: Vec<(OnWire, OnWire)>,
     /// Moments at which some node sent packages by a time that may be too far off.
@@ -124,13 +130,16 @@ impl World {
             planned: None,
             came: VecDeque::new(),
             frozen_until: 0,
+            incarnation: 0,
         });
         let nodes = nodes.collect();
         let (wire, collisions) = (Vec::new(), Vec::new());
-        Self { now: SECOND, nodes, wire, cut: [[false; 3]; 3], collisions, unsure: 0, stalls: 0, random }
+        let (cut, packages_come) = ([[false; 3]; 3], false);
+        Self { now: SECOND, nodes, wire, cut, packages_come, collisions, unsure: 0, stalls: 0, random }
     }
 
     pub(super) fn start(&mut self, node: NodeIndex) {
+        let incarnation = self.random.random_range(1..u64::MAX);
         let settings = TimeSettings {
             system: 1,
             own: node,
@@ -138,7 +147,7 @@ impl World {
             masters: MASTERS.to_vec(),
             interval: Duration::from_nanos(CYCLE),
             digest: 7,
-            incarnation: self.random.random_range(1..u64::MAX),
+            incarnation,
         };
         let wall_ns = WALL_NS + self.random.random_range(0..SECOND) + self.now;
         let one = &mut self.nodes[usize::from(node)];
@@ -146,7 +155,7 @@ impl World {
         let clock = Clock::new(settings, one.local_ns(self.now), wall_ns, one.page).in_slots(table.for_clock());
         one.clock = Some(clock);
         one.discipline = Discipline::new(table, 0);
-        (one.wakes, one.planned) = (self.now, None);
+        (one.wakes, one.planned, one.incarnation) = (self.now, None, incarnation);
         one.came.clear();
     }
 
@@ -166,6 +175,18 @@ impl World {
         let shows_ns = one.local_ns(now);
         one.rate_ppb += by_ppb;
         one.offset_ns -= one.local_ns(now) - shows_ns;
+    }
+
+    /// Stands still from shortly before its next window of synchronisation until so much after its beginning.
+    pub(super) fn wakes_late_to_synchronise(&mut self, node: NodeIndex, late_ns: u64) {
+        let window = |world: &Self| {
+            let planned = world.nodes[usize::from(node)].planned;
+            planned.filter(|planned| matches!(planned.window.kind, Kind::Synchronisation { .. }))
+        };
+        assert!(self.run_until(2 * CYCLE, |world| window(world).is_some()), "it has to synchronise");
+        let begin_ns = window(self).map_or(0, |planned| planned.begin_ns);
+        let one = &mut self.nodes[usize::from(node)];
+        one.frozen_until = one.true_ns(begin_ns) + late_ns;
     }
 
     pub(super) fn clock(&self, node: NodeIndex) -> &Clock {
@@ -297,9 +318,25 @@ impl World {
                 break;
             }
             permit.takes(local_ns, DATAGRAM_BYTES);
-            self.put(node, DATAGRAM_BYTES, &mut free, false);
+            let frame = self.put(node, DATAGRAM_BYTES, &mut free, false);
+            self.packages_come_to_others(&frame);
         }
         self.nodes[usize::from(node)].discipline.close(&permit);
+    }
+
+    fn packages_come_to_others(&mut self, frame: &OnWire) {
+        let incarnation = self.nodes[usize::from(frame.from)].incarnation;
+        let others = self.nodes.iter_mut().zip(0..).filter(|(_, node)| *node != frame.from && self.packages_come);
+        for (one, node) in others {
+            let local_ns = one.local_ns(frame.end);
+            let packages = Stats::new(&settings(node, 3), 0);
+            let link = &packages.peer(frame.from).link;
+            link.incarnation.set(incarnation);
+            link.heard_ns.set(local_ns);
+            if let Some(clock) = &mut one.clock {
+                clock.hears_by(&packages, local_ns, local_ns);
+            }
+        }
     }
 
     /// Hands a datagram to the wire, which it reaches some µs later; and looks who else is there.

@@ -85,7 +85,7 @@ impl Clock {
         let master_by_kernel = reply.sync_by_kernel && reply.request_by_kernel;
         exchange.by_kernel = master_by_kernel && exchange.sync_came.by_kernel && exchange.request_left.by_kernel;
         self.election.reply(reply.epoch, reply.error_ns, received.ns);
-        self.speaks_in_slots(received, head);
+        self.hears(head.from, head.incarnation, received.ns);
         let doubt_ns = exchange.sync_came.doubt_ns.max(exchange.request_left.doubt_ns);
         let sample =
             sample(&exchange, u64::from(doubt_ns) + u64::from(reply.doubt_ns)).ok_or(Ignored::NegativeDelay)?;

@@ -6,10 +6,12 @@
 use super::{Clock, Draft};
 use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
+use crate::stats::Stats;
 use crate::time::coarse::Coarse;
 use crate::time::election::{Followed, Origin, State};
 use crate::time::line::EVEN_PPB;
 use crate::time::message::{Request, Sync};
+use crate::time::overheard::Overheard;
 use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES, Term};
 use rohrpost_mailbox::TimeRecord;
 
@@ -40,8 +42,10 @@ pub enum Allowed {
 /// What a clock in time slots remembers besides.
 #[derive(Debug)]
 pub(super) struct Slots {
-    settings: InSlots,
+    pub(super) settings: InSlots,
     coarse: Coarse,
+    /// What was heard of who may not live any more.
+    pub(super) overheard: Overheard,
     counts: SyncCounts,
     /// The page goes by something else than what others go by now: a master that is not measured yet.
     pub(super) unsure: bool,
@@ -59,7 +63,7 @@ pub(super) struct Slots {
     next: usize,
     is_warm: bool,
     /// Cycles in which this node has only to say what time it is.
-    beginning: u8,
+    pub(super) beginning: u8,
     /// When this node was awake last, local ns.
     advanced_ns: u64,
 }
@@ -91,6 +95,7 @@ impl Clock {
         self.slots = Some(Box::new(Slots {
             settings,
             coarse: Coarse::default(),
+            overheard: Overheard::new(self.settings.nodes, self.interval_ns, settings.hello_every_ns),
             counts: SyncCounts::default(),
             unsure: true,
             master_error_ns: 0,
@@ -131,6 +136,8 @@ impl Clock {
         if now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
             slots.awake_cycle = cycle;
             self.election.awakes(before_ns, now_ns);
+            slots.overheard.awakes(now_ns.saturating_sub(before_ns));
+            self.election.overhears(&slots.overheard);
         }
     }
 
@@ -167,6 +174,10 @@ impl Clock {
             let slots = self.slots.as_mut()?;
             (slots.synced_cycle, slots.next, slots.is_warm) = (cycle, 0, false);
             slots.beginning = slots.beginning.saturating_sub(u8::from(!broken!(BeginsForEver)));
+            if slots.beginning == 0 {
+                slots.overheard.forget();
+                self.election.overhears(&slots.overheard);
+            }
             *(if is_master { &mut slots.counts.sent } else { &mut slots.counts.replacements_sent }) += 1;
         }
         let is_master = self.is_master();
@@ -241,6 +252,8 @@ impl Clock {
     /// A Sync was taken.
     pub(super) fn heard_in_slots(&mut self, received: Stamp, sync: &Sync, contested: bool, turned: bool) {
         let Some(slots) = &mut self.slots else { return };
+        slots.overheard.forget();
+        self.election.overhears(&slots.overheard);
         if turned {
             slots.coarse.clear();
             (slots.heard_cycle, slots.spoke_cycle) = (0, 0);
@@ -259,14 +272,23 @@ impl Clock {
         (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
     }
 
-    /// Something of somebody came that is no Sync. If it is the master, it lives, though its Sync may be missing.
-    pub(super) fn speaks_in_slots(&mut self, received: Stamp, head: &FrameHead) {
-        let cycle = self.line.at(received.ns).ns / self.interval_ns;
+    /// Something of a node came that is no Sync, packages perhaps: the last of this life of it at `received_ns`, local. If that is the
+    /// master, it lives, though its Syncs may be missing. Matters in time slots alone.
+    pub fn hears(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) {
         if let Some(slots) = &mut self.slots
-            && self.election.speaks(head.from, head.incarnation, received.ns)
+            && let Some(heard_ns) = self.election.speaks(from, incarnation, received_ns)
         {
-            slots.spoke_cycle = cycle;
+            slots.spoke_cycle = self.line.at(heard_ns).ns / self.interval_ns;
         }
+    }
+
+    /// The same of packages, as the one who takes them counts. `now_ns`: now by the monotonic clock, by which that is counted; `local_ns`: by
+    /// that of time.
+    pub fn hears_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
+        let State::Slave(Followed { node, .. }) = self.election.state() else { return };
+        let link = &packages.peer(node).link;
+        let since_ns = now_ns.saturating_sub(link.heard_ns.get());
+        self.hears(node, link.incarnation.get(), local_ns.saturating_sub(since_ns));
     }
 
     /// Somebody hears no master either, and has time: whoever takes over goes on by that.

@@ -2,9 +2,6 @@
 
 use std::fs;
 
-/// A thread of a router that sends in its slots is called so.
-const SLOTS_THREAD: &str = "slots";
-
 /// Counts so far.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Machine {
@@ -14,8 +11,8 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Looks, for the threads that keep the slots of these processes.
-    pub fn look(pids: &[i32]) -> Self {
+    /// Looks, for the threads of these processes that have this name.
+    pub fn look(pids: &[i32], thread: &str) -> Self {
         let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
         let line = stat.lines().next().unwrap_or_default();
         // User, nice, system, idle, waiting, two kinds of interrupts, stolen; what follows is in the first two already.
@@ -23,7 +20,7 @@ impl Machine {
         Self {
             stolen: ticks.get(7).copied().unwrap_or_default(),
             all: ticks.iter().sum(),
-            waited_ns: pids.iter().map(|pid| waited_ns(*pid)).sum(),
+            waited_ns: pids.iter().map(|pid| waited_ns(*pid, thread)).sum(),
         }
     }
 
@@ -32,17 +29,17 @@ impl Machine {
         (self.stolen - before.stolen) as f64 * 100.0 / (self.all - before.all).max(1) as f64
     }
 
-    /// So long threads of slots have waited for a processor since then, all together, ms.
+    /// So long these threads have waited for a processor since then, all together, ms.
     pub fn waited_ms(&self, before: &Self) -> f64 {
         self.waited_ns.saturating_sub(before.waited_ns) as f64 / 1e6
     }
 }
 
-/// `run_delay` of the thread of slots.
-fn waited_ns(pid: i32) -> u64 {
+/// `run_delay` of the threads with this name.
+fn waited_ns(pid: i32, name: &str) -> u64 {
     let threads = fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
     let read = |thread: &fs::DirEntry, file| fs::read_to_string(thread.path().join(file)).unwrap_or_default();
-    let slots = threads.filter(|thread| read(thread, "comm").trim() == SLOTS_THREAD);
-    let waited = slots.filter_map(|thread| read(&thread, "schedstat").split_whitespace().nth(1)?.parse::<u64>().ok());
+    let named = threads.filter(|thread| read(thread, "comm").trim() == name);
+    let waited = named.filter_map(|thread| read(&thread, "schedstat").split_whitespace().nth(1)?.parse::<u64>().ok());
     waited.sum()
 }

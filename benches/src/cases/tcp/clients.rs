@@ -1,0 +1,185 @@
+//! A thousand clients at once: how many packages go, and how late they come; whether one that reads nothing, or a hostile program, is felt by the
+//! others.
+
+use crate::cases::Case;
+use crate::harness::{Failure, Machine};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::{Ratio, Summary, median};
+use crate::tcp::crowd::{Crowd, Habits};
+use crate::tcp::hostile::Hostile;
+use crate::tcp::systems::{Security, Systems};
+use std::cell::RefCell;
+use std::time::Duration;
+
+const GUESTS: u16 = 1_000;
+/// In a quick run.
+const GUESTS_QUICK: u16 = 40;
+const BYTES: usize = 64;
+/// What a thousand clients send, a second: what must go.
+const PER_S: u64 = 50_000;
+/// What they send where it is asked whether they feel somebody, or TLS: both processors have rests, so that what is felt is not that they are
+/// full.
+const PER_S_BESIDE: u64 = 20_000;
+const PER_S_QUICK: u64 = 1_000;
+/// The router has some rest, so that the kernel's fair server stays out.
+const COUNTED: Duration = Duration::from_secs(4);
+const WARM_UP: Duration = Duration::from_secs(1);
+const QUICK: Duration = Duration::from_millis(200);
+/// The thread of the TCP router.
+const THREAD: &str = "tcp-router";
+
+const OURS: &str = "rohrpost";
+const BOUND: (&str, f64) = ("5 ms", 5_000.0);
+/// Of all that was sent.
+const RATE: (&str, f64) = ("of what is sent", 0.995);
+const BESIDE: f64 = 1.2;
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let habits =
+        Habits { guests: GUESTS, per_s: PER_S, bytes: BYTES, one_stalls: false, warm_up: WARM_UP, counted: COUNTED };
+    let plain = Turn { who: OURS, habits, security: Security::None, is_hostile: false };
+    let beside = Turn { habits: Habits { per_s: PER_S_BESIDE, ..habits }, ..plain };
+    let sealed = Turn { security: Security::Tls, ..beside };
+    let stalled = Turn { habits: Habits { one_stalls: true, ..beside.habits }, ..beside };
+    let bound = Versus { name: BOUND.0, p50: None, p99: Some(Target::AtMost(1.0)) };
+    let other = |name, p99| Versus { name, p50: None, p99 };
+    let felt = Some(Target::AtMost(BESIDE));
+    [
+        Clients { name: "clients", turns: vec![plain], versus: vec![bound] },
+        Clients {
+            name: "clients, sealed",
+            turns: vec![sealed, Turn { who: "not sealed", ..beside }],
+            versus: vec![bound, other("not sealed", None)],
+        },
+        Clients {
+            name: "clients, one stalled",
+            turns: vec![stalled, Turn { who: "none stalled", ..beside }],
+            versus: vec![other("none stalled", felt)],
+        },
+        Clients {
+            name: "clients, hostile beside",
+            turns: vec![Turn { is_hostile: true, ..beside }, Turn { who: "nobody beside", ..beside }],
+            versus: vec![other("nobody beside", felt)],
+        },
+    ]
+    .map(|case| Box::new(case) as Box<dyn Case>)
+    .into()
+}
+
+struct Clients {
+    name: &'static str,
+    /// Ours first.
+    turns: Vec<Turn>,
+    versus: Vec<Versus>,
+}
+
+#[derive(Clone, Copy)]
+struct Turn {
+    who: &'static str,
+    habits: Habits,
+    security: Security,
+    is_hostile: bool,
+}
+
+/// What was seen in a turn besides how late packages came.
+struct Seen {
+    who: &'static str,
+    sent_s: f64,
+    came_s: f64,
+    lost_percent: f64,
+    steal_percent: f64,
+    waited_ms_s: f64,
+    hostile_s: Option<f64>,
+}
+
+impl Case for Clients {
+    fn name(&self) -> String {
+        self.name.into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let seen = RefCell::new(Vec::new());
+        let mut contenders: Vec<Contender<'_>> = Vec::new();
+        for turn in &self.turns {
+            contenders.push(Contender::sampled(turn.who, || {
+                let (latencies, one) = turn.take(settings)?;
+                seen.borrow_mut().push(one);
+                Ok(latencies)
+            }));
+        }
+        let (bound, us) = BOUND;
+        let limit = Summary { p50: us, p99: Some(us), p999: None, max: None };
+        contenders.push(Contender { name: bound, turn: Box::new(move || Ok(limit)) });
+        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
+        let mut rows = compare(settings, &subject, &contenders, &self.versus);
+        drop(contenders);
+        // Where it is no bound, it is nobody.
+        rows.retain(|row| row.who != bound || self.versus.iter().any(|versus| versus.name == bound));
+        for turn in &self.turns {
+            let seen = seen.borrow();
+            let own: Vec<&Seen> = seen.iter().filter(|one| one.who == turn.who).collect();
+            rows.extend(turn.rows(self.name, &own));
+        }
+        Ok(rows)
+    }
+}
+
+impl Turn {
+    fn take(&self, settings: &Settings) -> Result<(Vec<f64>, Seen), Failure> {
+        let habits = self.habits(settings);
+        let mut systems = Systems::start(settings, self.security)?;
+        let mut crowd = Crowd::gather(&systems, habits)?;
+        let mut hostile = self.is_hostile.then(|| Hostile::start(systems.address())).transpose()?;
+        let mut connections = || hostile.as_mut().map(Hostile::connections).transpose();
+        crowd.await_begin()?;
+        let (machine, before) = (Machine::look(&[systems.router_pid()], THREAD), connections()?);
+        crowd.await_end()?;
+        let (after, connected) = (Machine::look(&[systems.router_pid()], THREAD), connections()?);
+        let tally = crowd.finish()?;
+        systems.check()?;
+        let seconds = habits.counted.as_secs_f64();
+        let (sent, came) = (tally.sent.get(), tally.came.get());
+        let seen = Seen {
+            who: self.who,
+            sent_s: sent as f64 / seconds,
+            came_s: tally.meanwhile.get() as f64 / seconds,
+            lost_percent: (sent - came) as f64 * 100.0 / sent.max(1) as f64,
+            steal_percent: after.steal_percent(&machine),
+            waited_ms_s: after.waited_ms(&machine) / seconds,
+            hostile_s: before.zip(connected).map(|(before, after)| (after - before) as f64 / seconds),
+        };
+        Ok((tally.latencies.all(), seen))
+    }
+
+    fn habits(&self, settings: &Settings) -> Habits {
+        let full = self.habits;
+        if !settings.quick {
+            return full;
+        }
+        Habits { guests: GUESTS_QUICK, per_s: PER_S_QUICK, warm_up: QUICK, counted: QUICK, ..full }
+    }
+
+    /// Rate, losses and what the computer did meanwhile; none if there was no turn.
+    fn rows(&self, case: &str, seen: &[&Seen]) -> Vec<Row> {
+        let subject = |what: &str, unit| Subject { case: format!("{case}, {what}"), bytes: Some(BYTES), unit };
+        let figure = |what: &str, unit, of: fn(&Seen) -> Option<f64>| {
+            let middle = median(seen.iter().filter_map(|one| of(one)))?;
+            Some(Row::alone(subject(what, unit), self.who, Ok(Summary::single(middle))))
+        };
+        let rate = figure("rate", "packages/s", |one| Some(one.came_s)).map(|row| {
+            let rounds = seen.iter().map(|one| one.came_s / one.sent_s);
+            let versus = Versus { name: RATE.0, p50: Some(Target::AtLeast(RATE.1)), p99: None };
+            Row { versus: Some(versus), ratio_p50: Ratio::of(rounds), ..row }
+        });
+        let rows = [
+            rate,
+            figure("lost", "%", |one| Some(one.lost_percent)),
+            figure("connections beside", "a second", |one| one.hostile_s),
+            figure("steal", "%", |one| Some(one.steal_percent)),
+            figure("run delay", "ms/s", |one| Some(one.waited_ms_s)),
+        ];
+        rows.into_iter().flatten().collect()
+    }
+}

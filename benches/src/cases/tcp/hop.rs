@@ -1,0 +1,101 @@
+//! How long a package takes from a module through the TCP router to a module of another system, one at a time; everybody sleeps who waits.
+
+use crate::cases::Case;
+use crate::harness::{Cell, End, Failure, Placement, Scheduling, time_two_processes};
+use crate::lan::ends::Module;
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::tcp::relays::{time_mailbox_relays, time_relays};
+use crate::tcp::systems::{Security, Systems, bench};
+use crate::tcp::zenoh::time_zenoh;
+use std::cell::Cell as Counter;
+use std::time::Duration;
+
+const MESSAGES: usize = 10_000;
+const WARM_UP: usize = 1_000;
+/// All sleep, so the kernel's fair server stays out.
+const CAP: Duration = Duration::from_secs(2);
+/// Of what it costs at least.
+const OF_RELAYS: f64 = 1.3;
+/// Of what it costs without a seal.
+const OF_OPEN: f64 = 1.3;
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let hop = |is_sealed| move |bytes| Box::new(Hop { bytes, is_sealed }) as Box<dyn Case>;
+    let plain = [64, 1024, 16_384, 62_000].map(hop(false));
+    plain.into_iter().chain([64, 1024].map(hop(true))).collect()
+}
+
+struct Hop {
+    bytes: usize,
+    /// With TLS beside without; else beside the floor and zenoh.
+    is_sealed: bool,
+}
+
+impl Case for Hop {
+    fn name(&self) -> String {
+        if self.is_sealed { "hop, sealed" } else { "hop" }.into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let messages = settings.count(MESSAGES);
+        let cell = Cell {
+            bytes: self.bytes,
+            messages,
+            warm_up: WARM_UP.min(messages / 10),
+            placement: Placement::TwoCores,
+            scheduling: Scheduling::Fifo,
+            pace: None,
+            cap: CAP,
+        };
+        let start = |security| Ground::start(settings, security);
+        let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
+        let at_most = |name, bound: Option<f64>| Versus { name, p50: bound.map(Target::AtMost), p99: None };
+        let open = start(Security::None);
+        if self.is_sealed {
+            let sealed = start(Security::Tls);
+            let contenders = [
+                Contender::sampled("rohrpost", || sealed.time(&cell)),
+                Contender::sampled("not sealed", || open.time(&cell)),
+            ];
+            return Ok(compare(settings, &subject, &contenders, &[at_most("not sealed", Some(OF_OPEN))]));
+        }
+        let contenders = [
+            Contender::sampled("rohrpost", || open.time(&cell)),
+            Contender::sampled("relays", || time_relays(&cell)),
+            Contender::sampled("relays of mailboxes", || time_mailbox_relays(&cell)),
+            Contender::sampled("zenoh", || time_zenoh(&cell)),
+        ];
+        let versus = [
+            at_most("relays", Some(OF_RELAYS)),
+            at_most("relays of mailboxes", Some(OF_RELAYS)),
+            at_most("zenoh", None),
+        ];
+        Ok(compare(settings, &subject, &contenders, &versus))
+    }
+}
+
+/// What all turns of a case happen on.
+struct Ground {
+    /// None where there is no command, or it does not start: then the others still have figures.
+    systems: Result<Systems, Failure>,
+    turns: Counter<u8>,
+}
+
+impl Ground {
+    fn start(settings: &Settings, security: Security) -> Self {
+        let systems = Systems::start(settings, security).and_then(Systems::with_clients);
+        Self { systems, turns: Counter::new(0) }
+    }
+
+    fn time(&self, cell: &Cell) -> Result<Vec<f64>, Failure> {
+        let systems = self.systems.as_ref().map_err(Clone::clone)?;
+        let turn = self.turns.get();
+        self.turns.set(turn.wrapping_add(1));
+        time_two_processes(cell, |end, meetings| {
+            let other = if end == End::Ping { End::Pong } else { End::Ping };
+            Module::between(&systems.directory(end), [bench(end, turn), bench(other, turn)], cell.bytes, meetings)
+        })
+    }
+}

@@ -1,0 +1,12 @@
+//! The TCP router: how long a package takes through it, how many go and beside whom, and what a client costs.
+
+mod clients;
+mod hop;
+mod idle;
+
+use super::Case;
+
+/// All cases, in the order in which they are measured.
+pub fn all() -> Vec<Box<dyn Case>> {
+    [hop::cases(), clients::cases(), idle::cases()].into_iter().flatten().collect()
+}

@@ -1,0 +1,144 @@
+//! What a relay does with the module beside it: takes what that sends, and hands over what comes for it.
+
+use crate::floors::{HandOver, Lanes, Wake};
+use crate::harness::{End, Failure, Link, Shared};
+use crate::ours::Station;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use rohrpost_mailbox::{Interest, Name, Node, Participant, Receiver, Shape, Waiting, Watches};
+use std::fs::File;
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::os::fd::{AsFd, OwnedFd};
+use std::path::Path;
+
+const PIECE_BYTES: usize = 64 * 1024;
+/// Mailboxes of a node.
+const MODULE: Name = Name::new(1, 1, 0, 0);
+const RELAY: Name = Name::new(1, 2, 0, 0);
+
+/// Between a relay and its module.
+pub(super) trait Door {
+    /// Sleeps until the module has sent something or the socket has something to read, and hands on what the module has sent; whether the
+    /// socket has something.
+    ///
+    /// # Errors
+    /// When that fails.
+    fn wait(&mut self, socket: &mut TcpStream) -> Result<bool, Failure>;
+
+    /// Hands a message over.
+    ///
+    /// # Errors
+    /// When that fails.
+    fn give(&mut self, message: &[u8]) -> Result<(), Failure>;
+}
+
+/// A module wakes its relay by a pipe through which the message goes, and is woken by a futex.
+pub(super) struct Bare<'a> {
+    out: File,
+    hand_over: HandOver<'a>,
+    piece: Vec<u8>,
+}
+
+/// What [`Bare`] needs, made before the processes are.
+pub(super) struct Hall {
+    lanes: Shared<Lanes>,
+    /// Out of the pipe, and into it.
+    pipe: (OwnedFd, OwnedFd),
+}
+
+impl Hall {
+    pub(super) fn new() -> Result<Self, Failure> {
+        Ok(Self { lanes: Shared::new()?, pipe: nix::unistd::pipe().map_err(|error| Failure::of("pipe", error))? })
+    }
+
+    /// For the relay.
+    pub(super) fn door(&self) -> Result<Bare<'_>, Failure> {
+        let hand_over = HandOver::new(&self.lanes, End::Pong, Wake::Futex);
+        Ok(Bare { out: file(&self.pipe.0)?, hand_over, piece: vec![0; PIECE_BYTES] })
+    }
+
+    /// For the module.
+    pub(super) fn module(&self) -> Result<Module<'_>, Failure> {
+        let hand_over = HandOver::new(&self.lanes, End::Ping, Wake::Futex);
+        Ok(Module { into: file(&self.pipe.1)?, hand_over })
+    }
+}
+
+fn file(descriptor: &OwnedFd) -> Result<File, Failure> {
+    descriptor.try_clone().map(File::from).map_err(|error| Failure::of("pipe", error))
+}
+
+impl Door for Bare<'_> {
+    fn wait(&mut self, socket: &mut TcpStream) -> Result<bool, Failure> {
+        let watched = [self.out.as_fd(), socket.as_fd()];
+        let mut waits = watched.map(|descriptor| PollFd::new(descriptor, PollFlags::POLLIN));
+        poll(&mut waits, PollTimeout::NONE).map_err(|error| Failure::of("poll", error))?;
+        let [from_module, from_network] = waits.map(|wait| wait.any().unwrap_or(true));
+        if from_module {
+            let count = self.out.read(&mut self.piece).map_err(|error| Failure::of("pipe", error))?;
+            socket.write_all(&self.piece[..count]).map_err(|error| Failure::of("write", error))?;
+        }
+        Ok(from_network)
+    }
+
+    fn give(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.hand_over.send(message)
+    }
+}
+
+/// The module at such a door.
+pub(super) struct Module<'a> {
+    into: File,
+    hand_over: HandOver<'a>,
+}
+
+impl Link for Module<'_> {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.into.write_all(message).map_err(|error| Failure::of("pipe", error))
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        self.hand_over.receive(message)
+    }
+}
+
+/// Both have a mailbox, as modules and the clients of nodes have.
+pub(super) struct Mailboxes {
+    receiver: Receiver,
+    watches: Watches,
+    back: Station,
+}
+
+impl Mailboxes {
+    /// For the relay, on the node in this directory.
+    pub(super) fn open(directory: &Path, socket: &TcpStream, bytes: usize) -> Result<Self, Failure> {
+        let failed = |error: &dyn std::fmt::Display| Failure::of("mailbox", error);
+        let body_bytes_max = u16::try_from(bytes).map_err(|error| failed(&error))?;
+        let node = Node::create(directory, 0o700).map_err(|error| failed(&error))?;
+        let participant = Participant::join(&node, RELAY).map_err(|error| failed(&error))?;
+        let shape = Shape { body_bytes_max, ..Shape::default() };
+        let receiver = participant.receiver(RELAY, shape).map_err(|error| failed(&error))?;
+        let mut watches = Watches::new(&participant).map_err(|error| failed(&error))?;
+        watches.add(socket, Interest::Read).map_err(|error| failed(&error))?;
+        Ok(Self { receiver, watches, back: Station::open(directory, None, MODULE, bytes)? })
+    }
+
+    /// For the module.
+    pub(super) fn module(directory: &Path, bytes: usize) -> Result<Station, Failure> {
+        Station::open(directory, Some(MODULE), RELAY, bytes)
+    }
+}
+
+impl Door for Mailboxes {
+    fn wait(&mut self, socket: &mut TcpStream) -> Result<bool, Failure> {
+        self.watches.wait_any(&mut [&mut self.receiver], Waiting::default(), || false);
+        while let Some(package) = self.receiver.try_receive() {
+            socket.write_all(package.body()).map_err(|error| Failure::of("write", error))?;
+        }
+        Ok(self.watches.next_ready().is_some())
+    }
+
+    fn give(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.back.send(message)
+    }
+}

@@ -1,0 +1,143 @@
+//! What a hop over a TCP router costs at least: the same processes and hand-overs, which look at nothing on the way.
+//!
+//! ```text
+//!  ping ──pipe──▶ relay ══TCP══▶ relay ══TCP══▶ relay ──futex──▶ pong
+//!  ping ◀─futex── relay ◀══TCP══ relay ◀══TCP══ relay ◀──pipe─── pong
+//! ```
+//! As the client of a node, the outer relays sleep on what their module hands over and on their socket at once, so a module wakes them by a
+//! pipe; the middle one sleeps in epoll.
+
+use super::door::{Door, Hall, Mailboxes};
+use super::systems::free_address;
+use crate::harness::{Cell, Child, End, Failure, Gate, Link, Scratch, Shared, settle, time_two_processes};
+use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
+
+/// The relays, and who starts them.
+const ALL: u32 = 4;
+/// The middle one listens within this.
+const CONNECTS_WITHIN: Duration = Duration::from_secs(5);
+const PIECE_BYTES: usize = 64 * 1024;
+
+/// Times a package over the three relays; see [`time_two_processes`].
+///
+/// # Errors
+/// What a relay failed with, else an end.
+pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
+    let halls = [Hall::new()?, Hall::new()?];
+    let hall = |end| &halls[usize::from(end == End::Pong)];
+    time(cell, |end, _| hall(end).door(), |end| hall(end).module())
+}
+
+/// The same with our mailboxes between modules and relays: what the TCP router and its clients add to that is their own.
+///
+/// # Errors
+/// As [`time_relays`].
+pub fn time_mailbox_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
+    let scratch = Scratch::new()?;
+    let directory = |end| scratch.directory().join(if end == End::Ping { "near" } else { "far" });
+    let door = |end, socket: &TcpStream| Mailboxes::open(&directory(end), socket, cell.bytes);
+    time(cell, door, |end| Mailboxes::module(&directory(end), cell.bytes))
+}
+
+fn time<D: Door, M: Link>(
+    cell: &Cell,
+    door: impl Fn(End, &TcpStream) -> Result<D, Failure>,
+    module: impl Fn(End) -> Result<M, Failure>,
+) -> Result<Vec<f64>, Failure> {
+    let (address, gate) = (free_address()?, Shared::<Gate>::new()?);
+    let start = |place, work: &dyn Fn() -> Result<(), Failure>| {
+        Child::start(|| {
+            settle(place, cell.placement, cell.scheduling)?;
+            work()
+        })
+    };
+    let outer = |end| {
+        start(end, &|| {
+            let socket = reach(address, end)?;
+            let door = door(end, &socket)?;
+            gate.meet(ALL)?;
+            relay(door, socket, cell.bytes)
+        })
+    };
+    let mut relays = vec![start(End::Pong, &|| middle(address, &gate))?, outer(End::Ping)?, outer(End::Pong)?];
+    gate.meet_children(&mut relays)?;
+    let timed = time_two_processes(cell, |end, _| module(end));
+    // One ends only when it fails, or when another does.
+    while let Some(at) = relays.iter_mut().position(|relay| relay.has_ended() == Ok(true)) {
+        relays.swap_remove(at).finish(Instant::now())?;
+    }
+    timed
+}
+
+/// Beside a module, as the client of its node.
+fn relay(mut door: impl Door, mut socket: TcpStream, bytes: usize) -> Result<(), Failure> {
+    let (mut piece, mut message) = (vec![0; PIECE_BYTES], Vec::new());
+    loop {
+        if !door.wait(&mut socket)? {
+            continue;
+        }
+        let count = socket.read(&mut piece).map_err(|error| Failure::of("outer relay", error))?;
+        message.extend_from_slice(&piece[..count]);
+        if count == 0 {
+            return Err(Failure::Failed("the middle relay has gone".into()));
+        }
+        if message.len() >= bytes {
+            door.give(&message[..bytes])?;
+            message.drain(..bytes);
+        }
+    }
+}
+
+/// In the middle, as the TCP router.
+fn middle(address: SocketAddr, gate: &Gate) -> Result<(), Failure> {
+    let failed = |error: io::Error| Failure::of("middle relay", error);
+    let listener = TcpListener::bind(address).map_err(failed)?;
+    let mut sockets = [accept(&listener).map_err(failed)?, accept(&listener).map_err(failed)?];
+    sockets.sort_by_key(|(end, _)| *end);
+    let mut sockets = sockets.map(|(_, socket)| socket);
+    let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|error| failed(error.into()))?;
+    for (socket, index) in sockets.iter().zip(0..) {
+        let added = epoll.add(socket, EpollEvent::new(EpollFlags::EPOLLIN, index));
+        added.map_err(|error| failed(error.into()))?;
+    }
+    let (mut piece, mut events) = (vec![0; PIECE_BYTES], [EpollEvent::empty(); 2]);
+    gate.meet(ALL)?;
+    loop {
+        let count = epoll.wait(&mut events, EpollTimeout::NONE).map_err(|error| failed(error.into()))?;
+        for event in &events[..count] {
+            let from = event.data() as usize;
+            let bytes = sockets[from].read(&mut piece).map_err(failed)?;
+            if bytes == 0 {
+                return Err(Failure::Failed("an outer relay has gone".into()));
+            }
+            sockets[1 - from].write_all(&piece[..bytes]).map_err(failed)?;
+        }
+    }
+}
+
+/// A connection, and which outer relay it is of.
+fn accept(listener: &TcpListener) -> io::Result<(u8, TcpStream)> {
+    let (mut socket, _) = listener.accept()?;
+    socket.set_nodelay(true)?;
+    let mut end = [0];
+    socket.read_exact(&mut end)?;
+    Ok((end[0], socket))
+}
+
+/// A connection to the middle relay, which is told whose it is.
+fn reach(address: SocketAddr, end: End) -> Result<TcpStream, Failure> {
+    let give_up = Instant::now() + CONNECTS_WITHIN;
+    let mut socket = loop {
+        match TcpStream::connect(address) {
+            Err(error) if Instant::now() > give_up => return Err(Failure::of("outer relay", error)),
+            Err(_) => std::thread::sleep(Duration::from_millis(2)),
+            Ok(socket) => break socket,
+        }
+    };
+    let told = socket.set_nodelay(true).and_then(|()| socket.write_all(&[u8::from(end == End::Pong)]));
+    told.map_err(|error| Failure::of("outer relay", error))?;
+    Ok(socket)
+}

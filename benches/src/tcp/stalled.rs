@@ -1,0 +1,65 @@
+//! A session that says that it is there, takes packages, and reads none.
+
+use super::pace::Pace;
+use crate::harness::Failure;
+use nix::sys::socket::{setsockopt, sockopt};
+use rohrpost_routers::session::frame::Message;
+use rohrpost_routers::tcp::{Moved, Stream};
+
+/// Sent to it each so often: a MiB a second.
+const BYTES: usize = 1024;
+const EACH_NS: u64 = 1_000_000;
+/// Silent for longer than 3.5 s, it would be closed.
+const ALIVE_EACH_NS: u64 = 500_000_000;
+/// What the kernel keeps for it, so that it stands still soon.
+const KEPT_BYTES: usize = 16 * 1024;
+const PIECE_BYTES: usize = 64 * 1024;
+
+pub(super) struct Stalled {
+    stream: Stream,
+    packages: Pace,
+    signs: Pace,
+    body: [u8; BYTES],
+    sent: u64,
+}
+
+impl Stalled {
+    pub(super) fn new(stream: Stream, now_ns: u64) -> Result<Self, Failure> {
+        setsockopt(&stream, sockopt::RcvBuf, &KEPT_BYTES).map_err(|error| Failure::of("receive buffer", error))?;
+        let (packages, signs) = (Pace::new(now_ns, EACH_NS), Pace::new(now_ns, ALIVE_EACH_NS));
+        Ok(Self { stream, packages, signs, body: [0; BYTES], sent: 0 })
+    }
+
+    /// Number of the next package that is to be sent to it, if one is due. Also says that it is there.
+    pub(super) fn next_due(&mut self, now_ns: u64) -> Result<Option<u64>, Failure> {
+        if self.signs.next_due(now_ns).is_some() {
+            let mut sign = Vec::new();
+            Message::Ask(now_ns).write(&mut sign);
+            if let Moved::Over(_) = self.stream.write(&sign) {
+                return Err(Failure::Failed("who reads nothing was closed before the turn was over".into()));
+            }
+        }
+        let due = self.packages.next_due(now_ns);
+        self.sent += u64::from(due.is_some());
+        Ok(due.map(|(number, _)| number))
+    }
+
+    /// Of a package to it.
+    pub(super) fn body(&mut self) -> &mut [u8] {
+        &mut self.body
+    }
+
+    /// It must have stood still: less has come to its door than was sent.
+    pub(super) fn check(mut self) -> Result<(), Failure> {
+        let (mut piece, mut came) = (vec![0; PIECE_BYTES], 0);
+        // What is in the kernel still; more does not follow at once.
+        while let Moved::Bytes(bytes) = self.stream.read(&mut piece) {
+            came += bytes as u64;
+        }
+        let sent = self.sent * BYTES as u64;
+        if came < sent / 2 {
+            return Ok(());
+        }
+        Err(Failure::Failed(format!("who should stall had {came} of {sent} bytes")))
+    }
+}

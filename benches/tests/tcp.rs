@@ -1,0 +1,68 @@
+//! The cases of the TCP router, run small: each runs, every line is complete, and nothing is left behind.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod support;
+
+use nix::sys::signal::Signal;
+use serde_json::{Map, Value};
+use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+
+/// A row that is there whenever its case could run: case and who.
+const ROWS: [(&str, &str); 18] = [
+    ("hop", "rohrpost"),
+    ("hop", "relays"),
+    ("hop", "relays of mailboxes"),
+    ("hop", "zenoh"),
+    ("hop, sealed", "rohrpost"),
+    ("hop, sealed", "not sealed"),
+    ("clients", "rohrpost"),
+    ("clients, rate", "rohrpost"),
+    ("clients, lost", "rohrpost"),
+    ("clients, steal", "rohrpost"),
+    ("clients, run delay", "rohrpost"),
+    ("clients, sealed", "not sealed"),
+    ("clients, one stalled", "rohrpost"),
+    ("clients, one stalled", "none stalled"),
+    ("clients, hostile beside", "rohrpost"),
+    ("clients, hostile beside, connections beside", "rohrpost"),
+    ("idle client", "rohrpost"),
+    ("idle client, sealed", "rohrpost"),
+];
+
+#[test]
+fn every_case_runs_and_every_line_is_complete() {
+    let (output, prefix) = run("tcp", &["--quick", "--json"]);
+    let rows = rows(&output);
+    for (case, who) in ROWS {
+        let is_there = rows.iter().any(|row| row["case"] == case && row["who"] == who);
+        // Without a command ours has one row that says so, and none of what else was seen. What failed is no excuse.
+        let is_skipped = |row: &Map<String, Value>| {
+            let is_own = case.starts_with(row["case"].as_str().unwrap()) && row["who"] == who;
+            is_own && row["note"].as_str().is_some_and(|note| note.starts_with("skipped: "))
+        };
+        assert!(is_there || rows.iter().any(is_skipped), "{case} by {who}");
+    }
+    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with("FAILED")));
+    assert_eq!(failed, None);
+    // So few packages find room everywhere.
+    let lost = rows.iter().filter(|row| row["case"].as_str().unwrap().ends_with(", lost"));
+    lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
+    assert_eq!(left_behind(&prefix), [""; 0]);
+}
+
+#[test]
+fn whoever_interrupts_it_finds_no_process_left() {
+    let mut child = bench("tcp", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
+    let prefix = prefix(&child);
+    let mut pids = Vec::new();
+    // Systems, relays and modules.
+    wait_for("a turn", || {
+        pids = children(&child);
+        pids.len() > 2
+    });
+    signal(&child, Signal::SIGINT);
+    assert!(!child.wait().unwrap().success());
+    assert_eq!(left_behind(&prefix), [""; 0]);
+    wait_for("the processes to end", || are_gone(&pids));
+}

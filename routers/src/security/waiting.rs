@@ -1,0 +1,95 @@
+//! Hellos that wait for a time slot: of each peer the newest question and the newest reply, since who waits for a slot is asked anew meanwhile.
+
+use super::acquaintances::Acquaintances;
+use super::gate::Said;
+use super::{CHALLENGE_MAX_NS, HELLO_DATAGRAM_BYTES, TAG_BYTES};
+use crate::frame::NodeIndex;
+use std::sync::Arc;
+
+/// A hello as slots count it: what seals it is around every datagram.
+pub const HELLO_SLOT_BYTES: usize = HELLO_DATAGRAM_BYTES - TAG_BYTES;
+
+/// Whoever sends in time slots has one, in the thread that sends.
+pub struct Waiting {
+    all: Arc<Acquaintances>,
+    peers: Box<[Peer]>,
+    /// Whose turn it is.
+    next: usize,
+}
+
+/// What waits for a peer.
+#[derive(Clone, Default)]
+struct Peer {
+    reply: Option<Word>,
+    question: Option<Word>,
+}
+
+#[derive(Clone, Copy)]
+struct Word {
+    /// When it was made, ns.
+    at_ns: u64,
+    /// A life begins by it.
+    begins: bool,
+    datagram: [u8; HELLO_DATAGRAM_BYTES],
+}
+
+impl Waiting {
+    /// Nothing waits.
+    pub fn new(all: &Arc<Acquaintances>) -> Self {
+        Self { peers: vec![Peer::default(); all.who.nodes.into()].into(), all: all.clone(), next: 0 }
+    }
+
+    /// A hello that is to leave. It takes the place of the one before; but a reply by which a life begins gives way to another of that sort alone.
+    ///
+    /// # Panics
+    /// If the datagram is shorter than a hello.
+    pub fn put(&mut self, now_ns: u64, said: Said, datagram: &[u8]) {
+        let mut word = Word { at_ns: now_ns, begins: said.begins, datagram: [0; HELLO_DATAGRAM_BYTES] };
+        word.datagram.copy_from_slice(&datagram[..HELLO_DATAGRAM_BYTES]);
+        let Some(peer) = self.peers.get_mut(usize::from(said.to)) else { return };
+        let place = if said.is_reply { &mut peer.reply } else { &mut peer.question };
+        let stays = place.is_some_and(|before| before.begins && !word.begins && !before.is_old(now_ns));
+        if !stays {
+            *place = Some(word);
+        }
+    }
+
+    /// The next that is to leave: replies first, and those to one peer before others; then all in turn. What is too old to be answered is dropped.
+    /// When it has left, [`Self::left`].
+    pub fn take(&mut self, now_ns: u64, first: Option<NodeIndex>) -> Option<(Said, [u8; HELLO_DATAGRAM_BYTES])> {
+        let (next, peers) = (self.next, self.peers.len());
+        let first = first.map(usize::from).filter(|first| *first < peers);
+        for is_reply in [true, false] {
+            let turns = (0..peers).map(|turn| (next + turn) % peers);
+            for to in first.into_iter().chain(turns) {
+                let peer = &mut self.peers[to];
+                let place = if is_reply { &mut peer.reply } else { &mut peer.question };
+                let Some(word) = place.take() else { continue };
+                if word.is_old(now_ns) {
+                    if word.begins {
+                        self.all.reply_left(to as NodeIndex);
+                    }
+                } else {
+                    self.next = (to + 1) % peers;
+                    let said = Said { to: to as NodeIndex, bytes: HELLO_DATAGRAM_BYTES, is_reply, begins: word.begins };
+                    return Some((said, word.datagram));
+                }
+            }
+        }
+        None
+    }
+
+    /// It was handed to the network: if it was a reply, its peer can open what is sealed to it from now on.
+    pub fn left(&self, said: Said) {
+        if said.is_reply {
+            self.all.reply_left(said.to);
+        }
+    }
+}
+
+impl Word {
+    /// Nobody would take an answer to it, or it as one.
+    fn is_old(&self, now_ns: u64) -> bool {
+        now_ns.saturating_sub(self.at_ns) >= CHALLENGE_MAX_NS
+    }
+}

@@ -1,0 +1,276 @@
+//! One node that knows nobody yet, and hears frames of which it does not know whether they were said just now.
+
+use super::world::{CYCLE, MASTERS, SECOND, US, World, table};
+use crate::frame::FrameHead;
+use crate::tdma::{Carries, Discipline, GATE_NS, Kind, Next, Silent, UNPROVEN_CYCLES, Verdict};
+use crate::time::message::{Message, Request, Sync};
+use crate::time::{Clock, Ignored, Role, Stamp, Step, TIME_BYTES, Term, TimeSettings};
+use std::time::Duration;
+
+/// Who listens so long, and hears nobody, begins a time; node 1 after another cycle.
+const LISTENS: u64 = 100_000_000 + 9 * CYCLE;
+/// So long it waits if it hears somebody.
+const PATIENCE: u64 = 2 * SECOND + 64 * CYCLE;
+
+/// Whoever lives has answered after so long: eight cycles' hellos are heard, and four go to and from each of two others, one in four cycles.
+const JOINS: u64 = (8 + 4 * 2) * UNPROVEN_CYCLES * CYCLE;
+/// So much later the second master begins than the first, if both hear somebody for ever; else it is a cycle.
+const APART: u64 = JOINS + 100_000_000 + 8 * CYCLE;
+
+/// A node that may be master, and overhears another.
+struct Ear {
+    clock: Clock,
+    discipline: Discipline,
+    now_ns: u64,
+    sequence: u64,
+}
+
+impl Ear {
+    fn new(own: u8) -> Self {
+        Self::among(own, 3, &MASTERS)
+    }
+
+    fn among(own: u8, nodes: u8, masters: &[u8]) -> Self {
+        let settings = TimeSettings {
+            system: 1,
+            own,
+            nodes,
+            masters: masters.to_vec(),
+            interval: Duration::from_nanos(CYCLE),
+            digest: 7,
+            incarnation: 9,
+        };
+        let (now_ns, table) = (10 * SECOND, table(own));
+        let clock = Clock::new(settings, now_ns, SECOND, None).in_slots(table.for_clock());
+        Self { clock, discipline: Discipline::new(table, 100 * US), now_ns, sequence: 0 }
+    }
+
+    fn overhears_of(&mut self, from: u8, message: &Message) -> Result<(), Ignored> {
+        let (kind, sequence, to) = (message.kind(), self.sequence, self.discipline.table().own());
+        let head = FrameHead { kind, system: 1, from, to, digest: 7, incarnation: 5, sequence };
+        let came = Stamp { ns: self.now_ns, doubt_ns: 0, by_kernel: true };
+        self.clock.overhear(self.now_ns, came, &head, &message.to_bytes())
+    }
+
+    /// A Sync of node 0, by a time that is a thousand seconds ahead; a cycle later than the last.
+    fn overhears(&mut self) -> Result<(), Ignored> {
+        self.pass(CYCLE);
+        self.sequence += 1;
+        let (sent_ns, term) = (self.now_ns + 1000 * SECOND, Term::new(7, 0));
+        let (id, cycle) = (self.sequence, sent_ns / CYCLE);
+        let sync = Sync { id, cycle, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
+        self.overhears_of(0, &Message::Sync(Sync { followed: true, ..sync }))
+    }
+
+    /// A node that has time, a thousand seconds ahead, and hears no master.
+    fn overhears_hello_of(&mut self, from: u8) -> Result<(), Ignored> {
+        self.sequence += 1;
+        let sent_ns = self.now_ns + 1000 * SECOND;
+        let hello = Request { epoch: 1, sent_ns, timed: true, ..Request::default() };
+        self.overhears_of(from, &Message::Request(hello))
+    }
+
+    /// It is awake once a cycle.
+    fn pass(&mut self, for_ns: u64) {
+        for _ in 0..for_ns.div_ceil(CYCLE) {
+            self.now_ns += CYCLE;
+            self.clock.poll_in(self.now_ns, crate::time::Allowed::Nothing, &mut [0; TIME_BYTES]);
+        }
+    }
+
+    /// Is awake until it is master: how long that takes, if not longer than this.
+    fn begins_within(&mut self, most_ns: u64, mut each_cycle: impl FnMut(&mut Self)) -> Option<u64> {
+        let from_ns = self.now_ns;
+        while self.now_ns - from_ns < most_ns {
+            each_cycle(self);
+            if self.clock.role() == Role::Master {
+                return Some(self.now_ns - from_ns);
+            }
+        }
+        None
+    }
+}
+
+pub(super) fn a_hello_leaves_in_one_of_four_cycles_and_nothing_else() {
+    let mut ear = Ear::new(2);
+    for _ in 0..8 {
+        assert!(matches!(ear.discipline.next(ear.now_ns, &ear.clock), Next::Silent { why: Silent::NoTime, .. }));
+        ear.overhears().unwrap();
+    }
+    assert_eq!((ear.clock.role(), ear.clock.coarse(ear.now_ns)), (Role::Listening, None), "it believes nobody");
+    let mut before_ns = None;
+    for asked in 1..=3 {
+        let Next::Window(planned) = ear.discipline.next(ear.now_ns, &ear.clock) else { panic!("silent") };
+        assert!(matches!(planned.window.kind, Kind::Slot { .. }) && ear.discipline.silent() == Some(Silent::Asking));
+        while ear.now_ns + CYCLE < planned.call_ns {
+            ear.overhears().unwrap();
+        }
+        ear.now_ns = planned.call_ns;
+        let verdict = ear.discipline.judge(&planned, ear.now_ns, &ear.clock);
+        let Verdict::Send(mut permit) = verdict else { panic!("{verdict:?}") };
+        assert_eq!(permit.carries, Carries::Hello);
+        let step = ear.clock.poll_in(ear.now_ns, permit.allowed(), &mut [0; TIME_BYTES]);
+        assert!(matches!(step, Step::Wait { .. }), "{step:?}");
+        assert!(permit.carries_hello() && permit.fits(ear.now_ns, 68));
+        permit.takes(ear.now_ns, 68);
+        ear.discipline.close(&permit);
+        assert_eq!(ear.discipline.counts(&ear.clock).unproven, asked);
+        let paused =
+            before_ns.replace(permit.begin_ns).is_none_or(|before| permit.begin_ns - before >= UNPROVEN_CYCLES * CYCLE);
+        assert!(paused, "after {before_ns:?} at {}", permit.begin_ns);
+    }
+}
+
+pub(super) fn whoever_hears_somebody_begins_no_time_for_a_while() {
+    let begins = Ear::new(1).begins_within(SECOND, |ear| ear.pass(CYCLE));
+    assert!(begins.is_some_and(|begins| begins.abs_diff(LISTENS) <= 2 * CYCLE), "in silence: {begins:?}");
+    let overhears = |ear: &mut Ear| ear.overhears().unwrap();
+    let begins = Ear::new(1).begins_within(2 * PATIENCE, overhears);
+    assert!(
+        begins.is_some_and(|begins| begins.abs_diff(PATIENCE + LISTENS + APART) <= 4 * CYCLE),
+        "heard for ever: {begins:?}"
+    );
+    let mut ear = Ear::new(1);
+    (0..100).for_each(|_| overhears(&mut ear));
+    let begins = ear.begins_within(SECOND, |ear| ear.pass(CYCLE));
+    assert!(
+        begins.is_some_and(|begins| begins.abs_diff(LISTENS) <= 2 * CYCLE),
+        "since the last that was heard: {begins:?}"
+    );
+}
+
+pub(super) fn who_has_begun_a_time_steps_back_until_it_is_impatient() {
+    let mut ear = Ear::new(1);
+    ear.begins_within(SECOND, |ear| ear.pass(CYCLE)).unwrap();
+    let first_ns = ear.now_ns;
+    ear.overhears().unwrap();
+    assert_eq!(
+        (ear.clock.role(), ear.clock.reckoning()),
+        (Role::Listening, None),
+        "it listens again, and goes by nothing"
+    );
+    let begins = ear.begins_within(2 * PATIENCE, |ear| ear.overhears().unwrap());
+    assert!(begins.is_some(), "but not for ever");
+    assert!(ear.now_ns - first_ns >= PATIENCE);
+    ear.overhears().unwrap();
+    assert_eq!(ear.clock.role(), Role::Master, "nor a second time");
+}
+
+#[test]
+fn whoever_is_impatient_leaves_the_time_to_hear_it_to_who_begins_before() {
+    let begins = MASTERS.map(|own| {
+        let each_cycle = |ear: &mut Ear| {
+            ear.pass(CYCLE);
+            ear.overhears_hello_of(2).unwrap();
+        };
+        Ear::new(own).begins_within(2 * PATIENCE, each_cycle).expect("patience ends")
+    });
+    assert!(begins[0] >= PATIENCE && begins[1] - begins[0] >= JOINS + 100_000_000, "{begins:?}");
+}
+
+#[test]
+fn the_only_master_that_lost_its_page_asks_each_of_five_that_speak_in_turn() {
+    let mut ear = Ear::among(0, 6, &[0]);
+    for _ in 0..8 {
+        (1..6).for_each(|from| ear.overhears_hello_of(from).unwrap());
+        ear.pass(CYCLE);
+    }
+    let next = ear.discipline.next(ear.now_ns, &ear.clock);
+    assert!(matches!(next, Next::Window(planned) if planned.carries == Carries::Hello), "{next:?}");
+    let asked = [(); 5].map(|()| {
+        let (node, _) = ear.clock.overheard(ear.now_ns).unwrap();
+        ear.clock.asked_overheard(ear.now_ns);
+        node
+    });
+    assert_eq!(asked, [1, 2, 3, 4, 5]);
+}
+
+#[test]
+fn a_window_of_what_is_overheard_is_no_slot_of_the_nodes_own_time() {
+    let mut world = World::new(1);
+    world.start_all();
+    assert!(world.run_until(5 * SECOND, World::agrees));
+    (0..2).for_each(|other| (world.cut[other][2], world.cut[2][other]) = (true, true));
+    let is_unsure = |world: &World| matches!(world.silent(2), Some(Silent::BoundTooLarge { .. }));
+    assert!(
+        world.run_until(60 * SECOND, is_unsure) && world.clock(2).reckoning().is_some(),
+        "it has a time of its own"
+    );
+    let mut now_ns = world.nodes[2].local_ns(world.now);
+    let one = &mut world.nodes[2];
+    let (clock, discipline) = (one.clock.as_mut().unwrap(), &mut one.discipline);
+    // By a time that is a thousand seconds ahead.
+    for sequence in 1..=8 {
+        now_ns += CYCLE;
+        clock.poll_in(now_ns, crate::time::Allowed::Nothing, &mut [0; TIME_BYTES]);
+        discipline.next(now_ns, clock);
+        let sent_ns = clock.reading(now_ns).time.ns + 1000 * SECOND;
+        let message = Message::Request(Request { epoch: 9, sent_ns, timed: true, ..Request::default() });
+        let head = FrameHead { kind: message.kind(), system: 1, from: 0, to: 2, digest: 7, incarnation: 5, sequence };
+        let came = Stamp { ns: now_ns, doubt_ns: 0, by_kernel: true };
+        clock.overhear(now_ns, came, &head, &message.to_bytes()).unwrap();
+    }
+    let Next::Window(planned) = discipline.next(now_ns, clock) else { panic!("silent") };
+    assert_eq!(planned.carries, Carries::Hello);
+    let before = discipline.counts(clock);
+    let late_ns = planned.begin_ns + GATE_NS + 1;
+    assert!(matches!(discipline.judge(&planned, late_ns, clock), Verdict::Late));
+    assert_eq!(discipline.counts(clock), before, "none of its own slots was late");
+    discipline.next(late_ns, clock);
+    let passed = discipline.counts(clock).silent - before.silent;
+    let own_slots = 2 * (late_ns - now_ns).div_ceil(CYCLE);
+    assert!((1..=own_slots).contains(&passed), "all of them are counted, and once: {passed} of {own_slots}");
+}
+
+#[test]
+fn who_goes_by_who_lives_meanwhile_asks_for_its_window_anew() {
+    let mut ear = Ear::new(2);
+    (0..8).for_each(|_| ear.overhears().unwrap());
+    let Next::Window(planned) = ear.discipline.next(ear.now_ns, &ear.clock) else { panic!("silent") };
+    for id in 101..=108 {
+        let (sent_ns, term) = (ear.now_ns + 1000 * SECOND, Term::new(7, 0));
+        let sync = Sync { id, cycle: id, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
+        let message = Message::Sync(sync);
+        let head =
+            FrameHead { kind: message.kind(), system: 1, from: 0, to: 2, digest: 7, incarnation: 5, sequence: id };
+        let came = Stamp { ns: ear.now_ns, doubt_ns: 0, by_kernel: true };
+        ear.clock.handle(ear.now_ns, came, &head, &message.to_bytes()).unwrap();
+    }
+    assert!(matches!(ear.discipline.judge(&planned, planned.call_ns, &ear.clock), Verdict::Early));
+    let Next::Window(anew) = ear.discipline.next(planned.call_ns, &ear.clock) else { panic!("silent") };
+    assert_eq!((anew.window, anew.carries), (planned.window, Carries::Time));
+}
+
+#[test]
+fn rare_slots_are_waited_for() {
+    let mut slots = super::world::tdma();
+    assert_eq!(table(0).for_clock().hello_every_ns, UNPROVEN_CYCLES * CYCLE);
+    slots.slots[0].period = 16;
+    slots.slots[2].period = 32;
+    let table = crate::tdma::Table::new(&slots, &MASTERS, 1, 3, super::world::HEADS);
+    assert_eq!(table.for_clock().hello_every_ns, 16 * CYCLE, "node 2 has another one in each third cycle");
+}
+
+#[test]
+fn who_knows_the_time_overhears_nobody_and_what_tells_no_time_is_of_no_use() {
+    let mut ear = Ear::new(2);
+    for message in [Message::WarmUp, Message::Request(Request::default())] {
+        assert_eq!(ear.overhears_of(0, &message), Err(Ignored::Unproven));
+    }
+    ear.overhears().unwrap();
+    let (sent_ns, term) = (ear.now_ns, Term::new(1, 0));
+    let sync = Sync { id: 99, cycle: 1, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
+    let head = FrameHead {
+        kind: Message::Sync(sync).kind(),
+        system: 1,
+        from: 0,
+        to: 2,
+        digest: 7,
+        incarnation: 5,
+        sequence: 99,
+    };
+    let came = Stamp { ns: ear.now_ns, doubt_ns: 0, by_kernel: true };
+    ear.clock.handle(ear.now_ns, came, &head, &Message::Sync(sync).to_bytes()).unwrap();
+    assert!(!ear.clock.overhears(ear.now_ns));
+    assert_eq!(ear.overhears(), Err(Ignored::Unproven), "it hears a master that lives");
+}

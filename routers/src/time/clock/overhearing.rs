@@ -1,0 +1,82 @@
+//! A clock in time slots that does not know the time, and hears frames of which nobody knows whether they were said just now. They tell it when to
+//! ask, and not to begin a time of its own yet; nothing else.
+
+use super::Clock;
+use crate::broken::broken;
+use crate::frame::{FrameHead, NodeIndex};
+use crate::time::election::State;
+use crate::time::message::Message;
+use crate::time::overheard::Told;
+use crate::time::{Ignored, Reckoning, Stamp};
+
+impl Clock {
+    /// Whether frames help whose sender has not shown that it lives: those of [`Clock::overhear`].
+    pub fn overhears(&self, now_ns: u64) -> bool {
+        let is_listening = || self.election.state() == State::Listening && self.sure(now_ns).is_none();
+        self.slots.is_some() && (self.is_beginning() || is_listening())
+    }
+
+    /// Takes a datagram of time that some life of its node has said at some time, and to this node.
+    ///
+    /// # Errors
+    /// [`Ignored`]: it changed nothing.
+    pub fn overhear(&mut self, now_ns: u64, received: Stamp, head: &FrameHead, rest: &[u8]) -> Result<(), Ignored> {
+        if broken!(TakesUnproven) {
+            return self.handle(now_ns, received, head, rest);
+        }
+        if !self.is_ours(head) {
+            return Err(Ignored::Stranger);
+        }
+        let message = Message::parse(head.kind, rest)?;
+        let told = match &message {
+            Message::Sync(sync) if sync.replacement => None,
+            Message::Sync(sync) => Some(Told { epoch: sync.epoch, system_ns: sync.sent_ns, error_ns: 0 }),
+            Message::Request(hello) if hello.id == 0 && hello.timed => {
+                Some(Told { epoch: hello.epoch, system_ns: hello.sent_ns, error_ns: hello.error_ns })
+            }
+            _ => return Err(Ignored::Unproven),
+        };
+        let is_wanted = self.overhears(now_ns);
+        let slots = self.slots.as_mut().filter(|_| is_wanted).ok_or(Ignored::Unproven)?;
+        let said = (head.from, head.incarnation, head.sequence);
+        if !slots.overheard.hears(said, received.ns, told) {
+            return Err(Ignored::Late);
+        }
+        let is_patient = slots.overheard.is_patient(now_ns);
+        self.election.overhears(&slots.overheard);
+        if let Message::Sync(sync) = message
+            && is_patient
+            && self.is_beginning()
+            && self.election.would_yield(head.from, &sync, self.is_followed(now_ns))
+        {
+            self.step_back(now_ns);
+        }
+        Ok(())
+    }
+
+    /// What this master began nobody goes by yet, and another's time may be older: it listens again.
+    fn step_back(&mut self, now_ns: u64) {
+        self.election.steps_back(now_ns);
+        self.line.stop_slew(now_ns);
+        self.forget();
+        self.drafts.clear();
+        if let Some(slots) = &mut self.slots {
+            (slots.unsure, slots.beginning) = (true, 0);
+        }
+    }
+
+    /// Who may be asked whether it lives, and by what time: none if nobody is heard, or not enough. For hellos alone.
+    pub fn overheard(&self, now_ns: u64) -> Option<(NodeIndex, Reckoning)> {
+        let slots = self.slots.as_ref()?;
+        let (delay_max_ns, allowance_ns) = (slots.settings.delay_max_ns, slots.settings.allowance_ns);
+        slots.overheard.reckoning(now_ns, delay_max_ns, allowance_ns)
+    }
+
+    /// A hello has left by [`Self::overheard`]: the next goes by another's time, if there is one.
+    pub fn asked_overheard(&mut self, now_ns: u64) {
+        if let Some(slots) = &mut self.slots {
+            let (delay_max_ns, allowance_ns) = (slots.settings.delay_max_ns, slots.settings.allowance_ns);
+            slots.overheard.next_turn(now_ns, delay_max_ns, allowance_ns);
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The time of a node that no master's Sync reaches: it goes by what the TCP router tells, and knows how far off that is at most.
+//!
+//! Ways through a stream are long, unequal and seldom twice the same, so nothing is measured of the rate of the clock: the line goes on as
+//! the local clock does, and is bent when an answer knows better than it does.
+
+use super::RATE_MAX_PPB;
+use super::line::{EVEN_PPB, Line};
+use rohrpost_mailbox::TimeRecord;
+
+/// The first answers are often slow; so many are waited for before the line begins.
+const HEARD_MIN: u8 = 4;
+/// The line is bent towards an answer within so long, or longer if that would be too fast.
+const MEND_NS: u64 = 2_000_000_000;
+
+/// What the node takes for system time.
+#[derive(Debug)]
+pub struct Follower {
+    line: Line,
+    /// Answers since the line has another epoch than theirs.
+    heard: u8,
+    /// How many answers there were when one was looked at last.
+    answers: u64,
+    /// The last that the line was compared with.
+    last: Option<TimeRecord>,
+}
+
+impl Follower {
+    /// Goes on from the page that an earlier life has left; else from the wall clock, of which nothing is known.
+    pub fn new(now_ns: u64, wall_ns: u64, page: Option<TimeRecord>) -> Self {
+        let line = match page {
+            Some(page) if page.error_ns < super::UNSYNCHRONISED_NS => Line::adopted(now_ns, page),
+            Some(page) => Line::unsynchronised(now_ns, page.at(now_ns).ns, page.epoch),
+            None => Line::unsynchronised(now_ns, wall_ns, 0),
+        };
+        Self { line, heard: 0, answers: 0, last: None }
+    }
+
+    /// What is in the page.
+    pub fn record(&self) -> &TimeRecord {
+        self.line.record()
+    }
+
+    /// The best that is known of the time after so many answers; it may be the same for long, since the best one counts.
+    pub fn told(&mut self, now_ns: u64, told: &TimeRecord, answers: u64) {
+        self.line.end_slew(now_ns);
+        let is_new = std::mem::replace(&mut self.answers, answers) != answers;
+        let there = told.at(now_ns);
+        let error_ns = u64::try_from(there.error.as_nanos()).unwrap_or(u64::MAX);
+        let drift_ns_s = RATE_MAX_PPB.unsigned_abs();
+        if self.line.is_synchronised() && told.epoch == self.line.record().epoch {
+            self.heard = 0;
+            if self.last.replace(*told) == Some(*told) {
+                return;
+            }
+            let by_ns = there.ns.wrapping_sub(self.line.at(now_ns).ns).cast_signed();
+            let whole_ns = error_ns.saturating_add(by_ns.unsigned_abs());
+            // Where the line is surer of itself, it goes on.
+            if whole_ns < self.line.error_ns(now_ns) {
+                self.line.bend(now_ns, by_ns, MEND_NS, EVEN_PPB, whole_ns, drift_ns_s);
+            }
+            return;
+        }
+        self.heard += u8::from(is_new);
+        if self.heard >= HEARD_MIN {
+            self.heard = 0;
+            self.line.step(now_ns, told.epoch, there.ns, EVEN_PPB, error_ns, drift_ns_s);
+        }
+    }
+
+    /// Nobody tells anything.
+    pub fn goes_on(&mut self, now_ns: u64) {
+        self.line.end_slew(now_ns);
+    }
+
+    /// The page was not written in time, and still says this.
+    pub fn page_says(&mut self, now_ns: u64, page: &TimeRecord) {
+        self.line.go_on_from(now_ns, page);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::UNSYNCHRONISED_NS;
+    use proptest::prelude::*;
+    use rohrpost_mailbox::TimeSource;
+
+    const SECOND_NS: u64 = 1_000_000_000;
+    /// System time is so far ahead of the local clock, which is `fast_ppb` fast.
+    const AHEAD_NS: u64 = 1_000 * SECOND_NS;
+
+    fn truth(now_ns: u64, fast_ppb: i64) -> u64 {
+        let gained_ns = i128::from(now_ns) * i128::from(fast_ppb) / 1_000_000_000;
+        (AHEAD_NS + now_ns).wrapping_add_signed(-gained_ns as i64)
+    }
+
+    fn told(epoch: u64, now_ns: u64, system_ns: u64, error_ns: u64) -> TimeRecord {
+        TimeRecord {
+            epoch,
+            source: TimeSource::Master,
+            monotonic_ns: now_ns,
+            system_ns,
+            pace_ppb: EVEN_PPB,
+            error_ns,
+            drift_ns_s: RATE_MAX_PPB.unsigned_abs(),
+        }
+    }
+
+    #[test]
+    fn it_begins_when_it_has_heard_enough_and_steps_with_the_epoch() {
+        let mut follower = Follower::new(0, 5, None);
+        // The first exchange is the best of all, so what is told stays the same while answers come.
+        let best = told(7, 1, AHEAD_NS + 1, 1_000);
+        for answers in 1..u64::from(HEARD_MIN) {
+            follower.told(answers, &best, answers);
+            follower.told(answers, &best, answers);
+            assert_eq!(follower.record().error_ns, UNSYNCHRONISED_NS, "an answer counts once");
+        }
+        follower.told(9, &best, u64::from(HEARD_MIN));
+        assert_eq!((follower.record().epoch, follower.record().at(9).ns), (7, AHEAD_NS + 9));
+        for now_ns in 10..10 + u64::from(HEARD_MIN) {
+            assert_eq!(follower.record().epoch, 7);
+            follower.told(now_ns, &told(3, now_ns, 2 * AHEAD_NS, 1_000), now_ns);
+        }
+        assert_eq!(follower.record().epoch, 3, "a network that began anew has a lower one");
+        let again = Follower::new(20, 5, Some(*follower.record()));
+        let there = again.record().at(20);
+        assert_eq!(
+            (there.epoch, there.ns),
+            (3, follower.record().at(20).ns + 1),
+            "a client that is started again goes on"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn time_never_goes_back_and_its_bound_holds(
+            fast_ppb in -200_000i64..200_000,
+            answers in prop::collection::vec((10_000_000u64..3 * SECOND_NS, 0u64..20_000_000, any::<bool>()), 1..40),
+        ) {
+            let mut follower = Follower::new(0, 0, None);
+            let (mut now_ns, mut last_ns) = (0, 0);
+            for ((pause_ns, off_ns, early), count) in answers.into_iter().zip(1..) {
+                // Between two answers the line is looked at, as readers do.
+                for _ in 0..10 {
+                    now_ns += pause_ns / 10;
+                    let there = follower.record().at(now_ns);
+                    if follower.record().error_ns < UNSYNCHRONISED_NS {
+                        prop_assert!(there.ns >= last_ns, "back by {} ns", last_ns - there.ns);
+                        last_ns = there.ns;
+                        let off_ns = there.ns.abs_diff(truth(now_ns, fast_ppb));
+                        prop_assert!(u128::from(off_ns) <= there.error.as_nanos(), "{off_ns} ns off: {there:?}");
+                    }
+                }
+                let system_ns = truth(now_ns, fast_ppb);
+                let said_ns = if early { system_ns - off_ns } else { system_ns + off_ns };
+                follower.told(now_ns, &told(1, now_ns, said_ns, off_ns + 10), count);
+            }
+        }
+    }
+}

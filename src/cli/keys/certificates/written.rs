@@ -1,0 +1,63 @@
+//! Files that belong together: all are whole on the disk before the first has its name.
+
+use super::CertificateError;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+/// Who may read what.
+pub(super) const SECRET: u32 = 0o600;
+pub(super) const PUBLIC: u32 = 0o644;
+
+/// A file to be.
+pub(super) struct Written {
+    pub(super) path: PathBuf,
+    pub(super) text: String,
+    /// Who may read it.
+    pub(super) mode: u32,
+}
+
+impl Written {
+    /// Where it is until all are.
+    fn beside(&self) -> PathBuf {
+        let mut beside = self.path.clone().into_os_string();
+        beside.push(".new");
+        beside.into()
+    }
+
+    fn write(&self) -> io::Result<()> {
+        // One that a crash has left is nobody's.
+        let _ = fs::remove_file(self.beside());
+        let mut file = OpenOptions::new().write(true).create_new(true).mode(self.mode).open(self.beside())?;
+        file.write_all(self.text.as_bytes())?;
+        file.sync_all()
+    }
+}
+
+/// Puts them into the folder in this order, after `before`, in place of older ones. If they cannot be written, all stays as it was.
+pub(super) fn put(
+    folder: &Path,
+    files: &[Written],
+    before: impl FnOnce() -> Result<(), CertificateError>,
+) -> Result<(), CertificateError> {
+    if files.is_empty() {
+        return Ok(());
+    }
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |error| CertificateError::File(path, error)
+    };
+    fs::create_dir_all(folder).map_err(failed(folder))?;
+    let written = files.iter().try_for_each(|file| file.write().map_err(failed(&file.path)));
+    written.and_then(|()| before()).inspect_err(|_| {
+        for file in files {
+            let _ = fs::remove_file(file.beside());
+        }
+    })?;
+    for file in files {
+        fs::rename(file.beside(), &file.path).map_err(failed(&file.path))?;
+    }
+    // Else names may be lost if the computer stops now.
+    File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed(folder))
+}

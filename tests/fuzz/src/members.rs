@@ -1,0 +1,161 @@
+//! A TCP router and connections that do anything that frames can say, at any time: accounts balance, memory and places are bounded, a name has
+//! one host at most, and who is let in is whom the digests say.
+
+use crate::sessions::{BEGIN_NS, Deaf, MS, server};
+use crate::split::Bytes;
+use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_routers::session::ClientIndex;
+use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
+use rohrpost_routers::session::server::{Output, Server, State};
+
+const STEPS_MAX: usize = 300;
+/// Places of who takes part and of who is let in.
+const PLACES: usize = 5;
+/// Packages that wait, a batch, the largest frame on each side as vectors grow, ranges that wait, and the rest.
+const BYTES_MAX: usize = (64 + 16 + 2 * 2 * 66 + 32 + 16) << 10;
+
+struct World {
+    server: Server,
+    now_ns: u64,
+    /// By the order in which they came.
+    connections: Vec<ClientIndex>,
+}
+
+pub(crate) fn run(data: &[u8]) {
+    let mut bytes = Bytes(data);
+    let mut world = World { server: server(), now_ns: BEGIN_NS, connections: Vec::new() };
+    for _ in 0..STEPS_MAX {
+        if bytes.is_empty() {
+            break;
+        }
+        world.step(&mut bytes);
+        world.check();
+    }
+    // At the end all leave, and nothing waits any more.
+    while let Some(client) = world.connections.pop() {
+        world.server.closed(world.now_ns, client, &mut Deaf);
+    }
+    for (priority, class) in world.server.counts().classes() {
+        assert_eq!(class.packages.get(), class.passed.get() + class.lost_in_all(), "class {}", priority.0);
+    }
+    assert!(world.server.table().is_empty(), "who has gone hosts nothing");
+}
+
+impl World {
+    fn step(&mut self, bytes: &mut Bytes<'_>) {
+        let (what, which) = (bytes.byte(), usize::from(bytes.byte()));
+        let client = self.connections.get(which % self.connections.len().max(1)).copied();
+        match (what % 9, client) {
+            (0, _) | (_, None) => {
+                let accepted = self.server.accept(self.now_ns, "somewhere", &mut Deaf);
+                self.connections.extend(accepted);
+            }
+            (1, Some(client)) => self.say(client, &hello(bytes)),
+            (2, Some(client)) => {
+                let ranges: Vec<Range> = (0..bytes.byte() % 8).map(|_| range(bytes)).collect();
+                let mut laid_out = Vec::new();
+                self.say(client, &Message::Register(Ranges::new(bytes.word(), &ranges, &mut laid_out)));
+            }
+            (3, Some(client)) => {
+                let body = vec![7; usize::from(bytes.half()) % 3000];
+                let head = Head {
+                    to: name(bytes),
+                    from: name(bytes),
+                    len: body.len() as u16,
+                    kind: Type::command(1 + bytes.half() % 100),
+                    priority: Priority(bytes.byte()),
+                    ..Head::default()
+                };
+                let carried =
+                    Carried { hops: bytes.byte() % 12, published_ns: bytes.long() % (2 * BEGIN_NS), head, body: &body };
+                self.say(client, &Message::Package(carried));
+            }
+            (4, Some(client)) => self.say(client, &Message::Ask(bytes.long())),
+            (5, Some(client)) => {
+                let count = usize::from(bytes.byte());
+                self.server.received(self.now_ns, client, bytes.take(count), &mut Deaf);
+            }
+            (6, _) => self.now_ns += u64::from(bytes.half()) * MS,
+            (7, Some(client)) => self.server.writable(client),
+            (_, Some(client)) => {
+                self.server.closed(self.now_ns, client, &mut Deaf);
+                self.connections.retain(|known| *known != client);
+            }
+        }
+        self.poll(bytes);
+    }
+
+    fn say(&mut self, client: ClientIndex, message: &Message<'_>) {
+        let mut stream = Vec::new();
+        message.write(&mut stream);
+        self.server.received(self.now_ns, client, &stream, &mut Deaf);
+    }
+
+    /// Streams take what the input says of it.
+    fn poll(&mut self, bytes: &mut Bytes<'_>) {
+        loop {
+            match self.server.poll(self.now_ns, &mut Deaf) {
+                Output::Write(client) => {
+                    let ready = self.server.ready(client).len();
+                    let taken = if bytes.byte().is_multiple_of(4) { ready / 2 } else { ready };
+                    self.server.took(self.now_ns, client, taken);
+                }
+                Output::Close(client) => self.connections.retain(|known| *known != client),
+                Output::Wait { until_ns } => return assert!(until_ns > self.now_ns),
+            }
+        }
+    }
+
+    fn check(&self) {
+        assert!(self.server.clients().count() <= PLACES);
+        let members = || self.server.views().filter(|view| view.is_member);
+        assert!(members().count() <= 3);
+        for view in members() {
+            let hosted = self.server.table().ranges_of(view.index);
+            let mut ranges = 0;
+            for range in hosted {
+                ranges += 1;
+                assert!(range.first.system() == view.system && range.last.system() == view.system);
+            }
+            assert_eq!(ranges, view.ranges);
+        }
+        for (client, _, state) in self.server.clients() {
+            let bytes = self.server.bytes_of(client);
+            assert!(bytes <= BYTES_MAX, "{bytes} B for one connection");
+            let hosts = self.server.table().ranges_of(client).count();
+            assert!(hosts == 0 || state == State::Member, "only who takes part hosts names");
+        }
+        let (mut packages, mut known) = (0, self.server.waiting() as u64);
+        for (priority, class) in self.server.counts().classes() {
+            assert!(class.packages.get() >= class.passed.get() + class.lost_in_all(), "class {}", priority.0);
+            packages += class.packages.get();
+            known += class.passed.get() + class.lost_in_all();
+        }
+        assert_eq!(packages, known, "what came has passed, is lost, or waits");
+    }
+}
+
+fn hello(bytes: &mut Bytes<'_>) -> Message<'static> {
+    let odd = bytes.byte();
+    Message::Hello(Hello {
+        system: 1 + odd % 3,
+        reaches_own: odd & 4 != 0,
+        common: if odd & 0x18 == 0x18 { 8 } else { 7 },
+        system_digest: if odd & 0x60 == 0x60 { 9 } else { 1 },
+        life: 1 + u64::from(bytes.byte() % 6),
+        attempt: 1 + u64::from(bytes.byte() % 6),
+        asked_ns: bytes.long(),
+        name: "client",
+    })
+}
+
+fn name(bytes: &mut Bytes<'_>) -> Name {
+    let [system, class, instance, local] = bytes.array();
+    let system = if system > 250 { 255 } else { 1 + system % 3 };
+    Name::new(system, 1 + class % 6, instance % 4, local % 4)
+}
+
+fn range(bytes: &mut Bytes<'_>) -> Range {
+    let (first, last) = (name(bytes), name(bytes));
+    if bytes.byte().is_multiple_of(8) { Range { first, last } } else { Range::module(first) }
+}

@@ -1,0 +1,121 @@
+//! Frames of sessions: a stream that anybody writes, to a TCP router and to a client. What was read is written again, byte for byte, however
+//! the stream is split, and nothing that was promised in it takes memory before it came.
+
+use rohrpost_routers::report::NotDelivered;
+use rohrpost_routers::session::client::{self, Client, ClientSettings};
+use rohrpost_routers::session::frame::{Carried, FrameHead, HEAD_BYTES, LENGTH_MAX, Message};
+use rohrpost_routers::session::server::{self, Output, Server, ServerSettings};
+use rohrpost_routers::session::{Answers, Cause};
+
+pub(crate) const MS: u64 = 1_000_000;
+pub(crate) const BEGIN_NS: u64 = 1000 * MS;
+/// What a connection takes up that has sent so many bytes: the same twice, as vectors grow, and the rest.
+const BESIDE_BYTES: usize = 16 * 1024;
+
+pub(crate) fn run(data: &[u8]) {
+    let (split, stream) = data.split_first().map_or((0, data), |(split, stream)| (usize::from(*split), stream));
+    frames(stream);
+    to_a_server(stream, split);
+    to_a_client(stream, split);
+}
+
+fn frames(mut stream: &[u8]) {
+    while let Some((bytes, rest)) = stream.split_first_chunk::<HEAD_BYTES>() {
+        let head = match FrameHead::parse(bytes, LENGTH_MAX) {
+            Ok(head) => head,
+            Err(bad) => return assert!(!bad.to_string().is_empty()),
+        };
+        let Some((frame, behind)) = rest.split_at_checked(head.length) else { return };
+        match Message::parse(head, frame) {
+            Ok(Message::Package(carried)) => assert_eq!(usize::from(carried.head.len), carried.body.len()),
+            Ok(message) => {
+                let mut written = Vec::new();
+                message.write(&mut written);
+                assert_eq!(written, stream[..HEAD_BYTES + head.length]);
+            }
+            Err(bad) => return assert!(!bad.to_string().is_empty()),
+        }
+        stream = behind;
+    }
+}
+
+/// Takes no notice.
+pub(crate) struct Deaf;
+
+impl Answers for Deaf {
+    fn answer(&mut self, _: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
+        answer.extend(why.word().bytes());
+        true
+    }
+}
+
+impl server::Host for Deaf {
+    fn event(&mut self, _: server::Event<'_>) {}
+}
+
+impl client::Host for Deaf {
+    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
+        assert_eq!(usize::from(carried.head.len), carried.body.len());
+        if carried.head.id.is_multiple_of(3) { Err(NotDelivered::MailboxFull) } else { Ok(()) }
+    }
+
+    fn event(&mut self, _: client::Event<'_>) {}
+}
+
+pub(crate) fn server() -> Server {
+    Server::new(ServerSettings {
+        name: "the server".into(),
+        common: 7,
+        system: None,
+        life: 5,
+        clients_max: 3,
+        greetings_max: 2,
+        quota_bytes: 64 << 10,
+        levels: std::array::from_fn(|priority| priority as u8 >> 3),
+    })
+}
+
+fn pieces(stream: &[u8], split: usize) -> impl Iterator<Item = &[u8]> {
+    stream.chunks(if split == 0 { usize::MAX } else { split })
+}
+
+fn to_a_server(stream: &[u8], split: usize) {
+    let mut server = server();
+    let Some(client) = server.accept(BEGIN_NS, "somewhere", &mut Deaf) else { return };
+    for (at, piece) in pieces(stream, split).enumerate() {
+        let now_ns = BEGIN_NS + at as u64 * MS;
+        server.received(now_ns, client, piece, &mut Deaf);
+        while let Output::Write(index) = server.poll(now_ns, &mut Deaf) {
+            let ready = server.ready(index).len();
+            server.took(now_ns, index, ready);
+        }
+        assert!(server.bytes_of(client) <= 2 * stream.len() + BESIDE_BYTES, "{} B", server.bytes_of(client));
+    }
+}
+
+fn to_a_client(stream: &[u8], split: usize) {
+    let settings = ClientSettings {
+        name: "client".into(),
+        system: 1,
+        reaches_own: false,
+        common: 7,
+        system_digest: 1,
+        life: 3,
+        quota_bytes: 64 << 10,
+        levels: [0; 256],
+    };
+    let mut client = Client::new(settings, Vec::new(), BEGIN_NS);
+    client.poll(BEGIN_NS, &mut Deaf);
+    client.connected(BEGIN_NS);
+    for (at, piece) in pieces(stream, split).enumerate() {
+        let now_ns = BEGIN_NS + at as u64 * MS;
+        client.received(now_ns, piece, &mut Deaf);
+        while client.poll(now_ns, &mut Deaf) == client::Output::Write {
+            client.took(now_ns, client.ready().len());
+        }
+    }
+    let balanced = |counts: &rohrpost_routers::session::Counts| {
+        counts.classes().all(|(_, class)| class.packages.get() >= class.passed.get() + class.lost_in_all())
+    };
+    assert!(balanced(client.inn()) && balanced(client.out()));
+}
