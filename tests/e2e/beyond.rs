@@ -7,6 +7,24 @@ use nix::sys::signal::Signal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+/// Each system lists what the other hosts, whichever runs the TCP router; without that the list says that it does not know.
+fn check_lists(systems: &Systems) {
+    for (node, module, by) in
+        [("north", "2.probe.0", "node south of south"), ("south", "1.probe.0", "node north of north")]
+    {
+        let list = systems.says(node, &["list"]).ok();
+        let is_there = list.lines().any(|line| line.starts_with(module) && line.ends_with(by));
+        assert!(is_there, "no {module} by {by} at {node}:\n{list}");
+    }
+    systems.says("north", &["stop", "tcp.255"]).ok();
+    wait("south is away", || (systems.client("south")["state"] != "up").then_some(()));
+    for node in SYSTEMS {
+        let list = systems.says(node, &["list"]).ok();
+        assert!(list.contains("modules at the TCP router are not known: "), "{node}:\n{list}");
+        assert!(systems.says(node, &["list", "--json"]).json()["beyond_silent"].is_string());
+    }
+}
+
 #[test]
 fn calls_and_data_cross_from_system_to_system() {
     let Some(systems) = Systems::launched(OPEN) else { return };
@@ -22,6 +40,7 @@ fn calls_and_data_cross_from_system_to_system() {
     for words in ["TCP router", "up", "node south of south", "node north of north", "takes part"] {
         assert!(shown.contains(words), "no `{words}` in:\n{shown}");
     }
+    check_lists(&systems);
     systems.stop();
 }
 
