@@ -6,7 +6,7 @@ mod support;
 
 use nix::sys::signal::Signal;
 use serde_json::{Map, Value};
-use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+use support::{FAILED, are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
 
 /// A row of each case that is there whenever the case could run, and by whom.
 const ROWS: [(&str, &str); 18] = [
@@ -47,7 +47,7 @@ fn every_case_runs_and_every_line_is_complete() {
         assert!(is_there || is_skipped, "{case} by {who}");
         assert!(own().next().is_some(), "{case}");
     }
-    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with("FAILED")));
+    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
     assert_eq!(failed, None);
     // Whatever was declared arrived.
     let lost = rows.iter().filter(|row| row["case"] == "flows, lost");

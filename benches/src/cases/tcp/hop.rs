@@ -15,6 +15,8 @@ const MESSAGES: usize = 10_000;
 const WARM_UP: usize = 1_000;
 /// All sleep, so the kernel's fair server stays out.
 const CAP: Duration = Duration::from_secs(2);
+/// What waits for longer than 1.5 s is given up on its way.
+const LOST: Duration = Duration::from_secs(5);
 /// Of what it costs at least.
 const OF_RELAYS: f64 = 1.3;
 /// Of what it costs without a seal.
@@ -95,7 +97,9 @@ impl Ground {
         self.turns.set(turn.wrapping_add(1));
         time_two_processes(cell, |end, meetings| {
             let other = if end == End::Ping { End::Pong } else { End::Ping };
-            Module::between(&systems.directory(end), [bench(end, turn), bench(other, turn)], cell.bytes, meetings)
+            let names = [bench(end, turn), bench(other, turn)];
+            Module::between(&systems.directory(end), names, cell.bytes, meetings)
+                .map(|module| module.with_patience(LOST))
         })
     }
 }
