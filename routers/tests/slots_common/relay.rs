@@ -6,6 +6,7 @@ use nix::sys::socket::{
     AddressFamily, LinkAddr, MsgFlags, SockFlag, SockProtocol, SockType, SockaddrLike, recvfrom, sendto, socket,
 };
 use rohrpost_mailbox::monotonic_ns;
+use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_routers::frame::FrameHead;
 use std::collections::VecDeque;
 use std::os::fd::{AsRawFd, OwnedFd};
@@ -76,6 +77,8 @@ impl Drop for Relay<'_> {
 
 /// From the node to all others, and from each of those to the node, which takes what is for it.
 fn run(socket: &OwnedFd, own: usize, others: &[usize], holds: Duration, keeps: Keeps, ends: &AtomicBool) -> u64 {
+    // Where it is not allowed, the relay is late now and then.
+    let _ = schedule(Scheduling::Fifo(1));
     let (mut held, mut carried) = (VecDeque::new(), 0);
     let mut buffer = [0; FRAME_BYTES];
     while !ends.load(Ordering::Relaxed) {
