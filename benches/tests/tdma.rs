@@ -5,7 +5,7 @@
 mod support;
 
 use serde_json::{Map, Value};
-use support::{bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
+use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
 /// A row of each case that is there whenever the case could run, and by whom.
 const ROWS: [(&str, &str); 18] = [
@@ -46,7 +46,7 @@ fn every_case_runs_and_every_line_is_complete() {
         assert!(is_there || is_skipped, "{case} by {who}");
         assert!(own().next().is_some(), "{case}");
     }
-    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with("FAILED")));
+    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
     assert_eq!(failed, None);
     // Whatever was declared arrived.
     let lost = rows.iter().filter(|row| row["case"] == "flows, lost");

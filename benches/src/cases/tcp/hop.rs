@@ -9,7 +9,10 @@ use crate::tcp::relays::{time_mailbox_relays, time_relays};
 use crate::tcp::systems::{Security, Systems, bench};
 use crate::tcp::zenoh::time_zenoh;
 use std::cell::Cell as Counter;
+use std::time::Duration;
 
+/// What waits for longer than 1.5 s is given up on its way.
+const LOST: Duration = Duration::from_secs(5);
 /// Of what it costs at least.
 const OF_RELAYS: f64 = 1.3;
 /// Of what it costs without a seal.
@@ -81,7 +84,9 @@ impl Ground {
         self.turns.set(turn.wrapping_add(1));
         time_two_processes(cell, |end, meetings| {
             let other = if end == End::Ping { End::Pong } else { End::Ping };
-            Module::between(&systems.directory(end), [bench(end, turn), bench(other, turn)], cell.bytes, meetings)
+            let names = [bench(end, turn), bench(other, turn)];
+            Module::between(&systems.directory(end), names, cell.bytes, meetings)
+                .map(|module| module.with_patience(LOST))
         })
     }
 }
