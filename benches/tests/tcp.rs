@@ -4,9 +4,8 @@
 
 mod support;
 
-use nix::sys::signal::Signal;
 use serde_json::{Map, Value};
-use support::{FAILED, are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
 
 /// A row that is there whenever its case could run: case and who.
 const ROWS: [(&str, &str); 18] = [
@@ -58,16 +57,12 @@ fn every_case_runs_and_every_line_is_complete() {
 
 #[test]
 fn whoever_interrupts_it_finds_no_process_left() {
-    let mut child = bench("tcp", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
-    let prefix = prefix(&child);
+    let child = bench("tcp", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
     let mut pids = Vec::new();
     // Systems, relays and modules.
     wait_for("a turn", || {
         pids = children(&child);
         pids.len() > 2
     });
-    signal(&child, Signal::SIGINT);
-    assert!(!child.wait().unwrap().success());
-    assert_eq!(left_behind(&prefix), [""; 0]);
-    wait_for("the processes to end", || are_gone(&pids));
+    interrupt(child, &pids);
 }

@@ -128,6 +128,14 @@ pub(crate) fn are_gone(pids: &[String]) -> bool {
     })
 }
 
+/// Interrupts a run that has these processes: it ends, and leaves none of them, and nothing in shared memory.
+pub(crate) fn interrupt(mut child: Child, pids: &[String]) {
+    signal(&child, Signal::SIGINT);
+    assert!(!child.wait().unwrap().success());
+    assert_eq!(left_behind(&prefix(&child)), [""; 0]);
+    wait_for("the processes to end", || are_gone(pids));
+}
+
 /// Sends it a signal.
 pub(crate) fn signal(child: &Child, signal: Signal) {
     kill(Pid::from_raw(i32::try_from(child.id()).unwrap()), signal).unwrap();
