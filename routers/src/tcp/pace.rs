@@ -6,6 +6,8 @@
 //!
 //! As long as nothing is known little is held at a time; a connection that takes much more than that and is never full is fast.
 
+use crate::session::BATCH_BYTES;
+
 /// What the kernel may keep before it has sent it: what leaves in so long.
 const UNSENT_NS: u64 = 250_000_000;
 /// The same and what is under way to the other end: what leaves in so long, or in twice the way there and back. With less than that way takes
@@ -62,6 +64,11 @@ impl Pace {
     /// What the kernel may keep before it has sent it.
     pub(super) fn unsent_bytes(&self) -> usize {
         self.unsent as usize
+    }
+
+    /// What is made ready at a time; without a rate, as much as usual.
+    pub(super) fn batch_bytes(&self) -> usize {
+        self.rate.map_or(BATCH_BYTES, |_| self.unsent_bytes())
     }
 
     /// Whether it is known to take little.

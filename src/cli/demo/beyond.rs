@@ -30,6 +30,8 @@ struct Sum {
     /// Meant to go to the TCP router.
     meant: u64,
     left: u64,
+    /// By newer ones, at the clients' ends.
+    replaced: u64,
     came: u64,
     delivered: u64,
     /// By cause.
@@ -55,6 +57,7 @@ fn sums(links: &[BeyondLink]) -> BTreeMap<u8, Sum> {
         for class in &link.sent {
             let sum = sums.entry(class.class).or_default();
             (sum.meant, sum.left) = (sum.meant + class.packages, sum.left + class.passed);
+            sum.replaced += class.replaced;
             sum.lose(class);
         }
         for class in &link.received {
@@ -77,13 +80,14 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
             class_name(installation, Some(Class(class))),
             sum.meant.to_string(),
             sum.left.to_string(),
+            sum.replaced.to_string(),
             sum.came.to_string(),
             sum.delivered.to_string(),
             sum.on_way().to_string(),
             if lost.is_empty() { "none".into() } else { lost.join(", ") },
         ]
     });
-    let heads = ["class", ">meant to", ">left", ">came", ">delivered", ">lost on the way", "lost at the ends"];
+    let heads = ["class", ">meant to", ">left", ">replaced", ">came", ">delivered", ">lost on the way", "lost at the ends"];
     let mut text = String::from("\nThrough the TCP router, by class, as the clients of all nodes have counted:\n\n");
     text += &table(heads, rows);
     if has_died {

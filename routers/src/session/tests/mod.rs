@@ -2,6 +2,7 @@
 
 mod book;
 mod ends;
+mod newest;
 mod pipe;
 mod plan;
 mod strain;
@@ -20,7 +21,7 @@ use world::{MS, S, World};
 const WELL_NS: u64 = 10 * S;
 const SEEDS: u64 = 30;
 /// What must have been seen in each ten networks.
-const SEEN_IN_TEN: [(&str, u64); 17] = [
+const SEEN_IN_TEN: [(&str, u64); 18] = [
     ("delivered", 5000),
     ("to all", 300),
     ("answered", 300),
@@ -38,6 +39,7 @@ const SEEN_IN_TEN: [(&str, u64); 17] = [
     ("client restarted", 5),
     ("line faults", 50),
     ("posted", 20_000),
+    ("replaced", 20),
 ];
 
 /// One seed: all goes wrong for a while, then all must be well.
@@ -56,6 +58,8 @@ fn run(plan: Plan) -> World {
         all_are_reached(&mut world);
         world.check_server(true);
         world.check_clients();
+        let replaced = world.replaced();
+        world.book.seen.insert("replaced", replaced);
     }
     world.book.problems.iter_mut().for_each(|problem| *problem = format!("seed {seed}, {problem}"));
     world
@@ -156,7 +160,7 @@ fn every_mistake_is_noticed() {
     let mut missed = Vec::new();
     for broken in Broken::SESSION {
         let fails = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
-        let by_check = CHECKS.iter().chain(strain::CHECKS).chain(&[check_backoff as fn(), check_slow_line]).any(fails);
+        let by_check = CHECKS.iter().chain(strain::CHECKS).chain(newest::CHECKS).chain(&[check_backoff as fn(), check_slow_line]).any(fails);
         let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).book.problems.is_empty());
         let by_network = (!by_check).then(|| (0..SEEDS).find(breaks)).flatten();
         eprintln!("{broken:?}: check {by_check}, network {by_network:?}");
