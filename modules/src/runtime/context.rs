@@ -8,8 +8,8 @@ use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
 use rohrpost_config::{ClassTable, Installation, NameTextError};
 use rohrpost_mailbox::{
-    CreateError, Full, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime,
-    Type, Watch, Watches, local,
+    CreateError, Full, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock,
+    SystemTime, Type, Watch, Watches, local,
 };
 use std::cell::RefCell;
 use std::io;

@@ -30,7 +30,8 @@ impl Hints {
     /// A package waits there. `newest` has the head of what waits in a place, if of that only the newest counts.
     pub(super) fn note<'a>(&mut self, head: &Head, place: u32, newest: impl Fn(u32) -> Option<&'a Head>) {
         let set = self.set(head);
-        let is_dated = |hint: u32| hint == NONE || hint == place || newest(hint).is_none_or(|head| self.set(head) != set);
+        let is_dated =
+            |hint: u32| hint == NONE || hint == place || newest(hint).is_none_or(|head| self.set(head) != set);
         let way = self.0[set].iter().position(|hint| is_dated(*hint)).unwrap_or(place as usize % WAYS);
         self.0[set][way] = place;
     }

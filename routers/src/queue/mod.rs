@@ -189,7 +189,9 @@ impl Queue {
         let is_older = |place: &u32| {
             let Entry { waiting, .. } = &self.entries[*place as usize];
             let is_alike = (waiting.sender, waiting.peer, waiting.level) == (newer.sender, newer.peer, newer.level);
-            is_alike && waiting.parts == 0 && self.entries[*place as usize].of_newest().is_some_and(|head| same_state(head, &newer.head))
+            is_alike
+                && waiting.parts == 0
+                && self.entries[*place as usize].of_newest().is_some_and(|head| same_state(head, &newer.head))
         };
         hints.of(&newer.head).find(is_older).map(Place)
     }
@@ -197,7 +199,13 @@ impl Queue {
     /// Lets a package wait in the place of the [older](Self::older) one. False: it has no room, not even if what is less important gives way;
     /// then the older one goes on waiting.
     #[must_use]
-    pub fn replace(&mut self, place: Place, newer: Waiting, body: &[u8], mut gone: impl FnMut(&Waiting, &[u8])) -> bool {
+    pub fn replace(
+        &mut self,
+        place: Place,
+        newer: Waiting,
+        body: &[u8],
+        mut gone: impl FnMut(&Waiting, &[u8]),
+    ) -> bool {
         let Entry { body: old, .. } = self.entries[place.0 as usize];
         let needed = Blocks::needed(body.len());
         let (sender, level) = (usize::from(newer.sender), newer.level);

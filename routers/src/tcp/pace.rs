@@ -152,7 +152,14 @@ mod tests {
             (60, 15 * 1024, Some(60 * 1024), "half a Mbit/s"),
             (10_000, 32 * 1024, None, "fast: the kernel knows best"),
         ] {
-            let told = run(&mut Pace::default(), 0, 2000, bytes_ms).unwrap();
+            let mut pace = Pace::default();
+            assert_eq!(pace.batch_bytes(), BATCH_BYTES, "as long as nothing is known");
+            let told = run(&mut pace, 0, 2000, bytes_ms).unwrap();
+            assert_eq!(
+                pace.batch_bytes() as u64,
+                told.unsent,
+                "what is made ready waits no longer than what is unsent"
+            );
             assert!(told.unsent.abs_diff(unsent) < 2048, "{why}: {told:?}");
             assert_eq!(told.held.is_some(), held.is_some(), "{why}: {told:?}");
             assert!(told.held.unwrap_or(0).abs_diff(held.unwrap_or(0)) < 4096, "{why}: {told:?}");

@@ -87,7 +87,8 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
             if lost.is_empty() { "none".into() } else { lost.join(", ") },
         ]
     });
-    let heads = ["class", ">meant to", ">left", ">replaced", ">came", ">delivered", ">lost on the way", "lost at the ends"];
+    let heads =
+        ["class", ">meant to", ">left", ">replaced", ">came", ">delivered", ">lost on the way", "lost at the ends"];
     let mut text = String::from("\nThrough the TCP router, by class, as the clients of all nodes have counted:\n\n");
     text += &table(heads, rows);
     if has_died {

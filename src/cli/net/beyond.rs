@@ -111,7 +111,8 @@ fn losses(running: &Running, links: &[&BeyondLink], servers: &[&BeyondClients]) 
             let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
             let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
             let name = name.unwrap_or_else(|| class.class.to_string());
-            let [came, passed, replaced] = [class.packages, class.passed, class.replaced].map(|count| count.to_string());
+            let [came, passed, replaced] =
+                [class.packages, class.passed, class.replaced].map(|count| count.to_string());
             let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
             rows.push([at.clone(), name, came, passed, replaced, lost]);
         }

@@ -160,7 +160,12 @@ fn every_mistake_is_noticed() {
     let mut missed = Vec::new();
     for broken in Broken::SESSION {
         let fails = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
-        let by_check = CHECKS.iter().chain(strain::CHECKS).chain(newest::CHECKS).chain(&[check_backoff as fn(), check_slow_line]).any(fails);
+        let by_check = CHECKS
+            .iter()
+            .chain(strain::CHECKS)
+            .chain(newest::CHECKS)
+            .chain(&[check_backoff as fn(), check_slow_line])
+            .any(fails);
         let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).book.problems.is_empty());
         let by_network = (!by_check).then(|| (0..SEEDS).find(breaks)).flatten();
         eprintln!("{broken:?}: check {by_check}, network {by_network:?}");

@@ -108,7 +108,8 @@ impl ClientShell {
     /// # Errors
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
-        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal, keeps_time, impair } = parts;
+        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal, keeps_time, impair } =
+            parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;

@@ -12,6 +12,7 @@ use super::stream::{Moved, Stream};
 use crate::session::ClientIndex;
 use crate::session::server::{Output, Server, ServerSettings, View};
 use crate::shell::Faults;
+use door::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
 use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
@@ -20,7 +21,6 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use door::{listen, raise_descriptors};
 use voice::Voice;
 
 /// Read from one client before the others have their turn.
