@@ -16,7 +16,6 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// What sockets hold of what the line has not taken yet: what it carries in so long.
@@ -32,11 +31,10 @@ const CONNECT: Duration = Duration::from_secs(5);
 /// Whether it is to end is looked for this often.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// The thread; dropped, it ends.
+/// The thread; dropped, it ends soon. Nobody waits for that: it may be connecting.
 pub(super) struct BadLine {
     near: SocketAddr,
     ends: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
 }
 
 impl BadLine {
@@ -53,8 +51,8 @@ impl BadLine {
         let listener = TcpListener::from(listener);
         let (near, ends) = (listener.local_addr()?, Arc::new(AtomicBool::new(false)));
         let work = Work { server, settings, listener, ends: ends.clone(), connections: 0 };
-        let thread = std::thread::Builder::new().name("tcp-bad-line".into()).spawn(move || work.run())?;
-        Ok(Self { near, ends, thread: Some(thread) })
+        std::thread::Builder::new().name("tcp-bad-line".into()).spawn(move || work.run())?;
+        Ok(Self { near, ends })
     }
 
     /// Where the client connects to.
@@ -66,10 +64,6 @@ impl BadLine {
 impl Drop for BadLine {
     fn drop(&mut self) {
         self.ends.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            // One that panicked has said so.
-            let _ = thread.join();
-        }
     }
 }
 

@@ -74,7 +74,9 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     if links.is_empty() {
         return String::new();
     }
-    let rows = sums(links).into_iter().rev().map(|(class, sum)| {
+    let all = sums(links);
+    let is_any_on_way = all.values().any(|sum| sum.on_way() > 0);
+    let rows = all.into_iter().rev().map(|(class, sum)| {
         let lost: Vec<String> = sum.lost.iter().map(|(cause, packages)| format!("{packages} {cause}")).collect();
         [
             class_name(installation, Some(Class(class))),
@@ -93,6 +95,9 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     text += &table(heads, rows);
     if has_died {
         text += "(lost on the way: with connections that broke, or waiting in a TCP router that died, less its own answers to what it could not hand on)\n";
+    }
+    if is_any_on_way {
+        text += "(what newer ones replaced at the TCP router itself counts as lost on the way here; `rohrpost net` tells it apart)\n";
     }
     let rows = links.iter().map(|link| {
         let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {
