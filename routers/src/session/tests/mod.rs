@@ -176,4 +176,11 @@ fn every_mistake_is_noticed() {
     assert_eq!(missed, []);
 }
 
+#[test]
+fn accounts_of_a_network_do_not_balance_without_those_that_were_replaced() {
+    let breaks = |seed| with(Broken::ForgetsReplaced, || run(Plan::rough(seed)).book.problems);
+    let problems: Vec<String> = (0..SEEDS).map(breaks).find(|problems| !problems.is_empty()).unwrap_or_default();
+    assert!(problems.iter().any(|problem| problem.contains("are accounted for")), "{problems:?}");
+}
+
 const _: () = assert!(WELL_NS > 2 * BACKOFF_MAX_NS && MS < S);
