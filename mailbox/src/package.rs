@@ -89,6 +89,9 @@ impl Options {
     pub const ERROR: Self = Self(4);
     /// Its receiver died while it had this package; it is handed out a second and last time.
     pub const REDELIVERED: Self = Self(8);
+    /// Of data: of one sender, receiver, type and id only the newest counts, so a newer package may replace this one on its way. Of the command
+    /// that subscribes: the data are to be such.
+    pub const NEWEST: Self = Self(16);
 
     /// Whether all bits of `other` are set.
     pub const fn has(self, other: Self) -> bool {

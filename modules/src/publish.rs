@@ -20,6 +20,17 @@ pub(crate) struct Newest {
     pub(crate) value: Vec<u8>,
 }
 
+/// Of a request that subscribes.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked {
+    /// Mailbox that the data go to.
+    pub(crate) to: Name,
+    /// Its priority; the data carry the same.
+    pub(crate) priority: Priority,
+    /// Of the data only the newest counts, and they say so.
+    pub(crate) newest: bool,
+}
+
 /// One subscription.
 pub(crate) struct Subscription {
     pub(crate) face: usize,
@@ -28,6 +39,8 @@ pub(crate) struct Subscription {
     pub(crate) to: Name,
     /// Of the request that asked for it; the data carry the same.
     pub(crate) priority: Priority,
+    /// Whether only the newest counts to who asked.
+    pub(crate) newest: bool,
     pub(crate) sequence: u32,
     pub(crate) missed: u32,
     ends_ns: u64,
@@ -61,14 +74,8 @@ pub(crate) struct Subscriptions {
 
 impl Subscriptions {
     /// Begins or renews; false when there is no room. Times are monotonic.
-    pub(crate) fn subscribe(
-        &mut self,
-        face: usize,
-        to: Name,
-        priority: Priority,
-        mut wish: Subscribe,
-        now_ns: u64,
-    ) -> bool {
+    pub(crate) fn subscribe(&mut self, face: usize, asked: Asked, mut wish: Subscribe, now_ns: u64) -> bool {
+        let Asked { to, priority, newest } = asked;
         wish.period_us = if wish.period_us == 0 { 0 } else { wish.period_us.max(PERIOD_MIN_US) };
         let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms) * 1_000_000);
         let due_ns = if wish.period_us == 0 { 0 } else { now_ns };
@@ -79,14 +86,25 @@ impl Subscriptions {
                 // What was fresh was another's.
                 (known.due_ns, known.fresh, known.told) = (due_ns, false, false);
             }
-            (known.face, known.wish, known.priority) = (face, wish, priority);
+            (known.face, known.wish, known.priority, known.newest) = (face, wish, priority, newest);
             return true;
         }
         if self.list.len() >= SUBSCRIPTIONS_MAX {
             return false;
         }
-        let (sequence, missed, fresh, told) = (0, 0, false, false);
-        self.list.push(Subscription { face, wish, to, priority, sequence, missed, ends_ns, due_ns, fresh, told });
+        self.list.push(Subscription {
+            face,
+            wish,
+            to,
+            priority,
+            newest,
+            sequence: 0,
+            missed: 0,
+            ends_ns,
+            due_ns,
+            fresh: false,
+            told: false,
+        });
         true
     }
 
@@ -187,9 +205,13 @@ mod tests {
         Subscribe { number: 1, id: 7, period_us: period_ms * 1000, lease_ms: 1000, mailbox: 2 }
     }
 
+    fn asked(local: u8) -> Asked {
+        Asked { to: Name::new(1, 9, 0, local), priority: Priority(9), newest: false }
+    }
+
     fn subscribed(period_ms: u32) -> Subscriptions {
         let mut all = Subscriptions::default();
-        assert!(all.subscribe(0, Name::new(1, 9, 0, 2), Priority(9), wish(period_ms), 1));
+        assert!(all.subscribe(0, asked(2), wish(period_ms), 1));
         all
     }
 
@@ -245,7 +267,7 @@ mod tests {
     fn a_lease_ends_unless_it_is_renewed() {
         let mut all = subscribed(0);
         tick(&mut all, 999 * MS);
-        assert!(all.subscribe(0, Name::new(1, 9, 0, 2), Priority(9), wish(0), 999 * MS));
+        assert!(all.subscribe(0, asked(2), wish(0), 999 * MS));
         assert_eq!(all.len(), 1, "renewed, not doubled");
         tick(&mut all, 1500 * MS);
         assert_eq!(all.len(), 1);
@@ -257,7 +279,7 @@ mod tests {
     fn mailboxes_of_one_subscriber_have_ids_of_their_own() {
         let mut all = subscribed(0);
         let own = Name::new(1, 9, 0, 3);
-        assert!(all.subscribe(0, own, Priority(9), Subscribe { mailbox: 3, ..wish(0) }, 1));
+        assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
         assert_eq!((all.len(), publish(&mut all, || Delivery::Sent)), (2, 2));
         all.unsubscribe(own, 7);
         assert_eq!((all.len(), all.list[0].to.local()), (1, 2));
@@ -267,7 +289,7 @@ mod tests {
     fn no_period_is_too_short_to_live_with() {
         let mut all = Subscriptions::default();
         let hasty = Subscribe { period_us: 1, lease_ms: u32::MAX, ..wish(0) };
-        assert!(all.subscribe(0, Name::new(1, 9, 0, 2), Priority(9), hasty, 1));
+        assert!(all.subscribe(0, asked(2), hasty, 1));
         let mut now_ns = 1;
         for _ in 0..1000 {
             tick(&mut all, now_ns);

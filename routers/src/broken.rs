@@ -129,6 +129,16 @@ mod variants {
         NeverBacksOff,
         /// Session: every registration is looked at, however many one client sends.
         RegistersAtOnce,
+        /// Session: of data of which only the newest counts all wait.
+        NeverReplaces,
+        /// Session: of all data only the newest counts.
+        ReplacesAllData,
+        /// Session: what is replaced by a newer one is not counted.
+        ForgetsReplaced,
+        /// Session: what replaces an older one waits behind all others.
+        LosesItsPlace,
+        /// Session: what waits behind something fresh is not looked at.
+        LooksAtFirst,
         /// Session: a question for the time waits behind packages that have not begun to leave.
         AsksLast,
         /// Security: what was opened before is opened again.
@@ -204,7 +214,7 @@ mod variants {
         ];
 
         /// All mistakes of sessions.
-        pub const SESSION: [Self; 20] = [
+        pub const SESSION: [Self; 25] = [
             Self::ForgetsPieces,
             Self::TakesTwice,
             Self::TakesAnyRange,
@@ -224,6 +234,11 @@ mod variants {
             Self::RegistersOnce,
             Self::NeverBacksOff,
             Self::RegistersAtOnce,
+            Self::NeverReplaces,
+            Self::ReplacesAllData,
+            Self::ForgetsReplaced,
+            Self::LosesItsPlace,
+            Self::LooksAtFirst,
             Self::AsksLast,
         ];
 

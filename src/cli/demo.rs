@@ -70,7 +70,8 @@ pub(super) struct Arguments {
     /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch starts it again.
     #[arg(long, requires_all = ["nodes", "seconds"])]
     kill_master: bool,
-    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed.
+    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. To nodes that are reached by TCP alone
+    /// what is lost is a delay, for all that is behind it.
     #[arg(long, value_name = "TEXT", requires = "nodes")]
     impair: Option<impair::Settings>,
     /// Another configuration.

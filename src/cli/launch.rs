@@ -36,7 +36,8 @@ pub(super) struct Arguments {
     /// Launch all nodes on this computer, each in a network namespace of its own.
     #[arg(long, conflicts_with = "node")]
     all: bool,
-    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed.
+    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. To nodes that are reached by TCP alone
+    /// what is lost is a delay, for all that is behind it.
     #[arg(long, value_name = "TEXT", requires = "all")]
     impair: Option<impair::Settings>,
     /// No live table, only what happens.

@@ -55,7 +55,7 @@ fn accounts(client: &serde_json::Value) -> Vec<(u64, u64)> {
     let number = |value: &serde_json::Value| value.as_u64().unwrap_or_default();
     let account = |class: &serde_json::Value| {
         let lost = class["lost"].as_array().into_iter().flatten().map(|lost| number(&lost["packages"])).sum::<u64>();
-        (number(&class["packages"]), number(&class["passed"]) + lost)
+        (number(&class["packages"]), number(&class["passed"]) + number(&class["replaced"]) + lost)
     };
     ways.iter().flatten().map(account).collect()
 }

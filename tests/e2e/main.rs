@@ -53,3 +53,4 @@ mod tools_data;
 mod top;
 mod tuned;
 mod versions;
+mod wifi;

@@ -126,6 +126,10 @@ pub(crate) struct Settings {
     rate_hz: f64,
     /// Publishes `blob` so often.
     blob_hz: f64,
+    /// Of so many bytes, which begin with its number and the monotonic time; 0: of sizes that change.
+    blob_bytes: usize,
+    /// Follows the blobs of this probe in [`NEWEST`]; the record has their numbers and ages, µs.
+    watches: Option<String>,
     panic_at_start: bool,
     /// Ends before it is ready.
     exit_at_start: Option<i32>,
@@ -158,6 +162,7 @@ pub(crate) struct Probe {
     leave: Option<i32>,
     /// Each, and the newest.
     hears: Option<[Subscription<u64>; 2]>,
+    watches: Option<Subscription<Vec<u8>>>,
 }
 
 impl Probe {
@@ -177,8 +182,15 @@ fn write_line(record: &Path, line: &str) {
 impl Probe {
     /// Publishes, and writes down when (between two moments of the monotonic clock) and how many bytes.
     fn publish_blob(&self, context: &mut Context) -> Result<(), ModuleError> {
-        let blob = vec![0; 10 + self.beats as usize % 7 * 15];
         let before = rohrpost::mailbox::monotonic_ns();
+        let blob = match self.settings.blob_bytes {
+            0 => vec![0; 10 + self.beats as usize % 7 * 15],
+            bytes => {
+                let mut blob = [self.beats.to_le_bytes(), before.to_le_bytes()].concat();
+                blob.resize(bytes, 0);
+                blob
+            }
+        };
         context.publish_now(ProbingInterface::BLOB, &blob)?;
         let after = rohrpost::mailbox::monotonic_ns();
         // As postcard: the length in one byte, and the bytes.
@@ -197,6 +209,13 @@ fn hear(from: &str, context: &mut Context) -> Result<[Subscription<u64>; 2], Mod
     Ok([context.subscribe(beat, from, Rate::Each)?, newest])
 }
 
+/// Follows another probe's blobs, of which only the newest counts.
+fn watch(from: &str, context: &mut Context) -> Result<Subscription<Vec<u8>>, ModuleError> {
+    let shape = Shape { slots: 8, body_bytes_max: 16 * 1024, full: Full::Latest, ..Shape::default() };
+    context.open_mailbox(NEWEST, shape)?;
+    Ok(context.subscribe_in(NEWEST, ProbingInterface::BLOB, from, Rate::Each)?)
+}
+
 impl Module for Probe {
     type Settings = Settings;
     type Interfaces = ProbingInterface;
@@ -207,7 +226,8 @@ impl Module for Probe {
         let rate_hz = [settings.blob_hz, settings.rate_hz].into_iter().find(|rate| *rate > 0.0).unwrap_or(100.0);
         context.set_period(Duration::from_secs_f64(1.0 / rate_hz));
         let hears = settings.hears.as_deref().map(|from| hear(from, context)).transpose()?;
-        let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None, hears };
+        let watches = settings.watches.as_deref().map(|from| watch(from, context)).transpose()?;
+        let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None, hears, watches };
         probe.note("start");
         if probe.settings.panic_at_start {
             panic!("a probe was asked to panic");
@@ -250,6 +270,11 @@ impl Module for Probe {
             if let Some(beat) = data.read(subscription) {
                 self.note(&format!("{which} {beat}"));
             }
+        }
+        if let Some(blob) = self.watches.as_ref().and_then(|watched| data.read(watched)) {
+            let word = |at: usize| u64::from_le_bytes(blob[at..at + 8].try_into().unwrap());
+            let age_us = rohrpost::mailbox::monotonic_ns().saturating_sub(word(8)) / 1000;
+            self.note(&format!("blob {} {age_us}", word(0)));
         }
         Ok(())
     }

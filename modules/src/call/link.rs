@@ -46,7 +46,7 @@ struct Call {
     to: Name,
     /// The whole body of the command, to be sent again; then, when the answer has come, the answer.
     body: Vec<u8>,
-    kind: Type,
+    label: Label,
     began: Instant,
     timeout: Duration,
     repeat_at: Instant,
@@ -169,6 +169,19 @@ impl Link {
         timeout: Duration,
         arguments: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
     ) -> Result<u32, CallError> {
+        self.begin_with(Options::default(), to, function, interface, timeout, arguments)
+    }
+
+    /// The same with options in the command's head.
+    pub(crate) fn begin_with(
+        &mut self,
+        options: Options,
+        to: Name,
+        function: u16,
+        interface: u32,
+        timeout: Duration,
+        arguments: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
+    ) -> Result<u32, CallError> {
         // The number may come from another process's description.
         if !(1..=Type::COMMAND_MAX).contains(&function) {
             return Err(CallError::BadArguments(format!("{function} is no function's number")));
@@ -198,8 +211,9 @@ impl Link {
         let began = Instant::now();
         let kind = Type::command(function);
         let repeat_at = began + timeout / REPEATS;
-        let call = Call { sequence, to, body, kind, began, timeout, repeat_at, repeated: false, answer: None };
-        match self.send(to, &self.label(kind, sequence), &[&call.body]) {
+        let label = self.label(kind, sequence, options);
+        let call = Call { sequence, to, body, label, began, timeout, repeat_at, repeated: false, answer: None };
+        match self.send(to, &label, &[&call.body]) {
             Ok(()) => {
                 self.calls.push(call);
                 Ok(sequence)
@@ -216,13 +230,13 @@ impl Link {
         }
     }
 
-    fn label(&self, kind: Type, sequence: u32) -> Label {
+    fn label(&self, kind: Type, sequence: u32, options: Options) -> Label {
         Label {
             from: self.me.with_local(rohrpost_mailbox::local::REPLIES),
             kind,
             id: sequence as u16,
             priority: self.me.class().priority(),
-            options: Options::default(),
+            options,
         }
     }
 
@@ -331,7 +345,7 @@ impl Link {
             let its = |call: &&mut Call| {
                 call.sequence == envelope.sequence
                     && call.is_to(head.from)
-                    && head.kind.0 == -call.kind.0
+                    && head.kind.0 == -call.label.kind.0
                     && call.answer.is_none()
             };
             let call = self.calls.iter_mut().find(its).filter(|_| envelope.incarnation == self.incarnation);
@@ -352,10 +366,10 @@ impl Link {
         // Age 0 means a first try, so a repeat is at least 1 µs old.
         let age_us = micros(now - call.began).max(1);
         call.body[CallEnvelope::BYTES - 4..CallEnvelope::BYTES].copy_from_slice(&age_us.to_le_bytes());
-        let (to, kind, sequence) = (call.to, call.kind, call.sequence);
+        let (to, label) = (call.to, call.label);
         let body = std::mem::take(&mut call.body);
         // A repeat that cannot be sent is as good as one that was lost: the next one, or the timeout, takes care.
-        let _ = self.send(to, &self.label(kind, sequence), &[&body]);
+        let _ = self.send(to, &label, &[&body]);
         self.calls[at].body = body;
         self.tally(to).repeated += 1;
     }

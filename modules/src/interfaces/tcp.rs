@@ -26,6 +26,8 @@ pub struct ClassPassed {
     pub packages: u64,
     /// Of these, handed on.
     pub passed: u64,
+    /// Of these, data of which only the newest counts, and a newer one took their place while they waited. No loss.
+    pub replaced: u64,
     /// Lost, and why.
     pub lost: Vec<CarriedLoss>,
 }

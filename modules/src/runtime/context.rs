@@ -8,8 +8,8 @@ use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
 use rohrpost_config::{ClassTable, Installation, NameTextError};
 use rohrpost_mailbox::{
-    CreateError, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock, SystemTime,
-    Type, Watch, Watches, local,
+    CreateError, Full, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock,
+    SystemTime, Type, Watch, Watches, local,
 };
 use std::cell::RefCell;
 use std::io;
@@ -64,8 +64,8 @@ pub struct Context {
     pub(crate) clock: SystemClock,
     /// Mailboxes of the module's own, besides commands, replies and data.
     pub(crate) own: Vec<Receiver>,
-    /// Their local ids.
-    opened: Vec<u8>,
+    /// Mailboxes that take data, by local id, and whether only the newest counts there.
+    taking: Vec<(u8, bool)>,
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
     pub(crate) period: Option<Duration>,
@@ -80,6 +80,7 @@ impl Context {
         link: Link,
         faces: Vec<Name>,
         clock: SystemClock,
+        data: &Shape,
     ) -> Self {
         let publications = Publications::new(link.participant());
         Self {
@@ -93,7 +94,7 @@ impl Context {
             followings: Followings::default(),
             clock,
             own: Vec::new(),
-            opened: Vec::new(),
+            taking: vec![(local::DATA, data.full == Full::Latest)],
             watches: None,
             period: None,
             next_tick: None,
@@ -200,10 +201,9 @@ impl Context {
         interface: u32,
         rate: Rate,
     ) -> Result<Subscription<T>, ContextError> {
-        if mailbox != local::DATA && !self.opened.contains(&mailbox) {
-            return Err(ContextError::NoMailbox(mailbox));
-        }
-        Ok(Subscription::new(self.followings.follow(mailbox, from, number, interface, rate), mailbox))
+        let known = self.taking.iter().copied().find(|(local, _)| *local == mailbox);
+        let (mailbox, latest) = known.ok_or(ContextError::NoMailbox(mailbox))?;
+        Ok(Subscription::new(self.followings.follow((mailbox, latest), from, number, interface, rate), mailbox))
     }
 
     /// Makes a mailbox of the module's own, local id 3 or more. What it brings comes to [`crate::Module::received`]: data that
@@ -214,7 +214,7 @@ impl Context {
     pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
         let participant = self.link.borrow().participant().clone();
         self.own.push(participant.receiver(self.me.with_local(local), shape)?);
-        self.opened.push(local);
+        self.taking.push((local, shape.full == Full::Latest));
         Ok(())
     }
 
@@ -326,7 +326,7 @@ fn deliver(
         kind: Type::data(newest.number),
         id: to.wish.id,
         priority: to.priority,
-        options: Options::STAMPED,
+        options: if to.newest { Options::STAMPED.with(Options::NEWEST) } else { Options::STAMPED },
     };
     match link.borrow_mut().send(to.to, &label, &[&head.to_bytes(), &newest.value]) {
         Ok(()) => Delivery::Sent,

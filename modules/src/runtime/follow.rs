@@ -3,7 +3,7 @@
 use crate::call::{CallError, Fault, Link};
 use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use crate::interface::append;
-use rohrpost_mailbox::Name;
+use rohrpost_mailbox::{Name, Options};
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};
 
@@ -57,6 +57,8 @@ impl<T> Subscription<T> {
 struct Followed {
     from: Name,
     wish: Subscribe,
+    /// Of the request: whether only the newest counts.
+    options: Options,
     interface: u32,
     /// A request under way.
     call: Option<u32>,
@@ -78,8 +80,16 @@ pub(crate) struct Followings {
 }
 
 impl Followings {
-    /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id.
-    pub(crate) fn follow(&mut self, mailbox: u8, from: Name, number: u16, interface: u32, rate: Rate) -> u16 {
+    /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id. `latest`: there only the newest
+    /// counts, and on the way as well.
+    pub(crate) fn follow(
+        &mut self,
+        (mailbox, latest): (u8, bool),
+        from: Name,
+        number: u16,
+        interface: u32,
+        rate: Rate,
+    ) -> u16 {
         let id = self.list.len() as u16;
         let period_us = match rate {
             Rate::Each => 0,
@@ -88,8 +98,19 @@ impl Followings {
         let wish = Subscribe { number, id, period_us, lease_ms: LEASE.as_millis() as u32, mailbox };
         let next = Instant::now();
         let from = from.module();
-        let (came, lost) = (0, 0);
-        self.list.push(Followed { from, wish, interface, call: None, next, expected: None, came, lost, refusal: None });
+        let options = if latest { Options::NEWEST } else { Options::default() };
+        self.list.push(Followed {
+            from,
+            wish,
+            options,
+            interface,
+            call: None,
+            next,
+            expected: None,
+            came: 0,
+            lost: 0,
+            refusal: None,
+        });
         id
     }
 
@@ -120,7 +141,8 @@ impl Followings {
             }
             if followed.call.is_none() {
                 let write = |body: &mut Vec<u8>| append(body, &followed.wish);
-                match link.begin(followed.from, SUBSCRIBE, followed.interface, ANSWER, write) {
+                let (to, options) = (followed.from, followed.options);
+                match link.begin_with(options, to, SUBSCRIBE, followed.interface, ANSWER, write) {
                     Ok(call) => followed.call = Some(call),
                     Err(error) => followed.answered(Err(error), now),
                 }
@@ -133,7 +155,7 @@ impl Followings {
         self.list.iter().map(|followed| followed.next).min()
     }
 
-    /// Notes the number of a package that came to `mailbox`. `latest`: a gap there is what newer ones replaced, and no loss.
+    /// Notes the number of a package that came to `mailbox`. `latest`: a gap there is what newer ones replaced, there or on the way, and no loss.
     pub(crate) fn note(&mut self, mailbox: u8, latest: bool, from: Name, id: u16, head: &DataHead) {
         let its = |followed: &&mut Followed| (followed.from, followed.wish.mailbox) == (from.module(), mailbox);
         let Some(followed) = self.list.get_mut(usize::from(id)).filter(its) else { return };

@@ -10,7 +10,8 @@ use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
 use crate::module::Module;
 use crate::output;
-use rohrpost_mailbox::{Label, Name, SendError, local, monotonic_ns};
+use crate::publish::Asked;
+use rohrpost_mailbox::{Label, Name, Options, SendError, local, monotonic_ns};
 
 /// What is needed to run one command.
 pub(super) struct Hosted<'a, M> {
@@ -57,7 +58,8 @@ impl<M: Module> Hosted<'_, M> {
                 let to = data_mailbox(call, wish.mailbox)?;
                 let now_ns = monotonic_ns();
                 let subscriptions = &mut self.context.subscriptions;
-                let room = subscriptions.subscribe(self.index, to, call.head.priority, wish, now_ns);
+                let asked = Asked { to, priority: call.head.priority, newest: call.head.options.has(Options::NEWEST) };
+                let room = subscriptions.subscribe(self.index, asked, wish, now_ns);
                 if room { Ok(()) } else { Err(Fault::Busy) }
             }
             common::UNSUBSCRIBE => {

@@ -189,7 +189,7 @@ impl Start {
         let link = Link::new(&participant, self.name, replies);
         let clock = SystemClock::open(&node);
         let names = faces.iter().map(|face: &Face<M>| face.name).collect();
-        let mut context = Context::new(self.name, installation.clone(), link, names, clock);
+        let mut context = Context::new(self.name, installation.clone(), link, names, clock, data.shape());
         let settings = installation.settings_as(module)?;
         let mut made =
             M::new(settings, &mut context).map_err(|error| StartError::Module(text.clone(), error.to_string()))?;

@@ -1,4 +1,5 @@
-//! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line, changed bits.
+//! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line, changed bits. And what
+//! the same network is to a stream: a [`Line`].
 //!
 //! ```text
 //!  push ──▶ lost? ──▶ line of `rate` ──▶ delay ± jitter ──▶ held back? ──▶ changed bit? ──▶ due, in order of time ──▶ poll
@@ -9,8 +10,10 @@
 //! datagram depends on the seed, the stream and how many came before it, not on the time or on other faults: raising the loss leaves the
 //! same datagrams late. The kernel's netem does the same where it exists; this is everywhere, and in the simulator too.
 
+mod line;
 mod text;
 
+pub use line::Line;
 pub use text::SettingsError;
 
 use rand::{RngCore, SeedableRng};
@@ -92,6 +95,24 @@ impl Default for Settings {
             corrupt: Share::default(),
             seed: 1,
         }
+    }
+}
+
+impl Settings {
+    /// When the line has sent so many bytes that it began then.
+    fn sent_ns(&self, begin_ns: u64, bytes: usize) -> u64 {
+        let Some(rate) = self.rate_bytes_s else { return begin_ns };
+        let takes_ns = u128::from(bytes as u64) * 1_000_000_000 / u128::from(rate.max(1));
+        begin_ns.saturating_add(u64::try_from(takes_ns).unwrap_or(u64::MAX))
+    }
+
+    fn delay_ns(&self, drawn: u32) -> u64 {
+        let (delay, jitter) = (nanos(self.delay), nanos(self.jitter));
+        (delay + part(2 * jitter, drawn)).saturating_sub(jitter)
+    }
+
+    fn later_ns(&self, drawn: u32) -> u64 {
+        1 + part(LATER_NS.max(2 * nanos(self.delay)), drawn)
     }
 }
 
@@ -205,17 +226,18 @@ impl<T: Clone> Impairment<T> {
             self.counts.lost += 1;
             return;
         }
-        let sent_ns = self.line(now_ns, datagram.len());
-        let mut due_ns = sent_ns.saturating_add(self.delay_ns(drawn.jitter)).max(self.last_due_ns);
+        self.line_free_ns = self.settings.sent_ns(self.line_free_ns.max(now_ns), datagram.len());
+        let due_ns = self.line_free_ns.saturating_add(self.settings.delay_ns(drawn.jitter));
+        let mut due_ns = due_ns.max(self.last_due_ns);
         self.last_due_ns = due_ns;
         if self.settings.reorder.holds(drawn.reorder) {
             self.counts.held_back += 1;
-            due_ns = due_ns.saturating_add(self.later_ns(drawn.later));
+            due_ns = due_ns.saturating_add(self.settings.later_ns(drawn.later));
         }
         let bit = self.settings.corrupt.holds(drawn.corrupt).then_some(drawn.bit);
         if self.settings.duplicate.holds(drawn.duplicate) {
             self.counts.copied += 1;
-            let copy_due_ns = due_ns.saturating_add(self.later_ns(drawn.copy_later));
+            let copy_due_ns = due_ns.saturating_add(self.settings.later_ns(drawn.copy_later));
             self.hold(copy_due_ns, to.clone(), datagram, None);
         }
         self.hold(due_ns, to, datagram, bit);
@@ -249,24 +271,6 @@ impl<T: Clone> Impairment<T> {
     /// Datagrams on their way.
     pub fn on_way(&self) -> usize {
         self.on_way.len()
-    }
-
-    /// When the line has sent it.
-    fn line(&mut self, now_ns: u64, bytes: usize) -> u64 {
-        let Some(rate) = self.settings.rate_bytes_s else { return now_ns };
-        let takes_ns = u128::from(bytes as u64) * 1_000_000_000 / u128::from(rate.max(1));
-        let begin_ns = self.line_free_ns.max(now_ns);
-        self.line_free_ns = begin_ns.saturating_add(u64::try_from(takes_ns).unwrap_or(u64::MAX));
-        self.line_free_ns
-    }
-
-    fn delay_ns(&self, drawn: u32) -> u64 {
-        let (delay, jitter) = (nanos(self.settings.delay), nanos(self.settings.jitter));
-        (delay + part(2 * jitter, drawn)).saturating_sub(jitter)
-    }
-
-    fn later_ns(&self, drawn: u32) -> u64 {
-        1 + part(LATER_NS.max(2 * nanos(self.settings.delay)), drawn)
     }
 
     /// Keeps a copy until it is due, with a bit changed if one is named.

@@ -70,6 +70,11 @@ impl Lists {
         }
     }
 
+    /// What stands behind a place of a list.
+    pub(super) fn after(&self, place: u32) -> Option<u32> {
+        Some(self.0[place as usize].after).filter(|after| *after != NONE)
+    }
+
     pub(super) fn take_first(&mut self, list: &mut List) -> Option<u32> {
         let first = list.first()?;
         self.remove(list, first);

@@ -6,18 +6,23 @@
 //!  package                     head · block ─▶ block ─▶ block   256 B each, so that one large package does not need one large hole
 //! ```
 //!
+//! Of data of which only the newest counts, one that waits can be [`replace`](Queue::replace)d by a newer one in its place, if the queue was
+//! made [for that](Queue::of_one).
+//!
 //! All memory is taken at the start: each sender's quota is there for it alone, so no sender can use up another's.
 
 mod blocks;
+mod hints;
 mod list;
 
 use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::settings::LEVELS;
 use blocks::{BLOCK_BYTES, Blocks, Chain};
+use hints::Hints;
 use list::{List, Lists};
 use rohrpost_config::NODES_MAX;
-use rohrpost_mailbox::Head;
+use rohrpost_mailbox::{Head, Kind, Options};
 
 const _: () = assert!(NODES_MAX <= 64, "a level's peers are the bits of a word");
 
@@ -70,10 +75,18 @@ pub struct Queue {
     busy: [u64; LEVELS],
     /// Levels with something, one bit each.
     levels: u32,
+    /// Where packages wait of which only the newest counts.
+    hints: Option<Hints>,
     quota_blocks: u32,
     ticket: u64,
     used_blocks: u32,
     len: usize,
+}
+
+/// Whether of such packages only the newest counts.
+pub fn counts_newest(head: &Head) -> bool {
+    let is_data = matches!(head.kind.kind(), Kind::Data(_));
+    is_data && (head.options.has(Options::NEWEST) || broken!(ReplacesAllData))
 }
 
 #[derive(Clone, Debug, Default)]
@@ -101,6 +114,7 @@ impl Queue {
             senders: vec![Sender::default(); senders].into(),
             busy: [0; LEVELS],
             levels: 0,
+            hints: None,
             quota_blocks: quota_blocks as u32,
             ticket: 0,
             used_blocks: 0,
@@ -110,6 +124,12 @@ impl Queue {
             queue.by_peer.append(&mut queue.free, place);
         }
         queue
+    }
+
+    /// For one sender and one peer, and it finds what a newer package replaces.
+    pub fn of_one(quota_bytes: usize) -> Self {
+        let queue = Self::new(1, 1, quota_bytes);
+        Self { hints: Some(Hints::new(queue.entries.len())), ..queue }
     }
 
     /// Whether nothing waits.
@@ -144,6 +164,9 @@ impl Queue {
         let Some(place) = self.by_peer.take_first(&mut self.free) else { return false };
         let body = self.blocks.store(body);
         self.entries[place as usize] = Entry { waiting, ticket: self.ticket, body };
+        if let Some(hints) = self.hints.as_mut().filter(|_| counts_newest(&waiting.head)) {
+            hints.note(&waiting.head, place, |hint| self.entries[hint as usize].of_newest());
+        }
         self.ticket += 1;
         self.used_blocks += needed;
         self.len += 1;
@@ -156,6 +179,47 @@ impl Queue {
         self.by_sender.append(&mut sender.levels[level], place);
         sender.blocks[level] += needed;
         sender.used += needed;
+        true
+    }
+
+    /// What waits and is replaced by this package, which is to wait as well: both are of the same state, no part of it has left, and of such
+    /// packages only the newest counts.
+    pub fn older(&self, newer: &Waiting) -> Option<Place> {
+        let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head) && !broken!(NeverReplaces))?;
+        let is_older = |place: &u32| {
+            let Entry { waiting, .. } = &self.entries[*place as usize];
+            let is_alike = (waiting.sender, waiting.peer, waiting.level) == (newer.sender, newer.peer, newer.level);
+            is_alike
+                && waiting.parts == 0
+                && self.entries[*place as usize].of_newest().is_some_and(|head| same_state(head, &newer.head))
+        };
+        hints.of(&newer.head).find(is_older).map(Place)
+    }
+
+    /// Lets a package wait in the place of the [older](Self::older) one. False: it has no room, not even if what is less important gives way;
+    /// then the older one goes on waiting.
+    #[must_use]
+    pub fn replace(
+        &mut self,
+        place: Place,
+        newer: Waiting,
+        body: &[u8],
+        mut gone: impl FnMut(&Waiting, &[u8]),
+    ) -> bool {
+        let Entry { body: old, .. } = self.entries[place.0 as usize];
+        let needed = Blocks::needed(body.len());
+        let (sender, level) = (usize::from(newer.sender), newer.level);
+        if !self.make_room(sender, level, needed.saturating_sub(old.blocks()), &mut gone) {
+            return false;
+        }
+        self.blocks.free(old);
+        let Entry { waiting, body: stored, .. } = &mut self.entries[place.0 as usize];
+        (*waiting, *stored) = (newer, self.blocks.store(body));
+        let changed = |blocks: u32| blocks + needed - old.blocks();
+        let sender = &mut self.senders[sender];
+        sender.blocks[usize::from(level)] = changed(sender.blocks[usize::from(level)]);
+        sender.used = changed(sender.used);
+        self.used_blocks = changed(self.used_blocks);
         true
     }
 
@@ -207,6 +271,11 @@ impl Queue {
     pub fn first_of(&self, peer: NodeIndex, level: u8) -> Option<Place> {
         let list = &self.peers[usize::from(peer)][usize::from(level)];
         if broken!(TakesNewest) { list.last() } else { list.first() }.map(Place)
+    }
+
+    /// What waits behind a package, for the same peer and on the same level.
+    pub fn behind(&self, place: Place) -> Option<Place> {
+        self.by_peer.after(place.0).map(Place)
     }
 
     /// The first level, from this one on, on which something waits for a peer.
@@ -264,10 +333,23 @@ impl Queue {
         sender.used -= body.blocks();
         self.used_blocks -= body.blocks();
         self.len -= 1;
+        self.entries[place.0 as usize].body = Chain::default();
         self.blocks.free(body);
         self.by_peer.prepend(&mut self.free, place.0);
         (waiting, self.blocks.beginning(&body, waiting.head.len))
     }
+}
+
+impl Entry {
+    /// Its head, if a package waits there of which only the newest counts.
+    fn of_newest(&self) -> Option<&Head> {
+        (self.body.blocks() > 0 && counts_newest(&self.waiting.head)).then_some(&self.waiting.head)
+    }
+}
+
+/// Whether two packages tell of the same, the one earlier and the other later.
+fn same_state(one: &Head, other: &Head) -> bool {
+    (one.to, one.from, one.kind, one.id) == (other.to, other.from, other.kind, other.id)
 }
 
 fn bits(mut word: u64) -> impl Iterator<Item = usize> {

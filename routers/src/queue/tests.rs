@@ -1,6 +1,6 @@
 use super::*;
 use proptest::prelude::*;
-use rohrpost_mailbox::Priority;
+use rohrpost_mailbox::{Priority, Type};
 
 pub(crate) const CHECKS: &[fn()] =
     &[check_order_of_levels, check_who_gives_way, check_senders_have_memory_of_their_own, check_what_gives_way_is_told];
@@ -155,8 +155,36 @@ impl Model {
     }
 
     fn pop(&mut self) -> Option<u16> {
+        Some(self.pop_first()?.head.id)
+    }
+
+    fn pop_first(&mut self) -> Option<Waiting> {
         let at = (0..self.waiting.len()).min_by_key(|at| (self.waiting[*at].level, *at))?;
-        Some(self.waiting.remove(at).head.id)
+        Some(self.waiting.remove(at))
+    }
+
+    /// Of one sender; what gave way, by `first`.
+    fn push_newest(&mut self, new: Waiting) -> Vec<u64> {
+        let blocks = |waiting: &Waiting| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
+        let state = |waiting: &Waiting| (waiting.level, waiting.head.id);
+        let older = self.waiting.iter().position(|old| counts_newest(&new.head) && state(old) == state(&new));
+        let yields = |waiting: &&Waiting| waiting.level > new.level;
+        let used: usize = self.waiting.iter().map(blocks).sum();
+        let kept = used - self.waiting.iter().filter(yields).map(blocks).sum::<usize>();
+        let more = older.map_or(blocks(&new), |at| blocks(&new).saturating_sub(blocks(&self.waiting[at])));
+        if kept + more > QUOTA / BLOCK_BYTES {
+            return vec![new.first];
+        }
+        let mut gone = Vec::new();
+        while self.waiting.iter().map(blocks).sum::<usize>() + more > QUOTA / BLOCK_BYTES {
+            let (at, _) = self.waiting.iter().enumerate().max_by_key(|(at, waiting)| (waiting.level, *at)).unwrap();
+            gone.push(self.waiting.remove(at).first);
+        }
+        match self.waiting.iter_mut().find(|old| counts_newest(&new.head) && state(old) == state(&new)) {
+            Some(old) => *old = new,
+            None => self.waiting.push(new),
+        }
+        gone
     }
 }
 
@@ -178,5 +206,46 @@ proptest! {
         let rest: Vec<u16> = std::iter::from_fn(|| model.pop()).collect();
         prop_assert_eq!(drain(&mut queue), rest);
         prop_assert_eq!(queue.used_bytes(), 0);
+    }
+
+    #[test]
+    fn what_is_replaced_keeps_its_place_and_the_rest_is_as_without(
+        steps in prop::collection::vec((0u16..6, 8u8..10, 0usize..2000, any::<bool>()), 1..200),
+    ) {
+        let (mut queue, mut model) = (Queue::of_one(QUOTA), Model::default());
+        for (tag, (state, level, len, take)) in steps.into_iter().enumerate() {
+            // Of states from 3 on each value counts.
+            let head = Head {
+                kind: Type::data(1),
+                id: state,
+                len: len as u16,
+                options: if state < 3 { Options::NEWEST } else { Options::default() },
+                ..Head::default()
+            };
+            let new = Waiting { head, level, first: tag as u64, ..Waiting::default() };
+            let body = vec![tag as u8; len];
+            let mut gone = Vec::new();
+            let tell = |waiting: &Waiting, _: &[u8]| gone.push(waiting.first);
+            let taken = match queue.older(&new) {
+                Some(older) => queue.replace(older, new, &body, tell),
+                None => queue.push(new, &body, tell),
+            };
+            gone.extend((!taken).then_some(tag as u64));
+            prop_assert_eq!(gone, model.push_newest(new));
+            if take && let Some(place) = queue.first() {
+                let Waiting { head, first, .. } = *queue.at(place);
+                let mut body = vec![0; head.len.into()];
+                queue.read(place, &mut body);
+                prop_assert!(body.iter().all(|byte| *byte == first as u8));
+                queue.remove(place);
+                prop_assert_eq!(model.pop_first().map(|waiting| waiting.first), Some(first));
+            }
+            prop_assert_eq!(queue.len(), model.waiting.len());
+        }
+        while let Some(place) = queue.first() {
+            let (waiting, _) = queue.remove(place);
+            prop_assert_eq!(model.pop_first().map(|waiting| waiting.first), Some(waiting.first));
+        }
+        prop_assert_eq!((queue.used_bytes(), queue.len()), (0, 0));
     }
 }

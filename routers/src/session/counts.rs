@@ -1,4 +1,4 @@
-//! What one end of sessions counts: every package comes, and passes or is lost with a cause.
+//! What one end of sessions counts: every package comes, and passes, is replaced by a newer one, or is lost with a cause.
 
 use crate::report::NotDelivered;
 use crate::stats::{self, Count};
@@ -105,6 +105,8 @@ pub struct ClassCounts {
     pub packages: Count,
     /// Of these, handed to the next connection; at a client, delivered.
     pub passed: Count,
+    /// Of these, such of which only the newest counts, and a newer one came while they waited.
+    pub replaced: Count,
     lost: [Count; Cause::ALL.len()],
 }
 
@@ -117,6 +119,11 @@ impl ClassCounts {
     /// Packages lost for any.
     pub fn lost_in_all(&self) -> u64 {
         self.lost.iter().map(Count::get).sum()
+    }
+
+    /// Packages of which it is known what became of them; the others wait.
+    pub fn settled(&self) -> u64 {
+        self.passed.get() + self.replaced.get() + self.lost_in_all()
     }
 }
 
@@ -149,6 +156,10 @@ impl Counts {
 
     pub(super) fn passed(&self, priority: Priority) {
         self.class(priority).passed.add(1);
+    }
+
+    pub(super) fn replaced(&self, priority: Priority) {
+        self.class(priority).replaced.add(1);
     }
 
     pub(super) fn lost(&self, priority: Priority, cause: Cause) {

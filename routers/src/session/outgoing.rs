@@ -4,16 +4,18 @@
 //!  package ─┬─ nothing waits ──────────────────────▶ ready: bytes for the stream, a batch at most, in their final order
 //!           └─ Queue: the least important gives way ──▲ most important first, whenever the stream has taken all
 //! ```
+//!
+//! Of data of which only the newest counts one package waits at most: a newer one takes its place.
 
 use super::WAIT_MAX_NS;
 use super::counts::Cause;
 use super::frame::{Carried, HEAD_BYTES, Message};
 use crate::broken::broken;
-use crate::queue::{Queue, Waiting};
+use crate::queue::{Place, Queue, Waiting, counts_newest};
 use crate::settings::LEVELS;
 use rohrpost_mailbox::Head;
 
-/// Bytes that are made ready at a time: what is more important than they are waits for no more. One frame may exceed it.
+/// Bytes that are made ready at a time, at most: what is more important than they are waits for no more. One frame may exceed it.
 pub const BATCH_BYTES: usize = 16 * 1024;
 /// A queue that was empty for so many looks gives its memory back.
 const EMPTY_LOOKS: u8 = 50;
@@ -34,6 +36,8 @@ pub(super) struct Parcel<'a> {
 pub(super) trait Fates {
     /// Handed to the stream.
     fn passed(&mut self, head: &Head);
+    /// A newer one waits in its place.
+    fn replaced(&mut self, head: &Head);
     /// Lost; with it the beginning of its body.
     fn lost(&mut self, head: &Head, body: &[u8], cause: Cause);
 }
@@ -52,12 +56,30 @@ pub(super) struct Outgoing {
     sent: u64,
     queue: Option<Box<Queue>>,
     quota_bytes: usize,
+    /// Bytes that are made ready at a time.
+    batch_bytes: usize,
     empty_looks: u8,
 }
 
 impl Outgoing {
     pub(super) fn new(quota_bytes: usize) -> Self {
-        Self { ready: Vec::new(), taken: 0, begun: 0, hurried: 0, sent: 0, queue: None, quota_bytes, empty_looks: 0 }
+        let batch_bytes = BATCH_BYTES;
+        Self {
+            ready: Vec::new(),
+            taken: 0,
+            begun: 0,
+            hurried: 0,
+            sent: 0,
+            queue: None,
+            quota_bytes,
+            batch_bytes,
+            empty_looks: 0,
+        }
+    }
+
+    /// So many bytes are made ready at a time from now on, but no more than [`BATCH_BYTES`].
+    pub(super) fn set_batch(&mut self, bytes: usize) {
+        self.batch_bytes = bytes.min(BATCH_BYTES);
     }
 
     /// Bytes for the stream.
@@ -97,6 +119,7 @@ impl Outgoing {
             self.ready.clear();
         }
         (self.taken, self.begun, self.hurried, self.sent) = (0, 0, 0, 0);
+        self.batch_bytes = BATCH_BYTES;
     }
 
     /// Appends a frame that is no package. The caller bounds how many.
@@ -121,14 +144,18 @@ impl Outgoing {
 
     /// A package is to leave. `shift_ns` goes from our clock to the session's; none as long as nothing may leave.
     pub(super) fn accept(&mut self, shift_ns: Option<i64>, parcel: &Parcel<'_>, fates: &mut impl Fates) {
-        if let Some(shift_ns) = shift_ns.filter(|_| !self.has_waiting() && self.ready().len() < BATCH_BYTES) {
+        if let Some(shift_ns) = shift_ns.filter(|_| !self.has_waiting() && self.ready().len() < self.batch_bytes) {
             return self.make_ready(shift_ns, parcel, fates);
         }
         let Parcel { head, body, published_ns, hops, level } = *parcel;
         let waiting = Waiting { head: *head, published_ns, hops, level, ..Waiting::default() };
         let quota_bytes = self.quota_bytes;
-        let queue = self.queue.get_or_insert_with(|| Box::new(Queue::new(1, 1, quota_bytes)));
-        if !queue.push(waiting, body, |gone, beginning| fates.lost(&gone.head, beginning, Cause::Full)) {
+        let queue = self.queue.get_or_insert_with(|| Box::new(Queue::of_one(quota_bytes)));
+        let is_taken = match queue.older(&waiting) {
+            Some(older) => replace(queue, older, waiting, body, fates),
+            None => queue.push(waiting, body, gives_way(fates)),
+        };
+        if !is_taken {
             fates.lost(head, body, Cause::Full);
         }
     }
@@ -136,7 +163,7 @@ impl Outgoing {
     /// Fills the batch with what waits.
     pub(super) fn refill(&mut self, now_ns: u64, shift_ns: i64, fates: &mut impl Fates) {
         let Some(mut queue) = self.queue.take() else { return };
-        while self.ready().len() < BATCH_BYTES
+        while self.ready().len() < self.batch_bytes
             && let Some(place) = queue.first()
         {
             let Waiting { head, published_ns, hops, .. } = *queue.at(place);
@@ -162,11 +189,17 @@ impl Outgoing {
     pub(super) fn look(&mut self, now_ns: u64, cause: Cause, fates: &mut impl Fates) {
         let Some(queue) = &mut self.queue else { return };
         for level in 0..LEVELS as u8 {
-            while let Some(place) =
-                queue.first_of(0, level).filter(|place| is_stale(now_ns, queue.at(*place).published_ns))
-            {
-                let (waiting, beginning) = queue.remove(place);
-                fates.lost(&waiting.head, beginning, cause);
+            let mut next = queue.first_of(0, level);
+            while let Some(place) = next {
+                next = queue.behind(place);
+                let Waiting { head, published_ns, .. } = queue.at(place);
+                if is_stale(now_ns, *published_ns) {
+                    let (waiting, beginning) = queue.remove(place);
+                    fates.lost(&waiting.head, beginning, cause);
+                } else if !counts_newest(head) || broken!(LooksAtFirst) {
+                    // They came one after the other, but for those that stand in the place of an older one.
+                    break;
+                }
             }
         }
         self.empty_looks = if queue.is_empty() { self.empty_looks + 1 } else { 0 };
@@ -211,6 +244,26 @@ impl Outgoing {
         self.say(&Message::Package(Carried { hops, published_ns, head: *head, body }));
         fates.passed(head);
     }
+}
+
+/// Lets a package wait in the place of an older one; whether it is taken.
+fn replace(queue: &mut Queue, older: Place, newer: Waiting, body: &[u8], fates: &mut impl Fates) -> bool {
+    let head = queue.at(older).head;
+    let is_taken = if broken!(LosesItsPlace) {
+        queue.remove(older);
+        queue.push(newer, body, gives_way(fates))
+    } else {
+        queue.replace(older, newer, body, gives_way(fates))
+    };
+    if is_taken && !broken!(ForgetsReplaced) {
+        fates.replaced(&head);
+    }
+    is_taken
+}
+
+/// What becomes of those that give way.
+fn gives_way(fates: &mut impl Fates) -> impl FnMut(&Waiting, &[u8]) {
+    |gone, beginning| fates.lost(&gone.head, beginning, Cause::Full)
 }
 
 pub(super) fn is_stale(now_ns: u64, published_ns: u64) -> bool {

@@ -8,6 +8,7 @@
 //!
 //! Both are processes of their own, and ordinary ones: nothing here shares a thread with the router of the LAN, or runs before a module.
 
+mod bad_line;
 mod client;
 mod desk;
 mod hush;

@@ -6,6 +6,8 @@
 //!
 //! As long as nothing is known little is held at a time; a connection that takes much more than that and is never full is fast.
 
+use crate::session::BATCH_BYTES;
+
 /// What the kernel may keep before it has sent it: what leaves in so long.
 const UNSENT_NS: u64 = 250_000_000;
 /// The same and what is under way to the other end: what leaves in so long, or in twice the way there and back. With less than that way takes
@@ -62,6 +64,11 @@ impl Pace {
     /// What the kernel may keep before it has sent it.
     pub(super) fn unsent_bytes(&self) -> usize {
         self.unsent as usize
+    }
+
+    /// What is made ready at a time; without a rate, as much as usual.
+    pub(super) fn batch_bytes(&self) -> usize {
+        self.rate.map_or(BATCH_BYTES, |_| self.unsent_bytes())
     }
 
     /// Whether it is known to take little.
@@ -145,7 +152,14 @@ mod tests {
             (60, 15 * 1024, Some(60 * 1024), "half a Mbit/s"),
             (10_000, 32 * 1024, None, "fast: the kernel knows best"),
         ] {
-            let told = run(&mut Pace::default(), 0, 2000, bytes_ms).unwrap();
+            let mut pace = Pace::default();
+            assert_eq!(pace.batch_bytes(), BATCH_BYTES, "as long as nothing is known");
+            let told = run(&mut pace, 0, 2000, bytes_ms).unwrap();
+            assert_eq!(
+                pace.batch_bytes() as u64,
+                told.unsent,
+                "what is made ready waits no longer than what is unsent"
+            );
             assert!(told.unsent.abs_diff(unsent) < 2048, "{why}: {told:?}");
             assert_eq!(told.held.is_some(), held.is_some(), "{why}: {told:?}");
             assert!(told.held.unwrap_or(0).abs_diff(held.unwrap_or(0)) < 4096, "{why}: {told:?}");

@@ -21,6 +21,8 @@ pub struct Class {
     pub packages: u64,
     /// Of these, handed on.
     pub passed: u64,
+    /// Of these, replaced by newer ones while they waited.
+    pub replaced: u64,
     /// Of these, lost, and why.
     pub lost: Vec<(Cause, u64)>,
 }
@@ -30,7 +32,13 @@ impl Class {
     pub(super) fn all(counts: &Counts) -> Vec<Self> {
         let class = |(priority, counts): (Priority, &crate::session::ClassCounts)| {
             let lost = Cause::ALL.into_iter().map(|cause| (cause, counts.lost(cause))).filter(|(_, count)| *count > 0);
-            Self { priority, packages: counts.packages.get(), passed: counts.passed.get(), lost: lost.collect() }
+            Self {
+                priority,
+                packages: counts.packages.get(),
+                passed: counts.passed.get(),
+                replaced: counts.replaced.get(),
+                lost: lost.collect(),
+            }
         };
         counts.classes().map(class).collect()
     }

@@ -142,6 +142,11 @@ impl Stream {
         self.pace.is_slow()
     }
 
+    /// How many bytes are made ready for it at a time, so that what comes then waits no longer than it would in the kernel.
+    pub(super) fn batch_bytes(&self) -> usize {
+        self.pace.batch_bytes()
+    }
+
     /// Hands on what was taken and has not left.
     ///
     /// # Errors

@@ -124,6 +124,7 @@ impl System {
             access,
             seal,
             keeps_time: false,
+            impair: None,
         };
         let client = ClientShell::start(parts).unwrap();
         let participant = Participant::join(&node, module(id)).unwrap();

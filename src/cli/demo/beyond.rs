@@ -30,6 +30,8 @@ struct Sum {
     /// Meant to go to the TCP router.
     meant: u64,
     left: u64,
+    /// By newer ones, at the clients' ends.
+    replaced: u64,
     came: u64,
     delivered: u64,
     /// By cause.
@@ -55,6 +57,7 @@ fn sums(links: &[BeyondLink]) -> BTreeMap<u8, Sum> {
         for class in &link.sent {
             let sum = sums.entry(class.class).or_default();
             (sum.meant, sum.left) = (sum.meant + class.packages, sum.left + class.passed);
+            sum.replaced += class.replaced;
             sum.lose(class);
         }
         for class in &link.received {
@@ -71,23 +74,30 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     if links.is_empty() {
         return String::new();
     }
-    let rows = sums(links).into_iter().rev().map(|(class, sum)| {
+    let all = sums(links);
+    let is_any_on_way = all.values().any(|sum| sum.on_way() > 0);
+    let rows = all.into_iter().rev().map(|(class, sum)| {
         let lost: Vec<String> = sum.lost.iter().map(|(cause, packages)| format!("{packages} {cause}")).collect();
         [
             class_name(installation, Some(Class(class))),
             sum.meant.to_string(),
             sum.left.to_string(),
+            sum.replaced.to_string(),
             sum.came.to_string(),
             sum.delivered.to_string(),
             sum.on_way().to_string(),
             if lost.is_empty() { "none".into() } else { lost.join(", ") },
         ]
     });
-    let heads = ["class", ">meant to", ">left", ">came", ">delivered", ">lost on the way", "lost at the ends"];
+    let heads =
+        ["class", ">meant to", ">left", ">replaced", ">came", ">delivered", ">lost on the way", "lost at the ends"];
     let mut text = String::from("\nThrough the TCP router, by class, as the clients of all nodes have counted:\n\n");
     text += &table(heads, rows);
     if has_died {
         text += "(lost on the way: with connections that broke, or waiting in a TCP router that died, less its own answers to what it could not hand on)\n";
+    }
+    if is_any_on_way {
+        text += "(what newer ones replaced at the TCP router itself counts as lost on the way here; `rohrpost net` tells it apart)\n";
     }
     let rows = links.iter().map(|link| {
         let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {

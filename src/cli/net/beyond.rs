@@ -8,7 +8,7 @@ use rohrpost::Class;
 use rohrpost::interfaces::{BeyondClients, BeyondLink, BeyondState, ClassPassed};
 use std::time::Duration;
 
-/// Tables of clients, of the server's connections and of what was lost, and why who takes no part does not; empty without a TCP router.
+/// Tables of clients, of the server's connections and of what was lost or replaced, and why who takes no part does not; empty without a TCP router.
 pub(super) fn text(running: &Running, all: &[Told]) -> [String; 4] {
     let links: Vec<&BeyondLink> = all.iter().filter_map(|told| told.beyond.as_ref()).collect();
     let servers: Vec<&BeyondClients> = all.iter().filter_map(|told| told.clients.as_ref()).collect();
@@ -99,7 +99,7 @@ fn clients(servers: &[&BeyondClients]) -> String {
     text
 }
 
-/// Classes of which something was lost; the others are in the JSON.
+/// Classes of which something was lost or replaced; the others are in the JSON.
 fn losses(running: &Running, links: &[&BeyondLink], servers: &[&BeyondClients]) -> String {
     let ends = links.iter().flat_map(|link| {
         [(format!("{}, to the TCP router", link.node), &link.sent), (format!("{}, from it", link.node), &link.received)]
@@ -107,12 +107,15 @@ fn losses(running: &Running, links: &[&BeyondLink], servers: &[&BeyondClients]) 
     let ends = ends.chain(servers.iter().map(|server| ("TCP router".into(), &server.classes)));
     let mut rows = Vec::new();
     for (at, classes) in ends {
-        for class in classes.iter().filter(|class| !class.lost.is_empty()) {
+        for class in classes.iter().filter(|class| class.replaced > 0 || !class.lost.is_empty()) {
             let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
             let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
             let name = name.unwrap_or_else(|| class.class.to_string());
-            rows.push([at.clone(), name, class.packages.to_string(), class.passed.to_string(), lost.join(", ")]);
+            let [came, passed, replaced] =
+                [class.packages, class.passed, class.replaced].map(|count| count.to_string());
+            let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
+            rows.push([at.clone(), name, came, passed, replaced, lost]);
         }
     }
-    if rows.is_empty() { String::new() } else { table(["at", "class", ">came", ">passed", "lost"], rows) }
+    if rows.is_empty() { String::new() } else { table(["at", "class", ">came", ">passed", ">replaced", "lost"], rows) }
 }

@@ -97,7 +97,7 @@ impl Module for RouterModule {
 }
 
 /// The bad network that a test wants.
-fn impairment() -> Result<Option<impair::Settings>, ModuleError> {
+pub(super) fn impairment() -> Result<Option<impair::Settings>, ModuleError> {
     let text = std::env::var(impair::ENVIRONMENT).unwrap_or_default();
     if text.is_empty() {
         return Ok(None);

@@ -1,12 +1,13 @@
 //! A node's client of the TCP router, as a module.
 
 use super::{NoSettings, PERIOD, certificates, classes, configured, levels, short};
-use crate::cli::router::faults::Encoded;
+use crate::cli::router::{faults::Encoded, impairment};
 use rohrpost::config::Reach;
 use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
 use rohrpost::mailbox::{ERROR_UNKNOWN_NS, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError};
 use rohrpost_routers::access::Access;
+use rohrpost_routers::impair;
 use rohrpost_routers::session::client::ClientSettings;
 use rohrpost_routers::tcp::{ClientParts, ClientSeal, ClientShell, Holder, LinkState};
 use std::net::SocketAddr;
@@ -42,6 +43,12 @@ impl Module for ClientModule {
             levels: levels(tcp),
         };
         let server = tcp.address;
+        let is_beyond = installation.node(&node_name).is_some_and(|node| node.reach == Reach::Tcp);
+        // Of nodes on the LAN the network there is made worse.
+        let impair = if is_beyond { impairment()? } else { None };
+        if let Some(impair) = impair {
+            tracing::warn!("makes the way to the TCP router worse, as {} says: {impair}", impair::ENVIRONMENT);
+        }
         let node = context.link().borrow().participant().node().clone();
         let shell = ClientShell::start(ClientParts {
             node: &node,
@@ -53,7 +60,8 @@ impl Module for ClientModule {
             faults: Arc::new(Encoded::of(installation)),
             access: Access::new(&installation.access),
             seal,
-            keeps_time: installation.node(&node_name).is_some_and(|node| node.reach == Reach::Tcp),
+            keeps_time: is_beyond,
+            impair,
         })?;
         context.set_period(PERIOD);
         Ok(Self { shell, node: node_name, server })

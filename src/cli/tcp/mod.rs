@@ -76,6 +76,7 @@ fn classes(all: &[Class]) -> Vec<ClassPassed> {
         class: class.priority.0,
         packages: class.packages,
         passed: class.passed,
+        replaced: class.replaced,
         lost: class
             .lost
             .iter()

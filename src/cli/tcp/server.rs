@@ -124,7 +124,7 @@ mod tests {
             bytes: most,
         };
         let lost = Cause::ALL.map(|cause| CarriedLoss { cause: cause.word().into(), packages: most });
-        let class = ClassPassed { class: u8::MAX, packages: most, passed: most, lost: lost.into() };
+        let class = ClassPassed { class: u8::MAX, packages: most, passed: most, replaced: most, lost: lost.into() };
         let all = BeyondClients {
             address: client.address.clone(),
             uptime_ms: most,

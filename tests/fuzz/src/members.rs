@@ -36,7 +36,7 @@ pub(crate) fn run(data: &[u8]) {
         world.server.closed(world.now_ns, client, &mut Deaf);
     }
     for (priority, class) in world.server.counts().classes() {
-        assert_eq!(class.packages.get(), class.passed.get() + class.lost_in_all(), "class {}", priority.0);
+        assert_eq!(class.packages.get(), class.settled(), "class {}", priority.0);
     }
     assert!(world.server.table().is_empty(), "who has gone hosts nothing");
 }
@@ -127,9 +127,9 @@ impl World {
         }
         let (mut packages, mut known) = (0, self.server.waiting() as u64);
         for (priority, class) in self.server.counts().classes() {
-            assert!(class.packages.get() >= class.passed.get() + class.lost_in_all(), "class {}", priority.0);
+            assert!(class.packages.get() >= class.settled(), "class {}", priority.0);
             packages += class.packages.get();
-            known += class.passed.get() + class.lost_in_all();
+            known += class.settled();
         }
         assert_eq!(packages, known, "what came has passed, is lost, or waits");
     }

@@ -115,7 +115,7 @@ fn to_a_client(stream: &[u8], split: usize) {
         }
     }
     let balanced = |counts: &rohrpost_routers::session::Counts| {
-        counts.classes().all(|(_, class)| class.packages.get() >= class.passed.get() + class.lost_in_all())
+        counts.classes().all(|(_, class)| class.packages.get() >= class.settled())
     };
     assert!(balanced(client.inn()) && balanced(client.out()));
 }

@@ -9,20 +9,21 @@
 mod asking;
 mod backoff;
 mod incoming;
+mod sending;
 
 pub use backoff::BACKOFF_MAX_NS;
 
 use super::counts::{Cause, Counts};
-use super::frame::{Carried, Hello, Message, Range, Ranges, Reason, Refusal, Verdict};
-use super::outgoing::{Fates, Outgoing, Parcel, is_stale};
+use super::frame::{Carried, Hello, Message, Range, Reason, Refusal, Verdict};
+use super::outgoing::Outgoing;
 use super::reckoning::{Bounded, Reckoning};
 use super::splitter::Splitter;
-use super::{Answers, GREETING_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS, WAIT_MAX_NS, answer_to, without_hurry};
+use super::{Answers, GREETING_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
 use crate::broken::broken;
 use crate::report::NotDelivered;
 use asking::Asking;
 use backoff::Backoff;
-use rohrpost_mailbox::{Head, Name, Priority, TimeRecord};
+use rohrpost_mailbox::{Head, TimeRecord};
 
 /// A connection is made within so long, or not at all.
 const CONNECT_MAX_NS: u64 = 5_000_000_000;
@@ -321,41 +322,11 @@ impl Client {
         self.is_blocked = false;
     }
 
-    /// Whether the stream is known to take so little that an answer may be long on its way.
-    pub fn set_slow(&mut self, is_slow: bool) {
+    /// What is known of how fast the stream takes bytes: whether so slowly that an answer may be long on its way, and how many are made ready
+    /// for it at a time.
+    pub fn set_pace(&mut self, is_slow: bool, batch_bytes: usize) {
         self.is_slow = is_slow;
-    }
-
-    /// A package is to go to the server.
-    pub fn send(&mut self, now_ns: u64, package: &Package<'_>, host: &mut impl Host) {
-        let head = without_hurry(&package.head);
-        self.out.came(head.priority);
-        let is_long_down = !self.is_up() && now_ns.saturating_sub(self.down_ns) > WAIT_MAX_NS;
-        let lost = is_long_down.then_some(Cause::Offline);
-        let lost = lost.or_else(|| is_stale(now_ns, package.published_ns).then_some(Cause::Stale));
-        let shift_ns = self.shift_ns(now_ns).filter(|_| !self.is_blocked);
-        let level = self.settings.levels[usize::from(head.priority.0)];
-        self.with_ledger(now_ns, host, |outgoing, ledger| match lost {
-            Some(cause) => ledger.lost(&head, package.body, cause),
-            None => {
-                let Package { body, published_ns, hops, .. } = *package;
-                outgoing.accept(shift_ns, &Parcel { head: &head, body, published_ns, hops, level }, ledger);
-            }
-        });
-    }
-
-    /// A package for all systems came to this node without the server, or was lost here. That nobody has its mailbox open is a loss only
-    /// where this client hosts the name: the server counts on it then, and says nothing.
-    pub fn reached_itself(&mut self, to: Name, priority: Priority, delivered: Result<(), NotDelivered>) {
-        let hosts = self.ranges.iter().any(|range| range.has(to));
-        if delivered == Err(NotDelivered::NoMailbox) && !hosts {
-            return;
-        }
-        self.out.came(priority);
-        match delivered {
-            Ok(()) => self.out.passed(priority),
-            Err(why) => self.out.lost(priority, why.into()),
-        }
+        self.outgoing.set_batch(batch_bytes);
     }
 
     /// What to do next.
@@ -388,14 +359,6 @@ impl Client {
         }
     }
 
-    /// From our clock to the server's session clock, as long as packages may leave: to the earliest that it may be there, so that no
-    /// package looks younger than it is.
-    fn shift_ns(&self, now_ns: u64) -> Option<i64> {
-        let session = self.session(now_ns).filter(|_| self.is_up())?;
-        let earliest_ns = session.ns.saturating_sub(session.error_ns);
-        Some((i128::from(earliest_ns) - i128::from(now_ns)).clamp(i64::MIN.into(), i64::MAX.into()) as i64)
-    }
-
     fn is_gone(&self, now_ns: u64) -> bool {
         let is_slow = self.is_slow || self.splitter.waits_since().is_some();
         let is_silent = self.asking.is_silent(now_ns, self.heard_ns, self.moved_ns, is_slow);
@@ -418,29 +381,6 @@ impl Client {
         self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.look(now_ns, cause, ledger));
     }
 
-    /// Asks for the time, also while the stream takes nothing: packages that have not begun to leave go behind the question.
-    fn ask(&mut self, now_ns: u64) {
-        if self.state == State::Member && self.asking.is_due(now_ns) {
-            let end = self.outgoing.hurry(&Message::Ask(now_ns));
-            self.asking.asks(now_ns, end);
-        }
-    }
-
-    fn refill(&mut self, now_ns: u64, host: &mut impl Host) {
-        if self.state != State::Member || !self.outgoing.ready().is_empty() {
-            return;
-        }
-        if matches!(self.registration, Registration::Due(at_ns) if now_ns >= at_ns) {
-            self.number = self.number.wrapping_add(1);
-            self.registration = Registration::Asked;
-            let mut bytes = Vec::new();
-            self.outgoing.say(&Message::Register(Ranges::new(self.number, &self.ranges, &mut bytes)));
-        }
-        if let Some(shift_ns) = self.shift_ns(now_ns) {
-            self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.refill(now_ns, shift_ns, ledger));
-        }
-    }
-
     fn next_ns(&self) -> u64 {
         let registers_ns = match self.registration {
             Registration::Due(at_ns) => at_ns,
@@ -450,38 +390,5 @@ impl Client {
             State::Member => self.look_ns.min(self.asking.next_ns).min(registers_ns),
             _ => self.look_ns,
         }
-    }
-
-    /// Does something with what leaves, and answers the commands of this end that are lost thereby.
-    fn with_ledger<H: Host>(
-        &mut self,
-        now_ns: u64,
-        host: &mut H,
-        work: impl FnOnce(&mut Outgoing, &mut Ledger<'_, H>),
-    ) {
-        let mut ledger = Ledger { counts: &self.out, host: &mut *host, answers: Vec::new() };
-        work(&mut self.outgoing, &mut ledger);
-        for (head, body) in ledger.answers {
-            // Who has gone, or takes no more answers, waits for its timeout.
-            let _ = host.deliver(&Carried { hops: 0, published_ns: now_ns, head, body: &body });
-        }
-    }
-}
-
-/// What becomes of packages that leave.
-struct Ledger<'a, H> {
-    counts: &'a Counts,
-    host: &'a mut H,
-    answers: Vec<(Head, Vec<u8>)>,
-}
-
-impl<H: Answers> Fates for Ledger<'_, H> {
-    fn passed(&mut self, head: &Head) {
-        self.counts.passed(head.priority);
-    }
-
-    fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
-        self.counts.lost(head.priority, cause);
-        self.answers.extend(answer_to(head, body, cause, None, self.host));
     }
 }

@@ -23,6 +23,10 @@ impl<H: Answers> Fates for Ledger<'_, H> {
         self.counts.passed(head.priority);
     }
 
+    fn replaced(&mut self, head: &Head) {
+        self.counts.replaced(head.priority);
+    }
+
     fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
         self.counts.lost(head.priority, cause);
         self.answers.extend(answer_to(head, body, cause, Some(self.holder), self.host));

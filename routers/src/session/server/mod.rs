@@ -257,6 +257,13 @@ impl Server {
         }
     }
 
+    /// So many bytes are made ready for a client at a time from now on.
+    pub fn set_batch(&mut self, client: ClientIndex, bytes: usize) {
+        if let Some(member) = self.member_mut(client) {
+            member.outgoing.set_batch(bytes);
+        }
+    }
+
     /// The stream takes bytes again.
     pub fn writable(&mut self, client: ClientIndex) {
         if let Some(member) = self.member_mut(client) {

@@ -4,7 +4,7 @@ use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
 use crate::session::{AGE_MAX_NS, Answers, Cause, client, server};
 use crate::sim::chance::Chance;
-use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name};
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options};
 use std::collections::BTreeMap;
 
 /// What clocks of different pace make of two seconds.
@@ -32,13 +32,16 @@ pub(super) struct Known {
     pub(super) refusals: Vec<String>,
 }
 
+/// Whose packages stay in their order: of one sender, receiver and priority; of data of which only the newest counts, of one address and id.
+type Flow = (Name, Name, u8, Option<(Name, u16)>);
+
 #[derive(Default)]
 pub(super) struct Book {
     pub(super) now_ns: u64,
     pub(super) packages: Vec<Posted>,
     pub(super) clients: Vec<Known>,
-    /// The last number of each sender, receiver and priority, by who delivers.
-    last: BTreeMap<(usize, Name, Name, u8), usize>,
+    /// The last number of each flow, by who delivers.
+    last: BTreeMap<(usize, Flow), usize>,
     /// Of each delivery: age, from whom, to whom.
     pub(super) log: Vec<(u64, usize, usize)>,
     pub(super) problems: Vec<String>,
@@ -75,7 +78,7 @@ impl Book {
         let to_all = package.head.to.system() == ALL_SYSTEMS;
         let is_unchanged = head.from == package.head.from
             && head.kind == package.head.kind
-            && head.priority == package.head.priority
+            && (head.priority, head.id, head.options) == (package.head.priority, package.head.id, package.head.options)
             && carried.body.len() == usize::from(package.head.len)
             && carried.body[8..].iter().all(|byte| *byte == number as u8)
             && (head.to == package.head.to || to_all && head.to.system() == system);
@@ -96,8 +99,9 @@ impl Book {
         let from = &self.clients[package.from];
         check(!(to_all && from.reaches_own && from.system == system), "its own system gets it without the server");
         package.delivered.push((to, system));
-        let (from, flow) = (package.from, (to, head.from, head.to, head.priority.0));
-        let before = self.last.insert(flow, number);
+        let newest = head.options.has(Options::NEWEST).then_some((package.head.to, head.id));
+        let (from, flow) = (package.from, (head.from, head.to, head.priority.0, newest));
+        let before = self.last.insert((to, flow), number);
         check(before.is_none_or(|before| before < number), "out of order");
         wrong.into_iter().for_each(|text| self.broken(text));
         self.log.push((age_ns, from, to));

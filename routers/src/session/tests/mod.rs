@@ -3,6 +3,7 @@
 mod book;
 mod ends;
 mod ground;
+mod newest;
 mod pipe;
 mod plan;
 mod strain;
@@ -21,7 +22,7 @@ use world::{MS, S, World};
 const WELL_NS: u64 = 10 * S;
 const SEEDS: u64 = 30;
 /// What must have been seen in each ten networks.
-const SEEN_IN_TEN: [(&str, u64); 17] = [
+const SEEN_IN_TEN: [(&str, u64); 18] = [
     ("delivered", 5000),
     ("to all", 300),
     ("answered", 300),
@@ -39,6 +40,7 @@ const SEEN_IN_TEN: [(&str, u64); 17] = [
     ("client restarted", 5),
     ("line faults", 50),
     ("posted", 20_000),
+    ("replaced", 20),
 ];
 
 /// One seed: all goes wrong for a while, then all must be well.
@@ -57,6 +59,8 @@ fn run(plan: Plan) -> World {
         all_are_reached(&mut world);
         world.check_server(true);
         world.check_clients();
+        let replaced = world.replaced();
+        world.book.seen.insert("replaced", replaced);
     }
     world.book.problems.iter_mut().for_each(|problem| *problem = format!("seed {seed}, {problem}"));
     world
@@ -157,7 +161,12 @@ fn every_mistake_is_noticed() {
     let mut missed = Vec::new();
     for broken in Broken::SESSION {
         let fails = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
-        let by_check = CHECKS.iter().chain(strain::CHECKS).chain(&[check_backoff as fn(), check_slow_line]).any(fails);
+        let by_check = CHECKS
+            .iter()
+            .chain(strain::CHECKS)
+            .chain(newest::CHECKS)
+            .chain(&[check_backoff as fn(), check_slow_line])
+            .any(fails);
         let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).book.problems.is_empty());
         let by_network = (!by_check).then(|| (0..SEEDS).find(breaks)).flatten();
         eprintln!("{broken:?}: check {by_check}, network {by_network:?}");
@@ -166,6 +175,13 @@ fn every_mistake_is_noticed() {
         }
     }
     assert_eq!(missed, []);
+}
+
+#[test]
+fn accounts_of_a_network_do_not_balance_without_those_that_were_replaced() {
+    let breaks = |seed| with(Broken::ForgetsReplaced, || run(Plan::rough(seed)).book.problems);
+    let problems: Vec<String> = (0..SEEDS).map(breaks).find(|problems| !problems.is_empty()).unwrap_or_default();
+    assert!(problems.iter().any(|problem| problem.contains("are accounted for")), "{problems:?}");
 }
 
 const _: () = assert!(WELL_NS > 2 * BACKOFF_MAX_NS && MS < S);

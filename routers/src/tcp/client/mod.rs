@@ -9,11 +9,13 @@
 mod time;
 mod voice;
 
+use super::bad_line::BadLine;
 use super::desk::Desk;
 use super::seal::ClientSeal;
 use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::access::Access;
+use crate::impair;
 use crate::session::client::{Client, ClientSettings, Output, Package};
 use crate::session::frame::Range;
 use crate::session::in_system;
@@ -50,6 +52,9 @@ pub enum ClientError {
     /// What it sleeps with.
     #[error("a pipe that wakes the client of the TCP router: {0}")]
     Watches(io::Error),
+    /// What makes the network to the server worse.
+    #[error("a bad line to the TCP router: {0}")]
+    BadLine(io::Error),
     /// The system has no thread for it.
     #[error("a thread of the client of the TCP router: {0}; is the limit of processes reached (ulimit -u)?")]
     Thread(io::Error),
@@ -77,6 +82,8 @@ pub struct ClientParts<'a> {
     pub seal: Option<ClientSeal>,
     /// Whether the node's system time is what the server tells.
     pub keeps_time: bool,
+    /// A bad network to the server; none: as it is.
+    pub impair: Option<impair::Settings>,
 }
 
 /// A client at work; dropped, it ends. What waits in its mailbox stays there.
@@ -84,6 +91,8 @@ pub struct ClientShell {
     shared: Arc<Shared>,
     /// Of its thread, whose bell wakes it.
     participant: Arc<Participant>,
+    /// Ends after the thread does.
+    _bad_line: Option<BadLine>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -99,18 +108,20 @@ impl ClientShell {
     /// # Errors
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
-        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal, keeps_time } = parts;
+        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal, keeps_time, impair } =
+            parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
         let watches = Watches::new(&participant).map_err(ClientError::Watches)?;
         node.set_routes_beyond(via, &beyond)?;
         let time = keeps_time.then(|| Time::new(node)).transpose()?;
+        let bad_line = impair.map(|impair| BadLine::begin(server, impair)).transpose().map_err(ClientError::BadLine)?;
         let (shared, system) = (Arc::new(Shared::default()), settings.system);
         let ranges = hosts.into_iter().map(|(first, last)| Range { first, last }).collect();
         let work = Work {
             shared: shared.clone(),
-            server,
+            server: bad_line.as_ref().map_or(server, BadLine::near),
             client: Client::new(settings, ranges, monotonic_ns()),
             voice: Voice::new(
                 server,
@@ -127,7 +138,7 @@ impl ClientShell {
             piece: vec![0; PIECE_BYTES].into(),
         };
         let thread = std::thread::Builder::new().name("tcp-client".into()).spawn(move || work.run());
-        Ok(Self { shared, participant, thread: Some(thread.map_err(ClientError::Thread)?) })
+        Ok(Self { shared, participant, _bad_line: bad_line, thread: Some(thread.map_err(ClientError::Thread)?) })
     }
 
     /// How it was a moment ago.
@@ -163,6 +174,7 @@ struct Connection {
 /// What the thread has.
 struct Work {
     shared: Arc<Shared>,
+    /// Where it connects to.
     server: SocketAddr,
     client: Client,
     voice: Voice,
@@ -305,7 +317,7 @@ impl Work {
             Moved::Over(error) => return self.broke(error.as_ref()),
         }
         if !all {
-            self.client.set_slow(connection.stream.is_slow());
+            self.client.set_pace(connection.stream.is_slow(), connection.stream.batch_bytes());
             connection.stream.set_round_trip(self.client.round_trip_ns());
             self.await_room(true);
         }

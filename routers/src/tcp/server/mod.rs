@@ -2,21 +2,20 @@
 //!
 //! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the client's own queue.
 
+mod door;
 mod voice;
 
 use super::desk::Desk;
-use super::hush::Topic;
 use super::seal::{Holder, ServerSeal};
 use super::seen::{Class, HOSTS_MAX, MEMBERS_MAX, Member, Members, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::session::ClientIndex;
 use crate::session::server::{Output, Server, ServerSettings, View};
 use crate::shell::Faults;
+use door::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
-use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
-use socket2::{Domain, Protocol, Socket, Type};
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
@@ -26,21 +25,12 @@ use voice::Voice;
 
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
-/// Connections accepted before the clients have their turn.
-const ACCEPTS: usize = 64;
-/// Connections that the kernel keeps until they are accepted.
-const BACKLOG: i32 = 1024;
 const EVENTS: usize = 256;
 /// What a process has open besides its connections, at most.
 const DESCRIPTORS_BESIDE: u64 = 256;
 /// What is no client's place.
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
-/// Connections that cannot be sealed are closed after so long, and there are so many of them at most.
-const PARTING_NS: u64 = 1_000_000_000;
-const PARTING_MAX: usize = 64;
-/// When accepting fails, since there is no descriptor left, it is tried again after so long.
-const ACCEPT_AGAIN_NS: u64 = 100_000_000;
 
 /// Why the TCP router does not run.
 #[derive(Debug, thiserror::Error)]
@@ -149,32 +139,6 @@ impl Drop for ServerShell {
             let _ = thread.join();
         }
     }
-}
-
-/// Each connection takes a descriptor. If the system does not grant so many, that is told when there is none left.
-fn raise_descriptors(wanted: u64) {
-    if let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_NOFILE)
-        && soft < wanted
-    {
-        let _ = setrlimit(Resource::RLIMIT_NOFILE, wanted.min(hard).max(soft), hard);
-    }
-}
-
-fn listen(address: SocketAddr) -> Result<TcpListener, ServerError> {
-    let listen = || {
-        let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
-        // One that died a moment ago has left connections that end slowly.
-        socket.set_reuse_address(true)?;
-        socket.set_nonblocking(true)?;
-        socket.bind(&address.into())?;
-        socket.listen(BACKLOG)?;
-        Ok(TcpListener::from(socket))
-    };
-    listen().map_err(|error: io::Error| match error.kind() {
-        io::ErrorKind::AddrInUse => ServerError::InUse(address),
-        io::ErrorKind::AddrNotAvailable => ServerError::NotHere(address),
-        _ => ServerError::Io(address, "a socket", error),
-    })
 }
 
 struct Connection {
@@ -292,23 +256,6 @@ impl Work {
         true
     }
 
-    /// A connection cannot be sealed. The other end reads why, if this one waits a moment before it closes.
-    fn unsealed(&mut self, client: ClientIndex, error: &io::Error) {
-        let now_ns = monotonic_ns();
-        let Some(Connection { stream, peer, .. }) =
-            self.connections.get_mut(usize::from(client.0)).and_then(Option::take)
-        else {
-            return;
-        };
-        self.host.refuses(Topic::Unsealed, format!("{peer} may not take part: {error}"));
-        stream.end();
-        // Closed when the place is needed, or the time is over; until then nothing is asked of it.
-        if self.epoll.delete(&stream).is_ok() && self.parting.len() < PARTING_MAX {
-            self.parting.push((now_ns + PARTING_NS, stream));
-        }
-        self.server.closed(now_ns, client, &mut self.host);
-    }
-
     /// Hands on what a connection took; whether all of it has left.
     fn flush(&mut self, client: ClientIndex) -> bool {
         let Some(connection) = connection(&mut self.connections, client) else { return false };
@@ -332,6 +279,7 @@ impl Work {
         }
         if !all {
             connection.stream.set_round_trip(self.server.round_trip_ns(client));
+            self.server.set_batch(client, connection.stream.batch_bytes());
             self.await_room(client, true);
         }
     }
@@ -347,50 +295,6 @@ impl Work {
                 self.broke(client);
             }
         }
-    }
-
-    fn accept(&mut self) {
-        let now_ns = monotonic_ns();
-        for _ in 0..ACCEPTS {
-            match self.listener.accept() {
-                Ok((socket, peer)) => {
-                    let sealed = self.seal.as_ref().map(ServerSeal::begin).transpose();
-                    if let Ok(stream) = sealed.and_then(|sealed| Stream::new(socket, sealed)) {
-                        self.take_in(now_ns, stream, peer);
-                    }
-                }
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
-                Err(error) => {
-                    let line =
-                        format!("cannot accept a connection: {error}; raise the limit of open files (ulimit -n)");
-                    self.host.says(Topic::Accept, &line);
-                    self.accept_ns = Some(now_ns + ACCEPT_AGAIN_NS);
-                    return self.listen_for(EpollFlags::empty());
-                }
-            }
-        }
-    }
-
-    /// Whether epoll tells of connections to be accepted.
-    fn listen_for(&self, flags: EpollFlags) {
-        if let Err(error) = self.epoll.modify(&self.listener, &mut EpollEvent::new(flags, LISTENER)) {
-            tracing::error!("epoll: {error}");
-        }
-    }
-
-    fn take_in(&mut self, now_ns: u64, stream: Stream, peer: SocketAddr) {
-        let peer = peer.to_string();
-        // Where there is no place, it is closed by being dropped.
-        let Some(client) = self.server.accept(now_ns, &peer, &mut self.host) else { return };
-        let event = EpollEvent::new(EpollFlags::EPOLLIN, client.0.into());
-        if self.epoll.add(&stream, event).is_err() {
-            return self.server.closed(now_ns, client, &mut self.host);
-        }
-        let index = usize::from(client.0);
-        if self.connections.len() <= index {
-            self.connections.resize_with(index + 1, || None);
-        }
-        self.connections[index] = Some(Connection { is_known: !stream.is_sealed(), stream, peer, awaits_room: false });
     }
 
     fn broke(&mut self, client: ClientIndex) {

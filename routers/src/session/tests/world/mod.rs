@@ -9,7 +9,7 @@ use crate::session::client::{self, Client, Package};
 use crate::session::server::{self, Server};
 use crate::session::{LOOK_EVERY_NS, without_hurry};
 use crate::sim::chance::Chance;
-use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, TimeRecord, TimeSource, Type};
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Options, Priority, TimeRecord, TimeSource, Type};
 use streams::Connection;
 
 pub(super) const MS: u64 = 1_000_000;
@@ -173,7 +173,9 @@ impl World {
         let len = if posts.percent(95) { posts.between(8, 200) } else { posts.between(8, 65_000) } as u16;
         let priority = Priority(posts.pick(&[10, 60, 60, 150, 250]));
         let kind = if posts.percent(40) { Type::command(16) } else { Type::data(1) };
-        let head = Head { to, from: module(sender).with_local(1), len, kind, priority, ..Head::default() };
+        let is_newest = kind == Type::data(1) && posts.percent(60);
+        let (id, options) = if is_newest { (posts.below(3) as u16, Options::NEWEST) } else { (0, Options::default()) };
+        let head = Head { to, from: module(sender).with_local(1), len, kind, id, priority, options };
         self.send(from, head, is_forged);
     }
 
@@ -256,6 +258,13 @@ impl World {
         self.book.problems.extend(problems);
     }
 
+    /// Packages that newer ones took the place of, as those ends count them that still live.
+    pub(super) fn replaced(&self) -> u64 {
+        let clients = self.nodes.iter().map(|node| node.client.out());
+        let all = clients.chain([self.server.counts()]);
+        all.flat_map(|counts| counts.classes()).map(|(_, class)| class.replaced.get()).sum()
+    }
+
     pub(super) fn check_clients(&mut self) {
         for (index, node) in self.nodes.iter().enumerate() {
             self.book.problems.extend(check_counts(&format!("client {index}, out"), node.client.out(), true));
@@ -266,7 +275,7 @@ impl World {
 
 fn check_counts(who: &str, counts: &crate::session::Counts, waits_none: bool) -> Vec<String> {
     let wrong = counts.classes().filter_map(|(priority, class)| {
-        let (came, went) = (class.packages.get(), class.passed.get() + class.lost_in_all());
+        let (came, went) = (class.packages.get(), class.settled());
         let holds = if waits_none { came == went } else { came >= went };
         (!holds).then(|| format!("{who}: of class {} came {came}, and {went} are accounted for", priority.0))
     });

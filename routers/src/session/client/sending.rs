@@ -1,0 +1,111 @@
+//! What goes to the server: packages, questions for the time, and what becomes of each.
+
+use super::{Client, Host, Package, Registration, State};
+use crate::report::NotDelivered;
+use crate::session::counts::{Cause, Counts};
+use crate::session::frame::{Carried, Message, Ranges};
+use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
+use crate::session::{Answers, WAIT_MAX_NS, answer_to, without_hurry};
+use rohrpost_mailbox::{Head, Name, Priority};
+
+impl Client {
+    /// A package is to go to the server.
+    pub fn send(&mut self, now_ns: u64, package: &Package<'_>, host: &mut impl Host) {
+        let head = without_hurry(&package.head);
+        self.out.came(head.priority);
+        let is_long_down = !self.is_up() && now_ns.saturating_sub(self.down_ns) > WAIT_MAX_NS;
+        let lost = is_long_down.then_some(Cause::Offline);
+        let lost = lost.or_else(|| is_stale(now_ns, package.published_ns).then_some(Cause::Stale));
+        let shift_ns = self.shift_ns(now_ns).filter(|_| !self.is_blocked);
+        let level = self.settings.levels[usize::from(head.priority.0)];
+        self.with_ledger(now_ns, host, |outgoing, ledger| match lost {
+            Some(cause) => ledger.lost(&head, package.body, cause),
+            None => {
+                let Package { body, published_ns, hops, .. } = *package;
+                outgoing.accept(shift_ns, &Parcel { head: &head, body, published_ns, hops, level }, ledger);
+            }
+        });
+    }
+
+    /// A package for all systems came to this node without the server, or was lost here. That nobody has its mailbox open is a loss only
+    /// where this client hosts the name: the server counts on it then, and says nothing.
+    pub fn reached_itself(&mut self, to: Name, priority: Priority, delivered: Result<(), NotDelivered>) {
+        let hosts = self.ranges.iter().any(|range| range.has(to));
+        if delivered == Err(NotDelivered::NoMailbox) && !hosts {
+            return;
+        }
+        self.out.came(priority);
+        match delivered {
+            Ok(()) => self.out.passed(priority),
+            Err(why) => self.out.lost(priority, why.into()),
+        }
+    }
+
+    /// From our clock to the server's session clock, as long as packages may leave: to the earliest that it may be there, so that no
+    /// package looks younger than it is.
+    fn shift_ns(&self, now_ns: u64) -> Option<i64> {
+        let session = self.session(now_ns).filter(|_| self.is_up())?;
+        let earliest_ns = session.ns.saturating_sub(session.error_ns);
+        Some((i128::from(earliest_ns) - i128::from(now_ns)).clamp(i64::MIN.into(), i64::MAX.into()) as i64)
+    }
+
+    /// Asks for the time, also while the stream takes nothing: packages that have not begun to leave go behind the question.
+    pub(super) fn ask(&mut self, now_ns: u64) {
+        if self.state == State::Member && self.asking.is_due(now_ns) {
+            let end = self.outgoing.hurry(&Message::Ask(now_ns));
+            self.asking.asks(now_ns, end);
+        }
+    }
+
+    pub(super) fn refill(&mut self, now_ns: u64, host: &mut impl Host) {
+        if self.state != State::Member || !self.outgoing.ready().is_empty() {
+            return;
+        }
+        if matches!(self.registration, Registration::Due(at_ns) if now_ns >= at_ns) {
+            self.number = self.number.wrapping_add(1);
+            self.registration = Registration::Asked;
+            let mut bytes = Vec::new();
+            self.outgoing.say(&Message::Register(Ranges::new(self.number, &self.ranges, &mut bytes)));
+        }
+        if let Some(shift_ns) = self.shift_ns(now_ns) {
+            self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.refill(now_ns, shift_ns, ledger));
+        }
+    }
+
+    /// Does something with what leaves, and answers the commands of this end that are lost thereby.
+    pub(super) fn with_ledger<H: Host>(
+        &mut self,
+        now_ns: u64,
+        host: &mut H,
+        work: impl FnOnce(&mut Outgoing, &mut Ledger<'_, H>),
+    ) {
+        let mut ledger = Ledger { counts: &self.out, host: &mut *host, answers: Vec::new() };
+        work(&mut self.outgoing, &mut ledger);
+        for (head, body) in ledger.answers {
+            // Who has gone, or takes no more answers, waits for its timeout.
+            let _ = host.deliver(&Carried { hops: 0, published_ns: now_ns, head, body: &body });
+        }
+    }
+}
+
+/// What becomes of packages that leave.
+pub(super) struct Ledger<'a, H> {
+    counts: &'a Counts,
+    host: &'a mut H,
+    answers: Vec<(Head, Vec<u8>)>,
+}
+
+impl<H: Answers> Fates for Ledger<'_, H> {
+    fn passed(&mut self, head: &Head) {
+        self.counts.passed(head.priority);
+    }
+
+    fn replaced(&mut self, head: &Head) {
+        self.counts.replaced(head.priority);
+    }
+
+    fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
+        self.counts.lost(head.priority, cause);
+        self.answers.extend(answer_to(head, body, cause, None, self.host));
+    }
+}
