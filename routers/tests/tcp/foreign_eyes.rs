@@ -121,7 +121,11 @@ fn cross_lan(lab: &Lab, sealed: bool, recorded: &mut Recorded) {
         let own = u8::from(name == "far");
         let node = Node::create(&folder.path().join(name), 0o700).unwrap();
         let mut side = Side::new(own, node, ADDRESSES, None);
-        if sealed { side.seal() } else { side.start() }
+        if sealed {
+            side.seal()
+        } else {
+            side.start()
+        }
         side
     });
     let to = crate::lan::module(1);
@@ -170,7 +174,8 @@ fn secrets() -> Vec<String> {
     // A third of what recurs, so that no edge of a frame or block hides it.
     let recurring = format!("frame contains {}", hex(&RECURRING[..8]));
     // To and from, as heads of packages begin, of datagrams and of sessions.
-    let [lan, tcp] = [[crate::lan::module(1), crate::lan::module(0)], [crate::ground::module(2), crate::ground::module(1)]];
+    let [lan, tcp] =
+        [[crate::lan::module(1), crate::lan::module(0)], [crate::ground::module(2), crate::ground::module(1)]];
     let names = [lan, tcp].map(|names| names.map(|name| name.raw().to_le_bytes()).concat());
     let names = names.map(|names| format!("frame contains {}", hex(&names)));
     words.chain([recurring]).chain(names).collect()
