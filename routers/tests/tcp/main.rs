@@ -12,3 +12,4 @@ mod lan;
 mod network;
 mod sealed;
 mod sessions;
+mod versions;
