@@ -27,7 +27,6 @@ impl Plan {
     pub fn rare(seed: u64) -> Self {
         let mut plan = Self::hard(seed).sealed();
         plan.give_time_to_join();
-        plan.divide();
         plan
     }
 
@@ -47,7 +46,6 @@ impl Plan {
         }
         plan.mended_ns = joins_ns * plan.nodes.len() as u64 + 3 * S;
         plan.give_time_to_join();
-        plan.divide();
         if let Some(slots) = &mut plan.slots {
             slots.joins_ns = Some(joins_ns);
         }
@@ -88,10 +86,15 @@ impl Plan {
         2 * S + slot_ns * 4 * self.nodes.len() as u64
     }
 
-    /// All is well only when who began last has joined.
+    /// All is well only when who began last has joined; and who was divided from another joins it as if it began.
     fn give_time_to_join(&mut self) {
-        self.mended_ns += self.joins_ns();
+        let joins_ns = self.joins_ns();
+        self.mended_ns += joins_ns;
         self.time_slots();
+        self.divide();
+        if let Some(slots) = &mut self.slots {
+            slots.divisions.asks_ns = joins_ns;
+        }
     }
 }
 
