@@ -183,7 +183,7 @@ fn a_sealed_node_says_that_another_speaks_another_wire_format() {
         counted()
     });
     assert!(rejected.node == "arm" && rejected.datagrams > 0, "{rejected:?}");
-    let words = ["takes nothing from node arm (10.78.0.2)", "it is of another wire format", "same version of Rohrpost"];
+    let words = ["takes nothing from node arm (10.78.0.2)", "wire format 2, ours is 1", "same version of Rohrpost"];
     field.wait_told("router.0", &words, 1);
     field.stop();
 }
