@@ -4,10 +4,9 @@
 
 mod support;
 
-use nix::sys::signal::Signal;
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
-use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+use support::{bench, children, interrupt, left_behind, rows, run, wait_for};
 
 const CBWARE: &str = "CBWare, its table";
 
@@ -66,16 +65,12 @@ fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
 #[test]
 fn whoever_interrupts_it_finds_no_process_and_no_network_left() {
     let before = network();
-    let mut child = bench("lan", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
-    let prefix = prefix(&child);
+    let child = bench("lan", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
     let mut pids = Vec::new();
     wait_for("a turn", || {
         pids = children(&child);
         pids.len() > 2
     });
-    signal(&child, Signal::SIGINT);
-    assert!(!child.wait().unwrap().success());
-    assert_eq!(left_behind(&prefix), [""; 0]);
-    wait_for("the processes to end", || are_gone(&pids));
+    interrupt(child, &pids);
     assert_eq!(network(), before);
 }

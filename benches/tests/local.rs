@@ -6,7 +6,7 @@ mod support;
 
 use nix::sys::signal::Signal;
 use std::process::Child;
-use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
 
 /// The latency cases: sizes, and who is in it besides ours.
 const CASES: [(&str, &[u64], &[&str]); 8] = [
@@ -65,12 +65,9 @@ fn begun() -> (Child, String) {
 
 #[test]
 fn whoever_interrupts_it_finds_nothing_left() {
-    let (mut child, prefix) = begun();
+    let (child, _) = begun();
     let pids = children(&child);
-    signal(&child, Signal::SIGINT);
-    assert!(!child.wait().unwrap().success());
-    assert_eq!(left_behind(&prefix), [""; 0]);
-    wait_for("the processes to end", || are_gone(&pids));
+    interrupt(child, &pids);
 }
 
 #[test]

@@ -4,9 +4,8 @@
 
 mod support;
 
-use nix::sys::signal::Signal;
 use serde_json::{Map, Value};
-use support::{are_gone, bench, children, left_behind, prefix, rows, run, signal, wait_for};
+use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
 /// A row of each case that is there whenever the case could run, and by whom.
 const ROWS: [(&str, &str); 18] = [
@@ -47,7 +46,7 @@ fn every_case_runs_and_every_line_is_complete() {
         assert!(is_there || is_skipped, "{case} by {who}");
         assert!(own().next().is_some(), "{case}");
     }
-    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with("FAILED")));
+    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
     assert_eq!(failed, None);
     // Whatever was declared arrived.
     let lost = rows.iter().filter(|row| row["case"] == "flows, lost");
@@ -58,7 +57,6 @@ fn every_case_runs_and_every_line_is_complete() {
 #[test]
 fn whoever_interrupts_it_finds_no_process_left() {
     let mut child = bench("tdma", &["--only", "slots", "--rounds", "1000"]).spawn().unwrap();
-    let prefix = prefix(&child);
     let mut pids = Vec::new();
     // Routers, capture and feeders; without a command or namespaces it ends by itself.
     wait_for("a turn", || {
@@ -66,9 +64,8 @@ fn whoever_interrupts_it_finds_no_process_left() {
         pids.len() > 2 || child.try_wait().unwrap().is_some()
     });
     if child.try_wait().unwrap().is_none() {
-        signal(&child, Signal::SIGINT);
-        assert!(!child.wait().unwrap().success());
+        interrupt(child, &pids);
+    } else {
+        assert_eq!(left_behind(&prefix(&child)), [""; 0]);
     }
-    assert_eq!(left_behind(&prefix), [""; 0]);
-    wait_for("the processes to end", || are_gone(&pids));
 }

@@ -12,7 +12,7 @@ use crate::node::{Node, Reach};
 use crate::reader::Section;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tdma::Tdma;
-use rohrpost_mailbox::{Name, Priority, local};
+use rohrpost_mailbox::{ALL_SYSTEMS, Name, Priority, local};
 use std::net::{IpAddr, SocketAddr};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -282,6 +282,12 @@ impl Installation {
     pub fn tcp_router(&self) -> Option<Name> {
         let class = self.classes.id(TCP).filter(|_| self.tcp.as_ref().is_some_and(|tcp| tcp.server.is_some()))?;
         Some(Name::new(self.system.id, class.0, SERVER_INSTANCE, local::COMMANDS))
+    }
+
+    /// The TCP router, if another system runs it: its name in all systems, since no configuration says in which.
+    pub fn tcp_router_elsewhere(&self) -> Option<Name> {
+        let class = self.classes.id(TCP).filter(|_| self.tcp.as_ref().is_some_and(|tcp| tcp.server.is_none()))?;
+        Some(Name::new(ALL_SYSTEMS, class.0, SERVER_INSTANCE, local::COMMANDS))
     }
 
     /// The names that a node hosts, each range with all mailboxes in it: its modules, their faces, and its tools. Sorted; none overlaps

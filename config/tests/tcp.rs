@@ -1,7 +1,7 @@
 //! What a file with a TCP router means.
 
 use rohrpost_config::{Installation, Program, TCP_CLIENT, TCP_ROUTER};
-use rohrpost_mailbox::{Name, Priority};
+use rohrpost_mailbox::{ALL_SYSTEMS, Name, Priority};
 use std::path::Path;
 
 const TCP: &str = include_str!("tcp.toml");
@@ -44,6 +44,8 @@ fn the_server_and_a_client_of_each_node_are_there_by_themselves() {
     assert_eq!((north.modules[0].has_transit(), north.modules[1].has_transit()), (false, true));
     let south = parse(&TCP.replace("server = \"base\"\n", ""));
     assert_eq!((south.tcp_router(), south.modules.len()), (None, 2), "another installation runs it");
+    let elsewhere = [&north, &south].map(|system| system.tcp_router_elsewhere());
+    assert_eq!(elsewhere, [None, Some(Name::new(ALL_SYSTEMS, 64, 255, 0))]);
 }
 
 #[test]

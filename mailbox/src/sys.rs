@@ -201,11 +201,16 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    fn reserved(runtime_ns: u64, period_ns: u64) -> Result<i32, ReservationError> {
+    /// What the kernel says of a thread that has reserved so much.
+    fn reserved(runtime_ns: u64, period_ns: u64) -> Result<libc::sched_attr, ReservationError> {
         let reserve = move || {
             reserve(Reservation { runtime_ns, deadline_ns: period_ns, period_ns })?;
-            // SAFETY: takes a number only.
-            Ok(unsafe { libc::sched_getscheduler(0) })
+            // SAFETY: numbers only, for which 0 is a value.
+            let mut said: libc::sched_attr = unsafe { std::mem::zeroed() };
+            let bytes = size_of::<libc::sched_attr>();
+            // SAFETY: writes as many bytes as it is told, to attributes that live here; 0 is the calling thread, and there are no flags.
+            assert_eq!(unsafe { libc::syscall(libc::SYS_sched_getattr, 0, &raw mut said, bytes, 0) }, 0);
+            Ok(said)
         };
         // Of a thread of its own, with which it ends.
         std::thread::spawn(reserve).join().unwrap()
@@ -214,7 +219,13 @@ mod tests {
     #[test]
     fn a_reservation_is_granted_or_refused_with_a_reason() {
         match reserved(MS / 10, 10 * MS) {
-            Ok(policy) => assert_eq!(policy & !libc::SCHED_RESET_ON_FORK, libc::SCHED_DEADLINE),
+            Ok(said) => {
+                assert_eq!((said.sched_policy, said.sched_runtime), (libc::SCHED_DEADLINE as u32, MS / 10));
+                assert!(
+                    said.sched_flags & libc::SCHED_FLAG_RECLAIM as u64 != 0,
+                    "what the hypervisor takes is made up for"
+                );
+            }
             Err(ReservationError::NotAllowed | ReservationError::TooMuch) => {}
             Err(error) => panic!("{error}"),
         }

@@ -6,13 +6,14 @@
 mod common;
 
 use common::relay::Relay;
-use common::talk::{Ears, talk};
-use common::{Capture, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
+use common::talk::{Ears, PAUSE, mouths, talk};
+use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
 use rohrpost_routers::frame::Kind;
 use rohrpost_routers::shell::Failure;
 use rohrpost_routers::tdma::Silent;
 use std::io::Write;
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 const ALL: [u8; NODES as usize] = [0, 1, 2];
@@ -24,6 +25,11 @@ const DRIFTS: Duration = Duration::from_secs(5);
 const HELD_BACK: Duration = Duration::from_millis(2);
 /// With this it is 100 µs further off after five seconds.
 const DRIFT_NS_S_MAX: u64 = 20_000;
+
+/// From then on it can go by its own clock for seconds.
+fn knows_its_rate(station: &Station) -> bool {
+    station.clock().record.drift_ns_s < DRIFT_NS_S_MAX
+}
 
 #[test]
 fn a_slave_whose_clock_drifts_and_changes_its_rate_keeps_its_slots() {
@@ -76,18 +82,45 @@ fn behind_a_bridge_that_becomes_slow_a_node_keeps_its_slots_and_loses_nothing() 
     let Some(segment) = Segment::start() else { return };
     segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
     let mut ears = Ears::new(&segment);
-    // From then on it can go by its own clock for seconds.
-    let knows = |station: &Station| station.clock().record.drift_ns_s < DRIFT_NS_S_MAX;
-    segment.wait_until("node 2 knows its rate", |segment| knows(&segment.stations[2]));
+    segment.wait_until("node 2 knows its rate", |segment| knows_its_rate(&segment.stations[2]));
     let time = segment.stations[0].clock().record;
     let capture = Capture::start(&segment.lab);
-    let relay = Relay::start(&segment, 2, HELD_BACK);
+    let relay = Relay::start(&segment, 2, HELD_BACK, |_| false);
     talk(&segment, &mut ears, &ALL, 300);
     let silent = segment.stations[2].slots().silent;
     assert!(relay.end() > 300, "data and time take that way");
     assert_kept("behind a slow bridge", &capture.end(), &time);
     assert_eq!(silent, None);
     talk(&segment, &mut ears, &ALL, 50);
+}
+
+#[test]
+fn a_master_whose_packages_come_is_replaced_by_nobody_who_misses_its_syncs() {
+    let Some(segment) = Segment::start() else { return };
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    let master = segment.stations[2].clock().master.unwrap();
+    let backup = &segment.stations[usize::from(MASTERS[0] + MASTERS[1] - master)];
+    segment.wait_until("the backup knows its rate", |_| knows_its_rate(backup));
+    let (stood_in, term) = (|| backup.slots().counts.syncs.replacements_sent, backup.clock().term);
+    let (is_over, began) = (AtomicBool::new(false), stood_in());
+    let mut mouths = mouths(&segment, &[master, backup.own]);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let since = Instant::now();
+            for id in (0..).take_while(|_| !is_over.load(Ordering::Relaxed) && since.elapsed() < 2 * PATIENCE) {
+                mouths.iter_mut().for_each(|mouth| mouth.say(id));
+                std::thread::sleep(PAUSE);
+            }
+        });
+        // Without another sign of life the backup would take over after three cycles.
+        let relay = Relay::start(&segment, backup.own, Duration::ZERO, |head| head.kind == Kind::Sync);
+        segment
+            .wait_until("it has stood in for many cycles", |_| stood_in() > began + 10 || backup.clock().term != term);
+        let clock = backup.clock();
+        assert!(relay.end() > 0);
+        is_over.store(true, Ordering::Relaxed);
+        assert_eq!((clock.master, clock.term), (Some(master), term), "it goes on with the master that speaks");
+    });
 }
 
 /// Has a node's device changed by `tc`; false where that is not possible.

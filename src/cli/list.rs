@@ -7,7 +7,7 @@ use super::target::{Running, Target};
 use super::{Failure, say};
 use rohrpost::Name;
 use rohrpost::config::Installation;
-use rohrpost::interfaces::BeyondHost;
+use rohrpost::interfaces::{BeyondHost, BeyondHosts};
 use rohrpost::mailbox::{Loss, MailboxInfo, saturating_sum};
 use rohrpost::survey::{Scope, node_of, purpose};
 use serde::Serialize;
@@ -86,6 +86,10 @@ struct Listing<'a> {
     modules: Vec<ModuleLine>,
     mailboxes: Vec<MailboxLine>,
     beyond: Vec<BeyondLine>,
+    /// Ranges of names there that the TCP router does not tell.
+    beyond_more: u64,
+    /// Why that is not known, if it is not; none without a TCP router, too.
+    beyond_silent: Option<String>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -93,13 +97,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let scope = if arguments.mailboxes || arguments.json { Scope::Mailboxes } else { Scope::Modules };
     let (survey, silent) = running.survey(scope)?;
     let nodes = running.shown();
+    let (beyond, beyond_more, beyond_silent) = match running.hosts_beyond() {
+        None => (Vec::new(), 0, None),
+        Some(Ok(hosts)) => (beyond(&running, &hosts), hosts.more, None),
+        Some(Err(why)) => (Vec::new(), 0, Some(why.to_string())),
+    };
     let listing = Listing {
         installation: &running.installation.name,
         node: &running.node_name,
         nodes: nodes.iter().map(|node| node_line(node, &silent)).collect(),
         modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
         mailboxes: mailbox_lines(&running.installation, &survey.mailboxes),
-        beyond: beyond(&running)?,
+        beyond,
+        beyond_more,
+        beyond_silent,
     };
     if arguments.json {
         say(serde_json::to_string(&listing)?);
@@ -117,6 +128,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let table = table(["beyond", ">system", "by"], rows);
         say(format_args!("\n{}(modules at the TCP router that this configuration does not have)", table));
     }
+    if listing.beyond_more > 0 {
+        say(format_args!("(and {} ranges of names that it does not tell)", listing.beyond_more));
+    }
+    if let Some(why) = &listing.beyond_silent {
+        say(format_args!("\nmodules at the TCP router are not known: {why}"));
+    }
     if !silent.is_empty() {
         let lines: Vec<String> = silent.iter().map(Silence::text).collect();
         say(format_args!("\n{}", lines.join("\n")));
@@ -127,10 +144,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Modules that the TCP router knows, if it runs here, and the configuration does not. Tools come and go.
-fn beyond(running: &Running) -> Result<Vec<BeyondLine>, Failure> {
+/// Modules that the TCP router knows and the configuration does not. Tools come and go.
+fn beyond(running: &Running, hosts: &BeyondHosts) -> Vec<BeyondLine> {
     let installation = &running.installation;
-    let Some(hosts) = running.hosts_beyond()? else { return Ok(Vec::new()) };
     let first = |host: &BeyondHost| Name::from_raw(host.first);
     let is_other = |host: &&BeyondHost| {
         let name = first(host);
@@ -142,7 +158,7 @@ fn beyond(running: &Running) -> Result<Vec<BeyondLine>, Failure> {
         let module = if name == last { text(name) } else { format!("{} to {}", text(name), text(last)) };
         BeyondLine { module, system: name.system(), by: host.client.clone() }
     };
-    Ok(hosts.hosts.iter().filter(is_other).map(line).collect())
+    hosts.hosts.iter().filter(is_other).map(line).collect()
 }
 
 /// Mailboxes, one a line.

@@ -8,11 +8,12 @@ use super::units::short;
 use rohrpost::common::GET_DATA;
 use rohrpost::config::Installation;
 use rohrpost::description::Description;
-use rohrpost::interfaces::{BeyondHosts, LinkState, Links, RouterInterface, TcpInterface};
+use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
 use rohrpost::launch::{Look, launcher_of};
-use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::mailbox::{InspectError, Name, SendError, realtime_ns};
 use rohrpost::output::iso;
+use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::survey::{LookFailure, MailboxLook, Scope, Seen, Survey, look_at_all};
 use rohrpost::{CallError, Fault, ToolLink};
 use serde::Serialize;
@@ -140,24 +141,37 @@ impl Running {
     /// What the own node's router says of its links; none without a router that answers.
     fn links(&self) -> Option<Links> {
         let router = self.installation.router_of(&self.node_name)?;
-        let port = RouterInterface::LINKS;
-        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let read = |bytes: &[u8]| from_bytes::<(u64, Links)>(bytes);
-        self.sight
-            .with(self, |tool| tool.call(router, GET_DATA, (port.hash)(), write, read))
-            .ok()?
-            .map(|(_, links)| links)
-            .ok()
+        self.newest(router, RouterInterface::LINKS).ok()
     }
 
-    /// What is registered at the TCP router; none if it runs elsewhere, or does not answer.
-    pub(super) fn hosts_beyond(&self) -> Result<Option<BeyondHosts>, Failure> {
-        let Some(server) = self.installation.tcp_router() else { return Ok(None) };
-        let port = TcpInterface::HOSTS;
+    /// The newest value of data that a module publishes.
+    fn newest<T: DeserializeOwned>(&self, module: Name, port: DataPort<T>) -> Result<T, Failure> {
         let write = |body: &mut Vec<u8>| append(body, &(port.number,));
-        let read = |bytes: &[u8]| from_bytes::<(u64, BeyondHosts)>(bytes);
-        let told = self.sight.with(self, |tool| tool.call(server, GET_DATA, (port.hash)(), write, read))?;
-        Ok(told.ok().map(|(_, hosts)| hosts))
+        let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
+        let told = self.sight.with(self, |tool| tool.call(module, GET_DATA, (port.hash)(), write, read))?;
+        told.map(|(_, value)| value).map_err(|error| self.told(module, &error))
+    }
+
+    /// What is registered at the TCP router, or why it is not known; none without `[tcp]`.
+    pub(super) fn hosts_beyond(&self) -> Option<Result<BeyondHosts, Failure>> {
+        if let Some(own) = self.installation.tcp_router() {
+            return Some(self.newest(own, TcpInterface::HOSTS));
+        }
+        let elsewhere = self.installation.tcp_router_elsewhere()?;
+        // Of a package to all systems nobody says that it did not arrive, and only the time would tell.
+        let told = self.takes_part().and_then(|()| self.newest(elsewhere, TcpInterface::HOSTS));
+        Some(told.map_err(|error| format!("{error}; `rohrpost list` in the system that runs it shows them").into()))
+    }
+
+    /// Whether this node takes part at the TCP router, or why not.
+    fn takes_part(&self) -> Result<(), Failure> {
+        let Some(client) = self.installation.tcp_client_of(&self.node_name) else { return Ok(()) };
+        let link = self.newest(client, TcpInterface::LINK)?;
+        match link.state {
+            BeyondState::Up => Ok(()),
+            _ if link.why.is_empty() => Err(format!("node {} is not connected yet", link.node).into()),
+            _ => Err(link.why.into()),
+        }
     }
 
     /// The modules of all nodes that are meant, but for those that need not run; with why, those that cannot be asked.

@@ -3,20 +3,11 @@
 
 use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, signal, wait};
 use crate::process::{Running, Said};
+use crate::systems::CLASSES;
 use nix::sys::signal::Signal;
 use rohrpost::mailbox::{SystemClock, monotonic_ns};
 use std::path::PathBuf;
 
-const CLASSES: &str = r#"
-[classes]
-router = { id = 250 }
-probe = { id = 96 }
-tcp = { id = 64, text = "Carries packages beyond the LAN" }
-output = { id = 32, text = "Collects what modules say" }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-"#;
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";
 const TWO: &str = "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\ntools = [16, 31]\n\
                    [time]\nsource = \"master\"\n";

@@ -64,6 +64,24 @@ pub struct Cell {
     pub cap: Duration,
 }
 
+impl Cell {
+    /// Round trips of a turn over a network.
+    pub const HOP_MESSAGES: usize = 10_000;
+
+    /// Over a network: a core for each end, in real time, one message after the other. All sleep, so the kernel's fair server stays out.
+    pub fn hop(bytes: usize, messages: usize) -> Self {
+        Self {
+            bytes,
+            messages,
+            warm_up: (Self::HOP_MESSAGES / 10).min(messages / 10),
+            placement: Placement::TwoCores,
+            scheduling: Scheduling::Fifo,
+            pace: None,
+            cap: Duration::from_secs(2),
+        }
+    }
+}
+
 /// What the ends of a turn share.
 #[repr(C)]
 struct Turn {

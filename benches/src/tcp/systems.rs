@@ -57,7 +57,7 @@ impl Systems {
         let (command, scratch) = (settings.command()?, Scratch::new()?);
         let address = free_address()?;
         for end in [End::Ping, End::Pong] {
-            let text = configuration(end, security, address.port());
+            let text = configuration(end, security, address);
             fs::write(config(&scratch, end), text).map_err(|error| Failure::of("configuration", error))?;
         }
         let installation = Installation::load(&config(&scratch, End::Ping));
@@ -220,13 +220,16 @@ fn config(scratch: &Scratch, end: End) -> PathBuf {
     Path::new(&scratch.directory()).join(format!("{}.toml", name_of(end)))
 }
 
-/// One that nobody has now.
+/// One that nobody has now. Of a loopback address of this process alone: nobody connects from there, and so takes the port meanwhile.
 pub(super) fn free_address() -> Result<SocketAddr, Failure> {
-    let found = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).and_then(|listener| listener.local_addr());
+    let [_, high, middle, low] = std::process::id().to_be_bytes();
+    // 127.128.0.0/9 without its first and last addresses; a PID has 22 bits.
+    let own = Ipv4Addr::new(127, 128 | high, middle, low.clamp(1, 254));
+    let found = TcpListener::bind((own, 0)).and_then(|listener| listener.local_addr());
     found.map_err(|error| Failure::of("a free port", error))
 }
 
-fn configuration(end: End, security: Security, port: u16) -> String {
+fn configuration(end: End, security: Security, at: SocketAddr) -> String {
     let (node, system) = (name_of(end), system_of(end));
     let security = match security {
         Security::None => "security = \"none\"",
@@ -257,6 +260,7 @@ program = "bench"
 optional = true
 "#,
         bench = BENCH.0,
-        address = Ipv4Addr::LOCALHOST,
+        address = at.ip(),
+        port = at.port(),
     )
 }

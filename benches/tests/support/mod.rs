@@ -7,6 +7,9 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+/// What the note of a contender begins with that failed.
+pub(crate) const FAILED: &str = "FAILED";
+
 /// Longer than anything here takes on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -20,7 +23,9 @@ pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
 /// The rows of a run, each checked, after an end without failure: a message that is damaged, missing or out of order would be one.
 pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
+    // Of much that was said, what failed comes last.
+    let failed: Vec<&str> = text.lines().filter(|line| line.contains(FAILED)).collect();
+    assert!(output.status.success(), "{text}\n{}\n{failed:#?}", String::from_utf8_lossy(&output.stderr));
     let mut lines: Vec<Map<String, Value>> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let (head, tail) = (lines.remove(0), lines.pop().unwrap());
     assert_eq!((&head["case"], &tail["case"]), (&"environment".into(), &"environment-after".into()));
@@ -121,6 +126,14 @@ pub(crate) fn are_gone(pids: &[String]) -> bool {
         let name = std::fs::read_to_string(Path::new("/proc").join(pid).join("comm")).unwrap_or_default();
         name.starts_with("rohrpost")
     })
+}
+
+/// Interrupts a run that has these processes: it ends, and leaves none of them, and nothing in shared memory.
+pub(crate) fn interrupt(mut child: Child, pids: &[String]) {
+    signal(&child, Signal::SIGINT);
+    assert!(!child.wait().unwrap().success());
+    assert_eq!(left_behind(&prefix(&child)), [""; 0]);
+    wait_for("the processes to end", || are_gone(pids));
 }
 
 /// Sends it a signal.

@@ -3,7 +3,7 @@
 use super::absent::Absent;
 use super::envelope::micros;
 use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope};
-use rohrpost_mailbox::{Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type};
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -52,6 +52,14 @@ struct Call {
     repeat_at: Instant,
     repeated: bool,
     answer: Option<Head>,
+}
+
+impl Call {
+    /// Whether who answers was called: itself, or that name in all systems, of which the first that answers counts.
+    fn is_to(&self, from: Name) -> bool {
+        let (to, from) = (self.to.module(), from.module());
+        to == from || to == Name::new(ALL_SYSTEMS, from.class().0, from.instance(), 0)
+    }
 }
 
 /// What came of the calls of one module.
@@ -321,7 +329,8 @@ impl Link {
             let Ok((envelope, result)) = ReplyEnvelope::split(package.body()) else { continue };
             // The sequence number, not the 16-bit id, tells calls apart: ids wrap.
             let its = |call: &&mut Call| {
-                (call.sequence, call.to.module()) == (envelope.sequence, head.from.module())
+                call.sequence == envelope.sequence
+                    && call.is_to(head.from)
                     && head.kind.0 == -call.kind.0
                     && call.answer.is_none()
             };

@@ -138,6 +138,7 @@ impl Launch {
         events: Receiver<Event>,
         keep: impl Fn(&Module) -> Option<OwnedFd>,
     ) -> Result<Self, LaunchError> {
+        program::hurry();
         let beside = executable.parent().map(PathBuf::from).unwrap_or_default();
         let missing = installation.missing_programs(node_name, &beside);
         let fatal: Vec<String> = missing.iter().filter(|p| !p.optional).map(ToString::to_string).collect();

@@ -115,11 +115,6 @@ impl Table {
         self.entries.iter().map(|entry| (entry.client, entry.range))
     }
 
-    /// Ranges that a client hosts.
-    pub fn ranges_of(&self, client: ClientIndex) -> impl Iterator<Item = Range> {
-        self.hosted().filter(move |(host, _)| *host == client).map(|(_, range)| range)
-    }
-
     fn flatten(&mut self) {
         self.steps.clear();
         let mut open: Vec<Entry> = Vec::new();

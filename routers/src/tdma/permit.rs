@@ -71,7 +71,7 @@ impl Permit {
     pub fn takes(&mut self, now_ns: u64, datagram_bytes: usize) {
         let wire_ns = self.wire.ns(datagram_bytes);
         self.free_ns = self.starts_ns(now_ns).saturating_add(wire_ns);
-        self.planned_ns += wire_ns.max(HAND_OVER.as_nanos() as u64);
+        self.planned_ns += busy_ns(wire_ns);
         self.datagrams += 1;
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
@@ -82,12 +82,21 @@ impl Permit {
         self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
     }
 
-    /// Whether a datagram that is handed over now would be on the wire later than bounds reckon with, after what the window has carried: the
-    /// thread stood still.
+    /// Whether a datagram that is handed over now would be off the wire later than bounds reckon with, after what the window has carried: the
+    /// window began too late, or the thread stood still.
+    pub fn is_late(&self, now_ns: u64, datagram_bytes: usize) -> bool {
+        let wire_ns = self.wire.ns(datagram_bytes);
+        self.starts_ns(now_ns).saturating_add(wire_ns) > self.reckoned_ns().saturating_add(busy_ns(wire_ns))
+    }
+
+    /// Whether the window has less room left now than bounds reckon with, after what it has carried.
     pub fn is_behind(&self, now_ns: u64) -> bool {
-        let reckoned_ns =
-            self.begin_ns.saturating_add(LATE_NS + self.planned_ns).saturating_add(HAND_OVER.as_nanos() as u64);
-        self.starts_ns(now_ns) > reckoned_ns
+        self.starts_ns(now_ns) > self.reckoned_ns()
+    }
+
+    /// When bounds have the wire free for the next datagram, at the latest, local ns.
+    fn reckoned_ns(&self) -> u64 {
+        self.begin_ns.saturating_add(LATE_NS + self.planned_ns)
     }
 
     /// When a datagram is on the wire that is handed over now: not before those that were.
@@ -121,4 +130,9 @@ impl Permit {
             Kind::Slot { .. } => Allowed::Slot,
         }
     }
+}
+
+/// So long bounds have a datagram keep a window busy that takes the wire so long, ns: what is shorter waits for the thread.
+fn busy_ns(wire_ns: u64) -> u64 {
+    wire_ns.max(HAND_OVER.as_nanos() as u64)
 }

@@ -1,4 +1,4 @@
-//! What a node sends and hears goes through a relay on the bridge, which holds every frame back for the same time.
+//! What a node sends and hears goes through a relay on the bridge, which holds every frame back for the same time, or keeps some from the node.
 
 use super::{NODES, Segment, name};
 use nix::net::if_::if_nametoindex;
@@ -6,6 +6,8 @@ use nix::sys::socket::{
     AddressFamily, LinkAddr, MsgFlags, SockFlag, SockProtocol, SockType, SockaddrLike, recvfrom, sendto, socket,
 };
 use rohrpost_mailbox::monotonic_ns;
+use rohrpost_mailbox::sys::{Scheduling, schedule};
+use rohrpost_routers::frame::FrameHead;
 use std::collections::VecDeque;
 use std::os::fd::{AsRawFd, OwnedFd};
 use std::sync::Arc;
@@ -20,6 +22,12 @@ const CHECKSUM_AT: std::ops::Range<usize> = 40..42;
 const UDP_AT: usize = 23;
 const UDP: u8 = 17;
 const FRAME_BYTES: usize = 1 << 12;
+
+/// Of UDP over IPv4 in Ethernet.
+const HEADS_BYTES: usize = 42;
+
+/// Which datagrams do not come to the node.
+pub(crate) type Keeps = fn(&FrameHead) -> bool;
 
 /// Runs until it is dropped; then the node is on the bridge again.
 pub(crate) struct Relay<'a> {
@@ -36,7 +44,7 @@ struct Held {
 }
 
 impl<'a> Relay<'a> {
-    pub(crate) fn start(segment: &'a Segment, node: u8, holds: Duration) -> Self {
+    pub(crate) fn start(segment: &'a Segment, node: u8, holds: Duration, keeps: Keeps) -> Self {
         let (socket, ports) = {
             let _inside = segment.lab.enter_bridge().unwrap();
             let flags = SockFlag::SOCK_CLOEXEC | SockFlag::SOCK_NONBLOCK;
@@ -47,7 +55,7 @@ impl<'a> Relay<'a> {
         let ends = Arc::new(AtomicBool::new(false));
         let (own, ending) = (ports[usize::from(node)], ends.clone());
         let others: Vec<usize> = ports.into_iter().filter(|port| *port != own).collect();
-        let thread = std::thread::spawn(move || run(&socket, own, &others, holds, &ending));
+        let thread = std::thread::spawn(move || run(&socket, own, &others, holds, keeps, &ending));
         // It runs before: meanwhile there are copies, but no pause.
         segment.lab.divide(&[&name(node)]).unwrap();
         Self { segment, node, ends, thread: Some(thread) }
@@ -68,7 +76,9 @@ impl Drop for Relay<'_> {
 }
 
 /// From the node to all others, and from each of those to the node, which takes what is for it.
-fn run(socket: &OwnedFd, own: usize, others: &[usize], holds: Duration, ends: &AtomicBool) -> u64 {
+fn run(socket: &OwnedFd, own: usize, others: &[usize], holds: Duration, keeps: Keeps, ends: &AtomicBool) -> u64 {
+    // Where it is not allowed, the relay is late now and then.
+    let _ = schedule(Scheduling::Fifo(1));
     let (mut held, mut carried) = (VecDeque::new(), 0);
     let mut buffer = [0; FRAME_BYTES];
     while !ends.load(Ordering::Relaxed) {
@@ -79,6 +89,10 @@ fn run(socket: &OwnedFd, own: usize, others: &[usize], holds: Duration, ends: &A
                 port if others.contains(&port) => std::slice::from_ref(&own),
                 _ => continue,
             };
+            let head = buffer[..bytes].get(HEADS_BYTES..).map(FrameHead::parse);
+            if from.ifindex() != own && matches!(head, Some(Ok((head, _))) if keeps(&head)) {
+                continue;
+            }
             let mut frame = buffer[..bytes].to_vec();
             if frame.get(UDP_AT) == Some(&UDP) && bytes >= CHECKSUM_AT.end {
                 frame[CHECKSUM_AT].fill(0);

@@ -37,9 +37,10 @@ pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
     Ok(exit(start.and_then(run_started::<RouterModule>)))
 }
 
+/// Settings of a router: there are none in `[[module]]`, all is said in the sections of the network.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct NoSettings {}
+pub(super) struct NoSettings {}
 
 struct RouterModule {
     shell: Shell,

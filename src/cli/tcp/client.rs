@@ -1,8 +1,8 @@
 //! A node's client of the TCP router, as a module.
 
-use super::{NoSettings, PERIOD, classes, levels, short};
+use super::{NoSettings, PERIOD, certificates, classes, configured, levels, short};
 use crate::cli::router::faults::Encoded;
-use rohrpost::config::{Reach, Tcp as Configured};
+use rohrpost::config::Reach;
 use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
 use rohrpost::mailbox::{ERROR_UNKNOWN_NS, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError};
@@ -26,16 +26,10 @@ impl Module for ClientModule {
 
     fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         let installation = context.installation();
-        let tcp = installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))?;
+        let tcp = configured(installation)?;
         let node_name = installation.node_of(context.me()).unwrap_or_default().to_owned();
         let holder = Holder::Node { node: node_name.clone(), system: installation.system.id };
-        let seal = match &tcp.certificates {
-            Some(folder) => Some(ClientSeal::load(&installation.resolve(folder), &holder)?),
-            None => {
-                tracing::warn!("{}", Configured::UNPROTECTED);
-                None
-            }
-        };
+        let seal = certificates(installation, tcp).map(|folder| ClientSeal::load(&folder, &holder)).transpose()?;
         let digest = installation.digest();
         let settings = ClientSettings {
             name: short(&format!("node {node_name} of {}", installation.system.name)),

@@ -4,13 +4,14 @@ mod client;
 mod server;
 
 use super::Failure;
-use rohrpost::Start;
-use rohrpost::config::Tcp;
+use super::router::NoSettings;
+use rohrpost::config::{Installation, Tcp};
 use rohrpost::interfaces::{CarriedLoss, ClassPassed};
 use rohrpost::mailbox::Priority;
+use rohrpost::{ModuleError, Start};
 use rohrpost_modules::runtime::{exit, run_started};
 use rohrpost_routers::tcp::Class;
-use serde::Deserialize;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -42,9 +43,18 @@ pub(super) fn join(arguments: Arguments) -> Result<ExitCode, Failure> {
     Ok(exit(start.and_then(run_started::<client::ClientModule>)))
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NoSettings {}
+/// The section `[tcp]`.
+fn configured(installation: &Installation) -> Result<&Tcp, ModuleError> {
+    installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))
+}
+
+/// The folder of the certificates; without one nothing is sealed, and that is said.
+fn certificates(installation: &Installation, tcp: &Tcp) -> Option<PathBuf> {
+    if tcp.certificates.is_none() {
+        tracing::warn!("{}", Tcp::UNPROTECTED);
+    }
+    tcp.certificates.as_ref().map(|folder| installation.resolve(folder))
+}
 
 /// The level of each priority.
 fn levels(tcp: &Tcp) -> [u8; 256] {

@@ -1,8 +1,7 @@
 //! The TCP router, as a module.
 
-use super::{NoSettings, PERIOD, classes, levels, short};
+use super::{NoSettings, PERIOD, certificates, classes, configured, levels, short};
 use crate::cli::router::faults::Encoded;
-use rohrpost::config::Tcp as Configured;
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondHost, BeyondHosts, Tcp, TcpInterface};
 use rohrpost::mailbox::{monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError, Name};
@@ -25,14 +24,8 @@ impl Module for ServerModule {
 
     fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
         let installation = context.installation();
-        let tcp = installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))?;
-        let seal = match &tcp.certificates {
-            Some(folder) => Some(ServerSeal::load(&installation.resolve(folder))?),
-            None => {
-                tracing::warn!("{}", Configured::UNPROTECTED);
-                None
-            }
-        };
+        let tcp = configured(installation)?;
+        let seal = certificates(installation, tcp).map(|folder| ServerSeal::load(&folder)).transpose()?;
         let digest = installation.digest();
         let settings = ServerSettings {
             name: short(&format!("the TCP router of {}", installation.system.name)),

@@ -11,11 +11,9 @@ use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
 use super::sample::{self, Children, Seen, by_name};
+use super::terminal::{Opened, keyboard};
 use ratatui::DefaultTerminal;
-use ratatui::backend::CrosstermBackend;
-use ratatui::crossterm::event::{self, Event, KeyEventKind};
-use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
-use ratatui::crossterm::{cursor, execute};
+use ratatui::crossterm::event::{Event, KeyEventKind};
 use rohrpost::Name;
 use rohrpost::description::Description;
 use rohrpost::launch::{Event as Told, events};
@@ -41,57 +39,6 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
         calls.close();
     }
     outcome.map(|()| ExitCode::SUCCESS)
-}
-
-/// What the terminal says, from a thread of its own: reading from a terminal that was closed never returns (crossterm takes
-/// its end for an interruption), and must not keep us from ending.
-fn keyboard() -> Result<Receiver<Event>, Failure> {
-    let (sender, receiver) = std::sync::mpsc::channel();
-    let read = move || {
-        while let Ok(event) = event::read() {
-            if sender.send(event).is_err() {
-                break;
-            }
-        }
-    };
-    std::thread::Builder::new().name("keyboard".into()).spawn(read)?;
-    Ok(receiver)
-}
-
-/// The terminal while it is ours; given back as it was, whatever ends us.
-struct Opened(DefaultTerminal);
-
-impl Opened {
-    fn new() -> Result<Self, Failure> {
-        let hook = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |panic| {
-            // First, so that what it says is to be read.
-            give_back();
-            hook(panic);
-        }));
-        Self::draw().map_err(|error| {
-            give_back();
-            format!("this terminal cannot be drawn on: {error}; say `top --once`").into()
-        })
-    }
-
-    fn draw() -> std::io::Result<Self> {
-        enable_raw_mode()?;
-        execute!(std::io::stdout(), EnterAlternateScreen)?;
-        ratatui::Terminal::new(CrosstermBackend::new(std::io::stdout())).map(Self)
-    }
-}
-
-impl Drop for Opened {
-    fn drop(&mut self) {
-        give_back();
-    }
-}
-
-/// A terminal that is gone cannot be given back, and that is no error.
-fn give_back() {
-    let _ = disable_raw_mode();
-    let _ = execute!(std::io::stdout(), LeaveAlternateScreen, cursor::Show);
 }
 
 /// The nodes that are meant, but for the own one.

@@ -18,6 +18,7 @@ mod model;
 mod output;
 mod palette;
 mod sample;
+mod terminal;
 #[cfg(test)]
 mod tests;
 mod text;

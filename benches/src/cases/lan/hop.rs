@@ -2,7 +2,7 @@
 
 use super::{Ground, WHOLE};
 use crate::cases::Case;
-use crate::harness::{Cell, Failure, Placement, Scheduling, time_two_processes};
+use crate::harness::{Cell, Failure, time_two_processes};
 use crate::lan::chain::{time_chain, time_mailbox_chain};
 use crate::lan::ends::Module;
 use crate::lan::nodes::{Network, UNPACED};
@@ -11,12 +11,7 @@ use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use std::time::Duration;
 
-/// Round trips of a turn, and those before them that do not count.
-pub(super) const MESSAGES: usize = 10_000;
 const MESSAGES_PACED: usize = 1_000;
-pub(super) const WARM_UP: usize = 1_000;
-/// All sleep, so the kernel's fair server stays out.
-pub(super) const CAP: Duration = Duration::from_secs(2);
 /// A package each so often, as robots send.
 const PACE: Duration = Duration::from_micros(500);
 /// What a network of today has.
@@ -48,16 +43,8 @@ impl Case for Hop {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let ground = Ground::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB", sealed: false });
-        let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { MESSAGES });
-        let cell = Cell {
-            bytes: self.bytes,
-            messages,
-            warm_up: WARM_UP.min(messages / 10),
-            placement: Placement::TwoCores,
-            scheduling: Scheduling::Fifo,
-            pace: self.pace,
-            cap: CAP,
-        };
+        let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { Cell::HOP_MESSAGES });
+        let cell = Cell { pace: self.pace, ..Cell::hop(self.bytes, messages) };
         let contenders = [
             Contender::sampled("rohrpost", || {
                 let (nodes, turn) = ground.turn()?;

@@ -1,9 +1,9 @@
 //! What it costs that datagrams are sealed: the hop with keys beside the same without, turn by turn.
 
 use super::Ground;
-use super::hop::{CAP, ETHERNET, MESSAGES, WARM_UP};
+use super::hop::ETHERNET;
 use crate::cases::Case;
-use crate::harness::{Cell, Failure, Placement, Scheduling, time_two_processes};
+use crate::harness::{Cell, Failure, time_two_processes};
 use crate::lan::ends::Module;
 use crate::lan::nodes::{Network, UNPACED};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
@@ -26,16 +26,7 @@ impl Case for Sealed {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
         let [sealed, open] = [true, false].map(|sealed| Ground::new(settings, &Network { sealed, ..network }));
-        let messages = settings.count(MESSAGES);
-        let cell = Cell {
-            bytes: self.bytes,
-            messages,
-            warm_up: WARM_UP.min(messages / 10),
-            placement: Placement::TwoCores,
-            scheduling: Scheduling::Fifo,
-            pace: None,
-            cap: CAP,
-        };
+        let cell = Cell::hop(self.bytes, settings.count(Cell::HOP_MESSAGES));
         let time = |ground: &Ground| {
             let (nodes, turn) = ground.turn()?;
             time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, self.bytes, meetings))

@@ -1,7 +1,7 @@
 //! How long a package takes from a module through the TCP router to a module of another system, one at a time; everybody sleeps who waits.
 
 use crate::cases::Case;
-use crate::harness::{Cell, End, Failure, Placement, Scheduling, time_two_processes};
+use crate::harness::{Cell, End, Failure, time_two_processes};
 use crate::lan::ends::Module;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
@@ -11,10 +11,8 @@ use crate::tcp::zenoh::time_zenoh;
 use std::cell::Cell as Counter;
 use std::time::Duration;
 
-const MESSAGES: usize = 10_000;
-const WARM_UP: usize = 1_000;
-/// All sleep, so the kernel's fair server stays out.
-const CAP: Duration = Duration::from_secs(2);
+/// What waits for longer than 1.5 s is given up on its way.
+const LOST: Duration = Duration::from_secs(5);
 /// Of what it costs at least.
 const OF_RELAYS: f64 = 1.3;
 /// Of what it costs without a seal.
@@ -39,16 +37,7 @@ impl Case for Hop {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let messages = settings.count(MESSAGES);
-        let cell = Cell {
-            bytes: self.bytes,
-            messages,
-            warm_up: WARM_UP.min(messages / 10),
-            placement: Placement::TwoCores,
-            scheduling: Scheduling::Fifo,
-            pace: None,
-            cap: CAP,
-        };
+        let cell = Cell::hop(self.bytes, settings.count(Cell::HOP_MESSAGES));
         let start = |security| Ground::start(settings, security);
         let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
         let at_most = |name, bound: Option<f64>| Versus { name, p50: bound.map(Target::AtMost), p99: None };
@@ -95,7 +84,9 @@ impl Ground {
         self.turns.set(turn.wrapping_add(1));
         time_two_processes(cell, |end, meetings| {
             let other = if end == End::Ping { End::Pong } else { End::Ping };
-            Module::between(&systems.directory(end), [bench(end, turn), bench(other, turn)], cell.bytes, meetings)
+            let names = [bench(end, turn), bench(other, turn)];
+            Module::between(&systems.directory(end), names, cell.bytes, meetings)
+                .map(|module| module.with_patience(LOST))
         })
     }
 }

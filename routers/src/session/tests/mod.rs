@@ -2,6 +2,7 @@
 
 mod book;
 mod ends;
+mod ground;
 mod pipe;
 mod plan;
 mod strain;

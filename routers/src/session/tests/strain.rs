@@ -1,7 +1,8 @@
 //! What one client must not do to the others, by hand.
 
-use super::ends::{Ground, MS, S};
+use super::ground::Ground;
 use super::plan::{module, system_of};
+use super::world::{MS, S};
 use crate::session::client::{self, Package};
 use crate::session::frame::{Carried, FrameHead, HEAD_BYTES, Kind, LENGTH_MAX, Message, RANGES_MAX, Range, Ranges};
 use crate::session::{Cause, LOOK_EVERY_NS};

@@ -406,6 +406,9 @@ impl Slots {
     /// `now_ns`: local; when it was found to fit.
     fn hand_over(&mut self, permit: &mut Permit, now_ns: u64, to: NodeIndex, bytes: usize) {
         let handed_ns = monotonic_ns();
+        if permit.is_late(now_ns, bytes) {
+            self.outbound.slot_left_out(handed_ns);
+        }
         let sent = self.wire.send_made(handed_ns, to, &mut self.datagram, bytes);
         if sent.is_err_and(super::Failure::is_loss) {
             self.outbound.unsent(&self.datagram[..bytes], &[], &mut self.answers);

@@ -2,7 +2,7 @@
 
 use super::world::{CYCLE, MASTERS, SECOND, US, table};
 use crate::frame::{FrameHead, Kind as Frame};
-use crate::tdma::{Carries, Discipline, GATE_NS, LATE_NS, Next, Permit, Planned, Silent, Verdict};
+use crate::tdma::{Carries, Discipline, GATE_NS, LATE_NS, Next, Planned, Silent, Verdict};
 use crate::time::message::{Message, Reply, Sync};
 use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
@@ -217,21 +217,23 @@ pub(super) fn what_was_handed_over_counts() {
 }
 
 #[test]
-fn a_window_is_behind_when_more_time_went_by_than_bounds_reckon_with() {
+fn what_leaves_later_than_bounds_reckon_with_is_late() {
     let mut one = Lonely::joined();
     let (_, Verdict::Send(mut permit)) = one.judged(0) else { panic!() };
-    let (late_ns, hand_over_ns, wire_ns) = (LATE_NS, 20 * US, 85_280);
-    let begin_ns = permit.begin_ns;
-    let is_behind = |permit: &Permit, after_ns| {
-        let found = [0, 1].map(|more_ns| permit.is_behind(begin_ns - one.discipline.lead_ns().1 + after_ns + more_ns));
-        assert_eq!(found, [false, true], "at {after_ns} ns");
+    let (hand_over_ns, wire_ns, small_wire_ns) = (20 * US, 85_280, 6_720);
+    let called_ns = permit.begin_ns - one.discipline.lead_ns().1;
+    let turns_at = |after_ns: u64, is_so: &dyn Fn(u64) -> bool| {
+        assert_eq!([0, 1].map(|more_ns| is_so(called_ns + after_ns + more_ns)), [false, true], "at {after_ns} ns");
     };
-    is_behind(&permit, late_ns + hand_over_ns);
-    permit.takes(begin_ns, 1_000);
-    is_behind(&permit, late_ns + hand_over_ns + wire_ns);
-    // A small one takes the wire 5 µs, and the thread longer.
-    permit.takes(begin_ns + wire_ns, 0);
-    is_behind(&permit, late_ns + 2 * hand_over_ns + wire_ns);
+    turns_at(LATE_NS, &|now_ns| permit.is_behind(now_ns));
+    turns_at(LATE_NS, &|now_ns| permit.is_late(now_ns, 1_000));
+    // A small one takes the wire less than the thread, which has the rest to hand it over.
+    turns_at(LATE_NS + hand_over_ns - small_wire_ns, &|now_ns| permit.is_late(now_ns, 0));
+    permit.takes(called_ns, 1_000);
+    turns_at(LATE_NS + wire_ns, &|now_ns| permit.is_behind(now_ns));
+    permit.takes(called_ns + wire_ns, 0);
+    turns_at(LATE_NS + wire_ns + hand_over_ns, &|now_ns| permit.is_behind(now_ns));
+    turns_at(LATE_NS + wire_ns + hand_over_ns, &|now_ns| permit.is_late(now_ns, 1_000));
 }
 
 #[test]

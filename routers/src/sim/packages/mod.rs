@@ -1,93 +1,45 @@
 //! The layer that carries packages: `Outbound` and `Inbound`, called as the threads of the shell call them, and watched.
+//!
+//! Here: what a router does as packages come. What differs with time slots is in `slotted`, what must hold in `checks`.
+
+mod checks;
+mod settings;
+mod slotted;
+mod watch;
+
+pub(super) use settings::DIGEST;
+pub use settings::{address, settings};
+pub(super) use slotted::Hands;
 
 use super::book::{Promise, Role};
 use super::clock::Now;
-use super::host::{Closed, Parcel, TRANSIT_AGE_MAX_NS, TRANSIT_SLOTS};
-use super::plan::{Plan, SYSTEM};
+use super::host::{Parcel, TRANSIT_AGE_MAX_NS};
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
-use crate::access::Access;
-use crate::fragment::PARTIAL_MAX;
 use crate::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
-use crate::inbound::{self, Datagram, Inbound, SOCKET_MAX_NS, TICK_EVERY_NS};
-use crate::intake::{Intake, Transit};
-use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
+use crate::inbound::{self, Datagram, Inbound};
 use crate::outbound::{Accepted, Outbound, Output, Package};
-use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, HELLO_SLOT_BYTES, Said, TAG_BYTES};
-use crate::settings::{NodeSettings, Settings};
-use crate::stats::{Cause, Side, Stats};
-use crate::tdma::Permit;
-use rohrpost_config::{Network, Route, Security};
-use rohrpost_mailbox::{Head, Kind, Options, Priority, Type};
+use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, TAG_BYTES};
+use crate::settings::Settings;
+use crate::stats::Stats;
+use rohrpost_mailbox::{Head, Options, Type};
+use slotted::say;
 use std::collections::VecDeque;
 use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
 use std::sync::Arc;
+use watch::{Came, Watch};
 
 /// The socket of packages.
 pub const PORT: Port = 0;
-/// Of the configuration.
-pub(super) const DIGEST: u64 = 0x1234_5678;
 /// A router that did nothing for so long stood still: threads do not wake that late.
 const STILL_NS: u64 = 400_000_000;
-/// So long after a datagram came what went before it, and is missing, is counted as lost: at the third tick.
-const SETTLED_NS: u64 = 3 * TICK_EVERY_NS + STILL_NS;
 /// The thread that receives looks around so often, if nothing comes.
 const LISTEN_NS: u64 = 100_000_000;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
 const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
-
-/// Says a hello, or has it wait for a slot.
-fn say(io: &Io<'_>, seals: &mut PackageSeals, line: &mut VecDeque<Sent>, said: Said, datagram: &[u8]) {
-    if io.plan.slots.is_none() {
-        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
-    }
-    let PackageSeals { gate, waiting, .. } = seals;
-    gate.waits(said, || {
-        waiting.put(io.now.monotonic_ns, said, datagram);
-        true
-    });
-}
-
-/// Address of a node.
-pub fn address(node: usize) -> IpAddr {
-    IpAddr::V4(Ipv4Addr::new(10, 77, 0, node as u8 + 1))
-}
-
-/// What one life of a router is configured with.
-pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
-    let others = plan.nodes.iter().enumerate().filter(|(other, _)| *other != node);
-    let mut routes: Vec<Route> = others
-        .flat_map(|(index, other)| other.modules.iter().map(move |module| (index, *module)))
-        .map(|(index, module)| Route { first: module, last: module.with_local(u8::MAX), node: index as NodeIndex })
-        .collect();
-    routes.sort_unstable_by_key(|route| route.first);
-    let nodes = (0..plan.nodes.len()).map(|index| NodeSettings { name: format!("n{index}"), address: address(index) });
-    Settings {
-        system: SYSTEM,
-        own: node as NodeIndex,
-        nodes: nodes.collect(),
-        digest: DIGEST,
-        incarnation,
-        network: Network {
-            security: if plan.sealed { Security::Keys } else { Security::None },
-            datagram_bytes_max: plan.shape.datagram_bytes_max,
-            rate_bytes_s: plan.shape.rate_bytes_s,
-            quota_bytes: plan.shape.quota_bytes,
-            bulk_below: plan.shape.bulk_below,
-            port: 21117,
-            mtu: u16::MAX,
-        },
-        tdma: plan.slots.as_ref().map(|slots| slots.table.clone()),
-        routes,
-        senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
-        access: Access::default(),
-        flows: Vec::new(),
-    }
-}
 
 /// One life of a router's packages.
 pub struct Packages {
@@ -182,7 +134,7 @@ impl Packages {
 
     fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) -> Accepted {
         let package = Package { head, published_ns, body };
-        let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+        let mut watch = Watch::out(io, &mut self.undelivered);
         let accepted = self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch);
         if let Accepted::Send { to, head } = &accepted {
             io.book.saw("sent at once");
@@ -193,7 +145,7 @@ impl Packages {
 
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
         if io.host.unsendable > 0 && io.chance.percent(50) {
-            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+            let mut watch = Watch::out(io, &mut self.undelivered);
             return self.outbound.unsent(&bytes, &[], &mut watch);
         }
         let sealed = match &mut self.seals {
@@ -202,7 +154,7 @@ impl Packages {
         };
         let bytes = if self.seals.is_some() { checked(&bytes) } else { bytes };
         let Some(sealed) = sealed else {
-            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+            let mut watch = Watch::out(io, &mut self.undelivered);
             return self.outbound.unsent(&bytes, &[], &mut watch);
         };
         io.book.leaves(io.now, io.life, &bytes);
@@ -294,46 +246,6 @@ impl Packages {
         }
     }
 
-    /// With time slots, where all is sealed: sends a hello in one, to this node before others; whether there was any.
-    pub(super) fn say_in(&mut self, io: &mut Io<'_>, first: Option<NodeIndex>, permit: &mut Permit) -> bool {
-        let (Some(seals), now_ns) = (&mut self.seals, io.now.monotonic_ns) else { return false };
-        let fits = permit.carries_hello() && permit.fits(now_ns, HELLO_SLOT_BYTES);
-        let Some((said, datagram)) = fits.then(|| seals.waiting.take(now_ns, first)).flatten() else { return false };
-        permit.takes(now_ns, HELLO_SLOT_BYTES);
-        io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
-        seals.waiting.left(said);
-        true
-    }
-
-    /// With time slots: sends in one what must be said, and then what is most important, as long as it fits.
-    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, intake: &mut Intake, permit: &mut Permit) {
-        let now_ns = io.now.monotonic_ns;
-        while let Some(refusal) = self.refusals.pop_front_if(|refusal| permit.fits(now_ns, refusal.bytes.len())) {
-            permit.takes(now_ns, refusal.bytes.len());
-            io.sent.push(refusal);
-        }
-        loop {
-            intake.take_on(&mut Hands { packages: self, io });
-            let Some(room_bytes) = permit.room_bytes(now_ns) else { break };
-            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
-            let Some((to, bytes)) = self.outbound.poll_slot(now_ns, room_bytes, &mut self.buffer, &mut watch) else {
-                break;
-            };
-            permit.takes(now_ns, bytes);
-            let bytes = Rc::from(&self.buffer[..bytes]);
-            self.send(io, to, bytes);
-        }
-    }
-
-    /// With time slots: does between them what passing time does; when to ask again.
-    pub(super) fn tidy(&mut self, io: &mut Io<'_>) -> u64 {
-        let until_ns = self.poll_inbound(io);
-        self.answer(io);
-        let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
-        self.outbound.tidy(watch.io.now.monotonic_ns, &mut watch);
-        until_ns
-    }
-
     fn counted(&self, source: Option<usize>) -> (u64, u64, u64) {
         let Some(peer) = source.map(|node| self.stats.peer(node as NodeIndex)) else {
             let rejected = self.seals.as_ref().map_or(0, |seals| seals.rejected(None));
@@ -344,92 +256,6 @@ impl Packages {
         let dropped =
             rejected + received.old.get() + received.damaged.get() + received.refused.get() + self.stats.foreign.get();
         (received.datagrams.get(), received.copies.get(), dropped)
-    }
-
-    fn check_accounts(&self, io: &mut Io<'_>) {
-        let account = io.book.account(io.life);
-        let waiting = self.stats.waiting_in_all();
-        if account.accepted != account.left + account.lost + waiting {
-            let text = format!("{account:?}, and {waiting} packages wait in router {} of node {}", io.life, io.node);
-            io.book.broken(io.now, Promise::Accounts, text);
-        }
-        let (out, inn) = (Sums::of(&self.stats.out), Sums::of(&self.stats.inn));
-        if out != (Sums { packages: account.accepted, passed: account.left, lost: account.lost }) {
-            io.book.broken(io.now, Promise::Accounts, format!("the router counts {out:?}, but did {account:?}"));
-        }
-        let partial = inn.packages.wrapping_sub(inn.passed + inn.lost);
-        let most = (PARTIAL_MAX * (io.plan.nodes.len() - 1)) as u64;
-        if partial > most {
-            io.book.broken(io.now, Promise::Bounded, format!("{partial} packages are being put together: {inn:?}"));
-        }
-        let used = self.stats.waiting_bytes.get();
-        if used > self.queue_bytes_max {
-            let text = format!("the queue takes up {used} bytes, {} at most", self.queue_bytes_max);
-            io.book.broken(io.now, Promise::Bounded, text);
-        }
-    }
-
-    /// A datagram of a peer was taken.
-    fn hears(&mut self, io: &mut Io<'_>, source: Option<usize>) {
-        let Some(peer) = source else { return };
-        let before_ns = std::mem::replace(&mut self.heard_ns[peer], io.now.monotonic_ns);
-        if io.now.monotonic_ns - before_ns >= SILENT_AFTER_NS {
-            self.present_since_ns[peer] = io.now.monotonic_ns;
-        }
-        let heard = (io.now.true_ns, io.life, io.lives[peer]);
-        io.book.heard.insert((io.node, peer), heard);
-    }
-
-    /// What this router says of its peers: a silent one is called so, and one that does not hear us.
-    fn check_links(&self, io: &mut Io<'_>) {
-        let now_ns = io.now.monotonic_ns;
-        if now_ns > self.polled_ns + STILL_NS {
-            return;
-        }
-        for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node) {
-            let state = self.stats.state(peer as NodeIndex, now_ns);
-            let since_ns = |then_ns: u64| now_ns - then_ns.max(self.steady_since_ns);
-            let is_there = matches!(state, State::Unknown | State::Alive);
-            if is_there && since_ns(self.heard_ns[peer]) > SILENT_AFTER_NS + STILL_NS {
-                let text = format!("node {peer} is {state:?} for node {}, which does not hear it", io.node);
-                io.book.broken(io.now, Promise::Links, text);
-            }
-            let (heard_ns, life, own_life) = io.book.heard.get(&(peer, io.node)).copied().unwrap_or_default();
-            let goes_on = life == io.lives[peer] && own_life == io.life;
-            let doubt_ns = (io.now.true_ns - heard_ns.min(io.now.true_ns)).min(since_ns(self.present_since_ns[peer]));
-            if is_there && goes_on && doubt_ns > UNHEARD_AFTER_NS + TELL_EVERY_NS + 2 * STILL_NS {
-                let text = format!("node {peer} is {state:?} for node {}, which it does not hear", io.node);
-                io.book.broken(io.now, Promise::Links, text);
-            }
-        }
-    }
-
-    /// At the end all losses on the wire are known, but of who came so late that what is missing may still come.
-    fn check_losses(&self, io: &mut Io<'_>) {
-        let is_settled = |peer: &usize| io.now.monotonic_ns - self.present_since_ns[*peer] > SETTLED_NS;
-        for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node).filter(is_settled) {
-            let missing = io.book.missing(io.life, peer as NodeIndex);
-            let counted = self.stats.peer(peer as NodeIndex).received.missing();
-            if missing.is_some_and(|missing| missing != counted) {
-                let text =
-                    format!("of node {peer} {missing:?} datagrams never came, node {} counts {counted}", io.node);
-                io.book.broken(io.now, Promise::Links, text);
-            }
-        }
-    }
-
-    fn check_well(&mut self, io: &mut Io<'_>) {
-        for node in (0..io.plan.nodes.len()).filter(|node| *node != io.node) {
-            let state = self.stats.state(node as NodeIndex, io.now.monotonic_ns);
-            if state != State::Alive {
-                io.book.broken(io.now, Promise::Recovery, format!("for node {}, node {node} is {state:?}", io.node));
-            }
-        }
-        let lost = (Sums::of(&self.stats.out).lost, Sums::of(&self.stats.inn).lost);
-        if *self.lost_before.get_or_insert(lost) != lost {
-            let text = format!("node {} lost packages: {:?}, then {lost:?}", io.node, self.lost_before);
-            io.book.broken(io.now, Promise::Recovery, text);
-        }
     }
 }
 
@@ -473,7 +299,7 @@ impl Layer for Packages {
         io.sent.extend(self.refusals.drain(..));
         self.answer(io);
         loop {
-            let mut watch = Watch { io, came: None, is_out: true, is_young: false, undelivered: &mut self.undelivered };
+            let mut watch = Watch::out(io, &mut self.undelivered);
             match self.outbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 Output::Send { to, bytes } => {
                     let bytes = Rc::from(&self.buffer[..bytes]);
@@ -506,115 +332,6 @@ impl Layer for Packages {
     fn close(&mut self, io: &mut Io<'_>) {
         io.book.close_receipts(io.now, io.life);
         self.check_losses(io);
-    }
-}
-
-/// What a package goes through when it is taken from the transit mailbox.
-pub(super) struct Hands<'a, 'b> {
-    pub(super) packages: &'a mut Packages,
-    pub(super) io: &'a mut Io<'b>,
-}
-
-impl Transit for Hands<'_, '_> {
-    fn waits(&mut self) -> (usize, Option<Priority>) {
-        self.io.host.transit.waits()
-    }
-
-    fn slots(&self) -> usize {
-        TRANSIT_SLOTS
-    }
-
-    fn has_queued(&self) -> bool {
-        self.packages.outbound.waits()
-    }
-
-    fn take(&mut self) -> Option<(Head, Accepted)> {
-        self.packages.take_one(self.io)
-    }
-}
-
-/// What all classes of one direction counted.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-struct Sums {
-    packages: u64,
-    passed: u64,
-    lost: u64,
-}
-
-impl Sums {
-    fn of(side: &Side) -> Self {
-        side.classes().fold(Self::default(), |sums, (_, class)| Self {
-            packages: sums.packages + class.packages.get(),
-            passed: sums.passed + class.passed.get(),
-            lost: sums.lost + class.lost_in_all(),
-        })
-    }
-}
-
-/// A datagram that came.
-#[derive(Clone, Copy)]
-struct Came {
-    /// To this computer, ns of its monotonic clock.
-    at_ns: u64,
-    /// Life of its sender, as it says.
-    incarnation: u64,
-}
-
-/// Takes what the cores tell of.
-struct Watch<'a, 'b> {
-    io: &'a mut Io<'b>,
-    /// The datagram that is being looked at.
-    came: Option<Came>,
-    is_out: bool,
-    /// The router began so short a time ago that the wire may hold copies of what its last life took.
-    is_young: bool,
-    undelivered: &'a mut Vec<Head>,
-}
-
-impl Report for Watch<'_, '_> {
-    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, _body: &[u8], cause: Cause) {
-        let io = &mut *self.io;
-        io.book.saw(cause.word());
-        io.line(|| format!("{}: from or to {peer:?}, {head:?}", cause.word()));
-        let number = if self.is_out {
-            io.book.lost_before(io.now, io.life, head, cause)
-        } else {
-            io.book.lost_behind(io.now, io.life, head)
-        };
-        // One that was handed out before may have been delivered then; so may the copy that a router finds on the wire when it begins.
-        let is_first = !head.options.has(Options::REDELIVERED) && (self.is_out || !self.is_young);
-        // Of these the caller's next try comes through, or brings another answer.
-        let is_final = !matches!(cause, Cause::Socket | Cause::Late | Cause::Incomplete);
-        let is_known = matches!(head.kind.kind(), Kind::Command(_)) && is_first && is_final;
-        match number {
-            Some(number) if self.is_out && is_known => io.host.returned.push(number),
-            Some(_) if is_known => self.undelivered.push(*head),
-            _ => {}
-        }
-    }
-}
-
-impl Deliver for Watch<'_, '_> {
-    fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
-        let io = &mut *self.io;
-        let Some(number) = io.book.arrives(io.now, io.node, head, body) else { return Ok(()) };
-        let taken = io.host.deliver(head.to, number);
-        io.line(|| format!("delivers {number} from {from}: {taken:?}"));
-        taken.map_err(|closed| match closed {
-            Closed::Absent => NotDelivered::NoMailbox,
-            Closed::Full => NotDelivered::MailboxFull,
-        })?;
-        io.book.saw("delivered");
-        if self.came.is_some_and(|came| io.now.monotonic_ns.saturating_sub(came.at_ns) > SOCKET_MAX_NS) {
-            io.book.broken(io.now, Promise::Fresh, format!("package {number} waited in the socket, and is delivered"));
-        }
-        let incarnation = self.came.map_or(0, |came| came.incarnation);
-        io.book.delivered(io.now, (incarnation, io.life), number, head.options.has(Options::REDELIVERED));
-        Ok(())
-    }
-
-    fn event(&mut self, event: Event) {
-        self.io.line(|| format!("{event:?}"));
     }
 }
 

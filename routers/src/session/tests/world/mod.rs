@@ -1,13 +1,16 @@
 //! A server, its clients and the lines between them, in virtual time from a seed.
 
+mod faults;
+mod streams;
+
 use super::book::{Book, Known, Teller};
-use super::pipe::Pipe;
 use super::plan::{Clock, Plan, client_settings, module, ranges, server_settings, shared, system_of};
 use crate::session::client::{self, Client, Package};
 use crate::session::server::{self, Server};
-use crate::session::{ClientIndex, LOOK_EVERY_NS, without_hurry};
+use crate::session::{LOOK_EVERY_NS, without_hurry};
 use crate::sim::chance::Chance;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, TimeRecord, TimeSource, Type};
+use streams::Connection;
 
 pub(super) const MS: u64 = 1_000_000;
 pub(super) const S: u64 = 1000 * MS;
@@ -15,17 +18,6 @@ pub(super) const S: u64 = 1000 * MS;
 const SYSTEM_NS: u64 = 1_700_000_000 * S;
 /// What an end may take up: packages that wait and their places, a batch, a frame on each side, and the rest.
 const BYTES_MAX: usize = super::plan::QUOTA + 16 * 1024 + 2 * 2 * 66_000 + 8192;
-
-pub(super) struct Connection {
-    client: usize,
-    /// Its place at the server, as long as that has it open.
-    index: Option<ClientIndex>,
-    is_client_open: bool,
-    up: Pipe,
-    down: Pipe,
-    was_up_full: bool,
-    was_down_full: bool,
-}
 
 pub(super) struct Node {
     pub(super) client: Client,
@@ -196,60 +188,6 @@ impl World {
         number
     }
 
-    /// Moves bytes from both ends of each connection to the other.
-    fn carry(&mut self) {
-        for at in 0..self.connections.len() {
-            self.carry_up(at);
-            self.carry_down(at);
-        }
-    }
-
-    fn carry_up(&mut self, at: usize) {
-        let connection = &mut self.connections[at];
-        let now_ns = self.server_clock.at(self.now_ns);
-        let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
-        while let Some(index) = connection.index {
-            let Some(bytes) = connection.up.read(self.now_ns) else { break };
-            self.server.received(now_ns, index, &bytes, &mut teller);
-            self.server_wake_ns = 0;
-        }
-        if let Some(index) = connection.index {
-            if connection.up.is_at_end() {
-                self.server.closed(now_ns, index, &mut teller);
-                connection.index = None;
-                connection.down.is_closed = true;
-            } else if connection.was_down_full && connection.down.has_room() {
-                connection.was_down_full = false;
-                self.server.writable(index);
-                self.server_wake_ns = 0;
-            }
-        }
-    }
-
-    fn carry_down(&mut self, at: usize) {
-        let connection = &mut self.connections[at];
-        let (index, node) = (connection.client, &mut self.nodes[connection.client]);
-        if !connection.is_client_open || self.now_ns < node.frozen_until_ns {
-            return;
-        }
-        let now_ns = node.clock.at(self.now_ns);
-        let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
-        while let Some(bytes) = connection.down.read(self.now_ns) {
-            node.client.received(now_ns, &bytes, &mut teller);
-            node.wake_ns = 0;
-        }
-        if connection.down.is_at_end() {
-            node.client.closed(now_ns, &mut teller);
-            node.wake_ns = 0;
-            connection.is_client_open = false;
-            connection.up.is_closed = true;
-        } else if connection.was_up_full && connection.up.has_room() {
-            connection.was_up_full = false;
-            node.client.writable();
-            node.wake_ns = 0;
-        }
-    }
-
     fn poll_server(&mut self) {
         let now_ns = self.server_clock.at(self.now_ns);
         if now_ns < self.server_wake_ns || self.now_ns < self.server_down_until_ns {
@@ -309,125 +247,6 @@ impl World {
                     break;
                 }
             }
-        }
-    }
-
-    fn connect(&mut self, index: usize) {
-        let node = &mut self.nodes[index];
-        node.attempts += 1;
-        let now_ns = node.clock.at(self.now_ns);
-        let is_there = self.now_ns >= self.server_down_until_ns;
-        let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
-        let name = format!("address {index}");
-        let place = self.server_clock.at(self.now_ns);
-        let Some(place) = is_there.then(|| self.server.accept(place, &name, &mut teller)).flatten() else {
-            let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
-            return node.client.closed(now_ns, &mut teller);
-        };
-        let line = self.plan.lines[index];
-        let (up, down) = (node.chance.fork(), node.chance.fork());
-        let (mut up, mut down) = (Pipe::new(up, line, self.plan.calm), Pipe::new(down, line, self.plan.calm));
-        if let Some(bytes) = self.plan.held_bytes.filter(|_| index == 0) {
-            (up, down) = (up.holding(bytes), down.holding(bytes));
-        }
-        if self.plan.stalled == Some(index) && self.now_ns >= S {
-            down.stalled_until_ns = u64::MAX;
-        }
-        if self.may_fail && self.faults.percent(4) {
-            (up.is_dead, down.is_dead) = (true, true);
-        }
-        node.client.connected(now_ns);
-        self.connections.push(Connection {
-            client: index,
-            index: Some(place),
-            is_client_open: true,
-            up,
-            down,
-            was_up_full: false,
-            was_down_full: false,
-        });
-    }
-
-    fn fail(&mut self) {
-        if self.plan.stalled.is_some() && self.now_ns == S {
-            let stalled = self.plan.stalled;
-            for connection in self.connections.iter_mut().filter(|connection| Some(connection.client) == stalled) {
-                connection.down.stalled_until_ns = u64::MAX;
-            }
-        }
-        if !self.may_fail || !self.faults.per_million(2500) {
-            return;
-        }
-        let client = self.faults.below(self.nodes.len() as u64) as usize;
-        let until_ns = self.now_ns + self.faults.between(100, 4000) * MS;
-        match self.faults.below(12) {
-            0 => self.restart_server(),
-            1 => self.restart_client(client),
-            2 => self.nodes[client].frozen_until_ns = until_ns,
-            what => {
-                let mut connections = self.connections.iter_mut();
-                let Some(connection) = connections.find(|one| one.client == client && one.is_client_open) else {
-                    return;
-                };
-                self.book.seen.entry("line faults").and_modify(|count| *count += 1).or_insert(1);
-                match what {
-                    3 | 4 => connection.down.stalled_until_ns = until_ns,
-                    5 => connection.up.stalled_until_ns = until_ns,
-                    6 => connection.down.is_dead = true,
-                    7 => connection.up.is_dead = true,
-                    8 => (connection.up.is_dead, connection.down.is_dead) = (true, true),
-                    // Both are told, after what is under way; or nothing of that comes.
-                    9 => (connection.up.is_closed, connection.down.is_closed) = (true, true),
-                    _ => self.break_connection(client),
-                }
-            }
-        }
-    }
-
-    /// Both ends are told at once, and what is under way is lost.
-    fn break_connection(&mut self, client: usize) {
-        for connection in self.connections.iter_mut().filter(|connection| connection.client == client) {
-            let line = self.plan.lines[client];
-            (connection.up, connection.down) =
-                (Pipe::new(self.faults.fork(), line, false), Pipe::new(self.faults.fork(), line, false));
-            (connection.up.is_closed, connection.down.is_closed) = (true, true);
-        }
-    }
-
-    /// The server is gone, and does not come again.
-    pub(super) fn end_server(&mut self) {
-        self.server_down_until_ns = u64::MAX;
-    }
-
-    fn restart_server(&mut self) {
-        self.book.saw("server restarted");
-        self.check_server(false);
-        self.server_life += 2;
-        self.server = Server::new(server_settings(self.server_life));
-        self.server_wake_ns = 0;
-        self.server_down_until_ns = self.now_ns + self.faults.between(0, 1500) * MS;
-        let is_told = self.faults.percent(70);
-        for connection in &mut self.connections {
-            connection.index = None;
-            connection.down.is_closed = is_told;
-            connection.down.is_dead |= !is_told;
-        }
-    }
-
-    fn restart_client(&mut self, index: usize) {
-        self.book.saw("client restarted");
-        let node = &mut self.nodes[index];
-        node.life += 2;
-        let now_ns = node.clock.at(self.now_ns);
-        node.client = Client::new(client_settings(index, node.life), ranges(index), now_ns);
-        node.wake_ns = 0;
-        self.book.clients[index].up_ns = None;
-        let is_told = self.faults.percent(50);
-        for connection in self.connections.iter_mut().filter(|one| one.client == index) {
-            connection.is_client_open = false;
-            connection.up.is_closed = is_told;
-            connection.up.is_dead |= !is_told;
-            connection.down.is_dead = true;
         }
     }
 

@@ -1,0 +1,92 @@
+//! What goes wrong: streams that stall, break or die, clients that freeze, ends that start anew.
+
+use super::{MS, S, World};
+use crate::session::client::Client;
+use crate::session::server::Server;
+use crate::session::tests::pipe::Pipe;
+use crate::session::tests::plan::{client_settings, ranges, server_settings};
+
+impl World {
+    pub(super) fn fail(&mut self) {
+        if self.plan.stalled.is_some() && self.now_ns == S {
+            let stalled = self.plan.stalled;
+            for connection in self.connections.iter_mut().filter(|connection| Some(connection.client) == stalled) {
+                connection.down.stalled_until_ns = u64::MAX;
+            }
+        }
+        if !self.may_fail || !self.faults.per_million(2500) {
+            return;
+        }
+        let client = self.faults.below(self.nodes.len() as u64) as usize;
+        let until_ns = self.now_ns + self.faults.between(100, 4000) * MS;
+        match self.faults.below(12) {
+            0 => self.restart_server(),
+            1 => self.restart_client(client),
+            2 => self.nodes[client].frozen_until_ns = until_ns,
+            what => {
+                let mut connections = self.connections.iter_mut();
+                let Some(connection) = connections.find(|one| one.client == client && one.is_client_open) else {
+                    return;
+                };
+                self.book.seen.entry("line faults").and_modify(|count| *count += 1).or_insert(1);
+                match what {
+                    3 | 4 => connection.down.stalled_until_ns = until_ns,
+                    5 => connection.up.stalled_until_ns = until_ns,
+                    6 => connection.down.is_dead = true,
+                    7 => connection.up.is_dead = true,
+                    8 => (connection.up.is_dead, connection.down.is_dead) = (true, true),
+                    // Both are told, after what is under way; or nothing of that comes.
+                    9 => (connection.up.is_closed, connection.down.is_closed) = (true, true),
+                    _ => self.break_connection(client),
+                }
+            }
+        }
+    }
+
+    /// Both ends are told at once, and what is under way is lost.
+    fn break_connection(&mut self, client: usize) {
+        for connection in self.connections.iter_mut().filter(|connection| connection.client == client) {
+            let line = self.plan.lines[client];
+            (connection.up, connection.down) =
+                (Pipe::new(self.faults.fork(), line, false), Pipe::new(self.faults.fork(), line, false));
+            (connection.up.is_closed, connection.down.is_closed) = (true, true);
+        }
+    }
+
+    /// The server is gone, and does not come again.
+    pub(in crate::session::tests) fn end_server(&mut self) {
+        self.server_down_until_ns = u64::MAX;
+    }
+
+    fn restart_server(&mut self) {
+        self.book.saw("server restarted");
+        self.check_server(false);
+        self.server_life += 2;
+        self.server = Server::new(server_settings(self.server_life));
+        self.server_wake_ns = 0;
+        self.server_down_until_ns = self.now_ns + self.faults.between(0, 1500) * MS;
+        let is_told = self.faults.percent(70);
+        for connection in &mut self.connections {
+            connection.index = None;
+            connection.down.is_closed = is_told;
+            connection.down.is_dead |= !is_told;
+        }
+    }
+
+    fn restart_client(&mut self, index: usize) {
+        self.book.saw("client restarted");
+        let node = &mut self.nodes[index];
+        node.life += 2;
+        let now_ns = node.clock.at(self.now_ns);
+        node.client = Client::new(client_settings(index, node.life), ranges(index), now_ns);
+        node.wake_ns = 0;
+        self.book.clients[index].up_ns = None;
+        let is_told = self.faults.percent(50);
+        for connection in self.connections.iter_mut().filter(|one| one.client == index) {
+            connection.is_client_open = false;
+            connection.up.is_closed = is_told;
+            connection.up.is_dead |= !is_told;
+            connection.down.is_dead = true;
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Packages where there are time slots: sent in a slot as far as it has room, and tidied between slots.
+//!
+//! `sim/slotted` calls this; without slots, `poll` sends as packages come.
+
+use super::watch::Watch;
+use super::{PORT, Packages};
+use crate::frame::NodeIndex;
+use crate::intake::{Intake, Transit};
+use crate::outbound::Accepted;
+use crate::security::{HELLO_SLOT_BYTES, Said};
+use crate::sim::host::TRANSIT_SLOTS;
+use crate::sim::seals::PackageSeals;
+use crate::sim::station::{Io, Sent};
+use crate::tdma::Permit;
+use rohrpost_mailbox::{Head, Priority};
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// What a package goes through when it is taken from the transit mailbox.
+pub(in crate::sim) struct Hands<'a, 'b> {
+    pub(in crate::sim) packages: &'a mut Packages,
+    pub(in crate::sim) io: &'a mut Io<'b>,
+}
+
+impl Transit for Hands<'_, '_> {
+    fn waits(&mut self) -> (usize, Option<Priority>) {
+        self.io.host.transit.waits()
+    }
+
+    fn slots(&self) -> usize {
+        TRANSIT_SLOTS
+    }
+
+    fn has_queued(&self) -> bool {
+        self.packages.outbound.waits()
+    }
+
+    fn take(&mut self) -> Option<(Head, Accepted)> {
+        self.packages.take_one(self.io)
+    }
+}
+
+impl Packages {
+    /// With time slots, where all is sealed: sends a hello in one, to this node before others; whether there was any.
+    pub(in crate::sim) fn say_in(&mut self, io: &mut Io<'_>, first: Option<NodeIndex>, permit: &mut Permit) -> bool {
+        let (Some(seals), now_ns) = (&mut self.seals, io.now.monotonic_ns) else { return false };
+        let fits = permit.carries_hello() && permit.fits(now_ns, HELLO_SLOT_BYTES);
+        let Some((said, datagram)) = fits.then(|| seals.waiting.take(now_ns, first)).flatten() else { return false };
+        permit.takes(now_ns, HELLO_SLOT_BYTES);
+        io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
+        seals.waiting.left(said);
+        true
+    }
+
+    /// With time slots: sends in one what must be said, and then what is most important, as long as it fits.
+    pub(in crate::sim) fn poll_in(&mut self, io: &mut Io<'_>, intake: &mut Intake, permit: &mut Permit) {
+        let now_ns = io.now.monotonic_ns;
+        while let Some(refusal) = self.refusals.pop_front_if(|refusal| permit.fits(now_ns, refusal.bytes.len())) {
+            permit.takes(now_ns, refusal.bytes.len());
+            io.sent.push(refusal);
+        }
+        loop {
+            intake.take_on(&mut Hands { packages: self, io });
+            let Some(room_bytes) = permit.room_bytes(now_ns) else { break };
+            let mut watch = Watch::out(io, &mut self.undelivered);
+            let Some((to, bytes)) = self.outbound.poll_slot(now_ns, room_bytes, &mut self.buffer, &mut watch) else {
+                break;
+            };
+            permit.takes(now_ns, bytes);
+            let bytes = Rc::from(&self.buffer[..bytes]);
+            self.send(io, to, bytes);
+        }
+    }
+
+    /// With time slots: does between them what passing time does; when to ask again.
+    pub(in crate::sim) fn tidy(&mut self, io: &mut Io<'_>) -> u64 {
+        let until_ns = self.poll_inbound(io);
+        self.answer(io);
+        let mut watch = Watch::out(io, &mut self.undelivered);
+        self.outbound.tidy(watch.io.now.monotonic_ns, &mut watch);
+        until_ns
+    }
+}
+
+/// Says a hello, or has it wait for a slot.
+pub(super) fn say(io: &Io<'_>, seals: &mut PackageSeals, line: &mut VecDeque<Sent>, said: Said, datagram: &[u8]) {
+    if io.plan.slots.is_none() {
+        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
+    }
+    let PackageSeals { gate, waiting, .. } = seals;
+    gate.waits(said, || {
+        waiting.put(io.now.monotonic_ns, said, datagram);
+        true
+    });
+}

@@ -1,0 +1,59 @@
+//! What happens in a world, and in which order.
+
+use crate::sim::station::{Arrived, Port};
+use rohrpost_mailbox::Name;
+use std::cmp::Ordering;
+
+/// What happens.
+pub(in crate::sim) enum Event {
+    /// A router has something to do.
+    Wake { node: usize },
+    /// A datagram comes out of a link.
+    Arrive { to: usize, arrived: Arrived },
+    /// An old one comes once more; if it is for that life, not to another.
+    Again { to: usize, life: Option<u32>, arrived: Arrived },
+    /// The kernel says when a datagram left.
+    Left { node: usize, life: u32, port: Port, index: u64 },
+    /// A router starts if nothing keeps it down.
+    Start { node: usize },
+    /// A fault of the plan begins.
+    Begin { fault: usize },
+    /// It is over.
+    End { fault: usize },
+    /// All faults are over.
+    Mended,
+    /// The next package of a flow, or the next of its burst.
+    Flow { flow: usize },
+    /// The next call of a caller.
+    Call { caller: usize },
+    /// The next try of a call.
+    Try { call: usize },
+    /// A module takes its next command.
+    Serve { node: usize, module: Name },
+    /// All is looked at; clocks wander.
+    Look,
+}
+
+/// An event in its place among all: by time, and at one moment in the order in which they were planned.
+pub(super) struct Entry {
+    pub(super) at_ns: u64,
+    pub(super) ticket: u64,
+    pub(super) event: Event,
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+impl Eq for Entry {}
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> Ordering {
+        (self.at_ns, self.ticket).cmp(&(other.at_ns, other.ticket))
+    }
+}

@@ -1,0 +1,218 @@
+//! A network of simulated computers in virtual time: events in their order, datagrams on their links, layers called as their threads
+//! would be.
+//!
+//! Here: what a world is made of, and the loop over its events. What happens at them is in `routers` and `carrying`, and beside in
+//! `sim/faults` and `sim/modules`.
+
+mod carrying;
+mod event;
+mod routers;
+
+pub(super) use event::Event;
+
+use super::book::{Book, Problem};
+use super::calls::{Calls, NewGuard, Server};
+use super::chance::Chance;
+use super::clock::{Clock, Now};
+use super::link::Link;
+use super::modules::DATA_MAILBOXES;
+use super::plan::{MS, Plan, RECOVERY_NS, S};
+use super::station::{Arrived, Layer, Sent, Station};
+use super::ticking;
+use super::times::Times;
+use super::trace::Trace;
+use super::wire::Wire;
+use event::Entry;
+use rohrpost_mailbox::{Name, TimeRecord, local};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+use std::rc::Rc;
+
+/// Makes the layers of a router that begins to live: node, life, its clocks, what its page of system time says.
+pub type NewLayers<'a> = Box<dyn FnMut(usize, u32, Now, Option<TimeRecord>) -> Vec<Box<dyn Layer>> + 'a>;
+
+/// One run.
+pub struct World<'a> {
+    /// What is to happen.
+    pub plan: Rc<Plan>,
+    pub(super) now_ns: u64,
+    events: BinaryHeap<Reverse<Entry>>,
+    ticket: u64,
+    pub(super) chance: Chance,
+    /// The computers.
+    pub stations: Vec<Station>,
+    /// From, to.
+    pub(super) links: Vec<Vec<Link>>,
+    pub(super) servers: BTreeMap<Name, Server>,
+    pub(super) sequences: Vec<u32>,
+    /// The books.
+    pub book: Book,
+    /// The calls.
+    pub calls: Calls,
+    /// What is written down.
+    pub trace: Trace,
+    new_layers: NewLayers<'a>,
+    lives: u32,
+    /// The life of each node's router.
+    living: Vec<u32>,
+    /// Datagrams that routers had, of which some come again: receiver, its life.
+    pub(super) old: Vec<(usize, u32, Arrived)>,
+    sent: Vec<Sent>,
+}
+
+/// Between two looks at all, ns.
+const LOOK_NS: u64 = 50 * MS;
+/// Datagrams that are kept to come again.
+const OLD_MAX: usize = 64;
+
+impl<'a> World<'a> {
+    /// A network as planned. `layers` makes routers, `guard` those who let commands run.
+    pub fn new(plan: Rc<Plan>, guard: NewGuard, layers: NewLayers<'a>, trace: bool) -> Self {
+        let mut chance = Chance::new(plan.seed ^ 0x5eed);
+        let count = plan.nodes.len();
+        let mut stations = Vec::new();
+        let mut servers = BTreeMap::new();
+        for node in &plan.nodes {
+            let mut station = Station::new(Clock::new(node.monotonic_ns, node.realtime_ns, node.rate_ppb));
+            station.down = 1;
+            for module in &node.modules {
+                servers.insert(*module, Server::new(guard, station.clock.at(0)));
+                for local in local::COMMANDS..local::DATA + DATA_MAILBOXES {
+                    station.host.boxes.insert(module.with_local(local), Default::default());
+                }
+            }
+            stations.push(station);
+        }
+        let mut book = Book::new(plan.shape.bulk_below);
+        book.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
+        (book.wire, book.well_ns) = (Wire::new(count), plan.mended_ns + RECOVERY_NS);
+        let mut world = Self {
+            now_ns: 0,
+            events: BinaryHeap::new(),
+            ticket: 0,
+            stations,
+            links: vec![vec![Link::new(plan.quality); count]; count],
+            servers,
+            sequences: vec![1; count],
+            book,
+            calls: Calls::default(),
+            trace: Trace::new(trace),
+            new_layers: layers,
+            lives: 0,
+            living: vec![0; count],
+            old: Vec::new(),
+            sent: Vec::new(),
+            chance: chance.fork(),
+            plan: plan.clone(),
+        };
+        world.schedule(&plan);
+        world
+    }
+
+    fn schedule(&mut self, plan: &Plan) {
+        for (node, its) in plan.nodes.iter().enumerate() {
+            self.at(its.boot_ns, Event::Start { node });
+        }
+        for (fault, its) in plan.faults.iter().enumerate() {
+            self.at(its.from_ns, Event::Begin { fault });
+            self.at(its.until_ns, Event::End { fault });
+        }
+        self.at(plan.mended_ns, Event::Mended);
+        for (flow, its) in plan.flows.iter().enumerate() {
+            let at_ns = plan.traffic_begin_ns + self.chance.below(its.period_ns);
+            self.at(at_ns, Event::Flow { flow });
+        }
+        for (caller, its) in plan.calls.iter().enumerate() {
+            let at_ns = self.chance.below(its.period_ns);
+            self.at(at_ns, Event::Call { caller });
+        }
+        self.at(0, Event::Look);
+    }
+
+    pub(super) fn at(&mut self, at_ns: u64, event: Event) {
+        self.ticket += 1;
+        self.events.push(Reverse(Entry { at_ns, ticket: self.ticket, event }));
+    }
+
+    /// The clocks of a node.
+    pub fn now(&self, node: usize) -> Now {
+        self.stations[node].clock.at(self.now_ns)
+    }
+
+    /// Runs to the end, or to the first broken promise.
+    pub fn run(&mut self) -> &[Problem] {
+        while let Some(Reverse(entry)) = self.events.pop() {
+            if entry.at_ns > self.plan.end_ns || !self.book.problems.is_empty() {
+                break;
+            }
+            self.now_ns = entry.at_ns;
+            self.happen(entry.event);
+        }
+        if self.book.problems.is_empty() {
+            self.look();
+            self.close();
+        }
+        &self.book.problems
+    }
+
+    fn happen(&mut self, event: Event) {
+        match event {
+            Event::Wake { node } if self.stations[node].wake_ns == Some(self.now_ns) => self.wake(node),
+            // There was another, earlier one.
+            Event::Wake { .. } => {}
+            Event::Arrive { to, arrived } => {
+                if let Some(delay_ns) = self.stations[to].echo_ns.filter(|_| arrived.port == ticking::PORT) {
+                    self.at(self.now_ns + delay_ns, Event::Again { to, life: None, arrived: arrived.clone() });
+                }
+                self.arrive(to, arrived);
+            }
+            Event::Again { to, life, arrived } => {
+                if life.is_none_or(|life| self.living[to] == life) {
+                    self.arrive(to, arrived);
+                }
+            }
+            Event::Left { node, life, port, index } => {
+                let stamp = self.now(node);
+                self.with_router(node, life, |router, io| {
+                    if let Some(layer) = router.layer(port) {
+                        layer.left(io, port, index, stamp);
+                    }
+                });
+            }
+            Event::Start { node } => self.start(node),
+            Event::Begin { fault } => self.begin(fault),
+            Event::End { fault } => self.end(fault),
+            Event::Mended => self.mend(),
+            Event::Flow { flow } => self.flow(flow),
+            Event::Call { caller } => self.call(caller),
+            Event::Try { call } => self.try_call(call),
+            Event::Serve { node, module } => self.serve(node, module),
+            Event::Look => {
+                self.look();
+                self.at(self.now_ns + LOOK_NS, Event::Look);
+            }
+        }
+    }
+
+    fn look(&mut self) {
+        for node in 0..self.stations.len() {
+            self.wander(node);
+            let now = self.now(node);
+            self.book.times.read(now, node, &mut self.book.problems);
+            let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
+            let well = self.now_ns >= self.book.well_ns;
+            self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.check(io, well)));
+        }
+    }
+
+    /// A clock's rate changes a little.
+    fn wander(&mut self, node: usize) {
+        let its = &self.plan.nodes[node];
+        let step_ppb = its.wander_ppb * LOOK_NS as i64 / S as i64;
+        let station = &mut self.stations[node];
+        let drift_ppb = station.drift_ppb + self.chance.around(step_ppb.max(1));
+        station.drift_ppb = drift_ppb.clamp(-10 * its.wander_ppb, 10 * its.wander_ppb);
+        station.clock.set_rate(self.now_ns, its.rate_ppb + station.drift_ppb);
+        self.book.times.clocks[node] = station.clock.clone();
+    }
+}

@@ -1,0 +1,67 @@
+//! `graph`: who sends what to whom, as a table, as JSON, and drawn.
+
+use crate::harness::{PATIENCE, Place, probe, wait};
+use crate::process::Running;
+use nix::sys::signal::Signal;
+use serde_json::Value;
+
+#[test]
+fn graph_shows_who_sends_what_to_whom() {
+    let place = Place::new();
+    let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));
+    let mut send = Running::start(place.command(&["send", "probe.0", "count", "5", "--rate", "50"]));
+    echo.wait_for("\n");
+    wait("it counts", || (!place.counted().is_empty()).then_some(()));
+    let graph = wait("both are in the graph", || {
+        let graph = place.say(&["graph", "--seconds", "0.5", "--json"]).json();
+        let kinds = |carries: &str| graph["edges"].as_array().unwrap().iter().any(|edge| edge["carries"] == carries);
+        (kinds("data") && kinds("command") && kinds("reply")).then_some(graph)
+    });
+    let edge = |carries: &str| {
+        graph["edges"].as_array().unwrap().iter().find(|edge| edge["carries"] == carries).unwrap().clone()
+    };
+    let (data, command, reply) = (edge("data"), edge("command"), edge("reply"));
+    assert_eq!((&data["from"], &data["what"]), (&"probe.0".into(), &"beat".into()));
+    assert_eq!((&command["to"], &command["what"]), (&"probe.0".into(), &"count".into()));
+    assert_eq!((&reply["to"], &reply["what"]), (&command["from"], &"count answered".into()));
+    let counted = |edge: &Value| edge["packages"].as_u64().unwrap();
+    for edge in [&data, &command, &reply] {
+        let (packages, per_s) = (counted(edge), edge["packages_per_s"].as_f64().unwrap());
+        assert!(packages > 0 && per_s > 0.0 && per_s.is_finite(), "{edge}");
+    }
+    wait("all that it saw are run", || (place.counted().len() as u64 >= counted(&command)).then_some(()));
+    assert!(graph["interval_s"].as_f64().unwrap() >= 0.5, "{graph}");
+    let modules: Vec<_> = graph["modules"].as_array().unwrap().iter().map(|module| module["module"].clone()).collect();
+    assert_eq!(modules.len(), 3, "{modules:?}");
+    let text = place.say(&["graph", "--seconds", "0.5"]).ok();
+    assert!(text.starts_with("from ") && text.contains("probe.0"), "{text}");
+    let dot = place.say(&["graph", "--seconds", "0.5", "--dot"]).ok();
+    assert!(dot.starts_with("digraph rohrpost {\n") && dot.contains("[label = \"beat "), "{dot}");
+    assert!(dot.contains("\"probe.0\" [label = \"probe.0\"]") && !dot.contains("answered"), "{dot}");
+    assert!(place.say(&["graph", "--seconds", "0.5", "--dot", "--all"]).ok().contains("count answered "));
+    assert_eq!(place.say(&["graph", "--seconds", "0.5", "--svg", "-o", "graph.svg"]).ok(), "");
+    let svg = std::fs::read_to_string(place.path("graph.svg")).unwrap();
+    assert!(svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"), "{svg}");
+    assert!(svg.contains(">probe.0</text>") && svg.contains(">beat ") && svg.contains(">count "), "{svg}");
+    echo.stop();
+    send.stop();
+    let early = Running::start(place.command(&["graph", "--seconds", "3600", "--json"]));
+    wait("it heeds Ctrl-C", || early.heeds_control_c().then_some(()));
+    early.signal(Signal::SIGINT);
+    let graph = early.said().json();
+    assert!(graph["interval_s"].as_f64().unwrap() < 3600.0, "{graph}");
+    for edge in graph["edges"].as_array().unwrap() {
+        assert!(edge["packages_per_s"].as_f64().is_some_and(f64::is_finite), "{edge}");
+    }
+    let told = place.say(&["graph", "--seconds", "0", "--silent"]).fails();
+    assert_eq!(told, "in 0 s nothing is sent; try --seconds 2\n");
+    let told = place.say(&["graph", "--seconds", "0.1", "-o", "nowhere/graph.txt"]).fails();
+    assert!(told.contains("name a file in a folder that is there"), "{told}");
+    // With nobody sending, it says so.
+    robot.tool(PATIENCE).close();
+    assert_eq!(
+        place.say(&["graph", "--seconds", "0.1"]).ok(),
+        "nobody sent anything within 0.1 s; --silent shows who did before\n"
+    );
+}

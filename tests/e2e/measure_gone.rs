@@ -1,0 +1,100 @@
+//! What the tools that measure say of what never was, stops, dies, or is launched again.
+
+use crate::harness::{Place, halt, probe, signal, wait};
+use crate::measure::{last, lines};
+use crate::process::Running;
+use nix::sys::signal::Signal;
+use serde_json::Value;
+
+#[test]
+fn hz_tells_what_is_silent_and_what_does_not_exist() {
+    let place = Place::new();
+    let (mut launch, robot) =
+        place.launched(&[&probe("probe.0", "rate-hz = 50.0", "restart = { policy = \"never\" }")]);
+    let text = place.say(&["hz", "probe.0", "--count", "1"]).ok();
+    let [beat, silence, blob] = text.lines().collect::<Vec<_>>()[..] else { panic!("{text}") };
+    assert!(beat.starts_with("beat     ") && beat.contains(" Hz  mean ") && beat.ends_with(" values"), "{text}");
+    assert!(silence.contains("never published; `rohrpost status` tells"), "{text}");
+    assert!(blob.starts_with("blob     "), "{text}");
+    for (arguments, error) in [
+        (&["hz", "probe.0", "bleat"][..], "probe.0 has no data `bleat`; it has: beat, silence, blob\n"),
+        (&["hz", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
+        (&["bw", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
+        (&["delay", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
+        (&["hz", "probe.0", "--window", "0"], "a window of 0 s holds nothing; try --window 1\n"),
+    ] {
+        assert_eq!(place.say(arguments).fails(), error);
+    }
+    // What has stopped is not called slow.
+    halt(robot.pid("probe.0"));
+    let text = place.say(&["hz", "probe.0", "beat", "--seconds", "0.3"]).ok();
+    assert!(text.contains("nothing new in this window; the last came "), "{text}");
+    let mut hz = Running::start(place.command(&["hz", "probe.0", "beat"]));
+    hz.wait_for("nothing new");
+    signal(robot.pid("probe.0"), Signal::SIGKILL);
+    launch.wait_for("probe.0");
+    hz.wait_for("never published");
+    hz.stop();
+}
+
+#[test]
+fn what_stops_is_silent_and_no_longer_as_quick_as_it_was() {
+    let place = Place::new();
+    let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let mut tools = [["hz", "probe.0", "beat", "--json"], ["bw", "probe.0", "beat", "--json"]]
+        .map(|arguments| Running::start(place.command(&arguments)));
+    let names = [["values", "values_per_s"], ["packages", "packages_per_s"]];
+    for (tool, [count, _]) in tools.iter().zip(names) {
+        wait("it goes on", || last(tool, |line| line[count].as_u64() >= Some(20) && line["silent_s"].is_null()));
+    }
+    halt(robot.pid("probe.0"));
+    for (tool, [count, per_s]) in tools.iter_mut().zip(names) {
+        // Within the window of ten seconds, of which most is good.
+        let is_silent = |line: &Value| line[count].as_u64() > Some(1) && line["silent_s"].as_f64() > Some(1.0);
+        let line = wait("it is silent", || last(tool, is_silent));
+        let [sent, rate, silent_s] = [count, per_s, "silent_s"].map(|name| line[name].as_f64().unwrap());
+        assert!(rate > 0.0 && rate * silent_s < sent, "{line}");
+        if let Some(mean_s) = line["interval_mean_s"].as_f64() {
+            assert!(rate * mean_s < 0.99, "{line}");
+        }
+        let after = wait("it is silent for longer", || last(tool, |later| later["silent_s"].as_f64() > Some(silent_s)));
+        assert!(after[per_s].as_f64().is_none_or(|later| later < rate), "{line} {after}");
+        tool.stop();
+    }
+    let text = place.say(&["hz", "probe.0", "beat", "--count", "1"]).ok();
+    assert!(text.contains("nothing new in this window; the last came "), "{text}");
+    signal(robot.pid("probe.0"), Signal::SIGCONT);
+}
+
+#[test]
+fn a_node_that_is_launched_again_is_found_again() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
+    let config = robot.installation.path.clone();
+    let start = |arguments: &[&str]| Running::start(place.command(arguments));
+    let mut tools = [
+        start(&["hz", "probe.0", "beat", "--json"]),
+        start(&["bw", "probe.0", "beat", "--json"]),
+        start(&["delay", "probe.0", "--json"]),
+    ];
+    let values = |line: &Value| {
+        line["values"].as_u64().or(line["packages"].as_u64()).or(line["published"][0]["values"].as_u64()).unwrap()
+    };
+    for tool in &tools {
+        wait("a value", || last(tool, |line| values(line) > 1));
+    }
+    drop(robot);
+    launch.stop();
+    for tool in &tools {
+        wait("that launch has ended", || tool.err().contains("waiting until it is launched again").then_some(()));
+    }
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    for tool in &mut tools {
+        wait("that it is there again", || tool.err().contains("node `main` was launched again").then_some(()));
+        let before = lines(tool).len();
+        wait("values of the new one", || lines(tool)[before..].iter().any(|line| values(line) > 1).then_some(()));
+        tool.stop();
+    }
+}
