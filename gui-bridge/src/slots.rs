@@ -253,6 +253,7 @@ mod tests {
             synchronisations_missed: 0,
             synchronisations_late: 0,
             held: 0,
+            unproven: 0,
             roles: 0,
             lead_ns: 0,
             tunnel: None,

@@ -1,6 +1,8 @@
 //! Hundreds of simulated networks, and the same with a mistake switched on: `ROHRPOST_SIM_SEEDS=10000` for more of them, from
 //! `ROHRPOST_SIM_FIRST=n` on; `ROHRPOST_SIM_SEED=n` to see one line by line.
 
+#[path = "simulated/rare.rs"]
+mod rare;
 mod simulated;
 
 use rohrpost_modules::call::{Fault, Once, Request, Verdict};

@@ -1,4 +1,4 @@
-//! `rohrpost --help`: thirty-one subcommands, those of every day first.
+//! `rohrpost --help`: its subcommands, those of every day first.
 
 use clap::{Command, CommandFactory};
 

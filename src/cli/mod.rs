@@ -111,7 +111,7 @@ enum Command {
     Doctor(doctor::Arguments),
     /// Measure how this computer hands packages over.
     Bench(bench::Arguments),
-    /// Make and change the keys with which nodes seal what they send.
+    /// Make, change and show keys and certificates of nodes.
     Keys(keys::Arguments),
     /// Begin a module of your own: a project that builds and runs.
     New(new::Arguments),

@@ -49,8 +49,15 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
     ];
     let silent = slots.iter().filter(|slots| !slots.why_silent.is_empty());
     let silent = silent.map(|slots| format!("node {} is silent: {}\n", slots.node, slots.why_silent));
+    let hellos = slots.iter().filter(|slots| slots.unproven > 0).map(|slots| unproven(slots));
     let tunnels = slots.iter().filter_map(|slots| slots.tunnel.map(|tunnel| tunnelled(&slots.node, &tunnel)));
-    table(heads, rows) + &silent.collect::<String>() + &tunnels.collect::<String>()
+    table(heads, rows) + &silent.collect::<String>() + &hellos.collect::<String>() + &tunnels.collect::<String>()
+}
+
+/// What was said at a moment that nobody vouches for.
+fn unproven(slots: &SlotState) -> String {
+    let hellos = if slots.unproven == 1 { "1 hello".into() } else { format!("{} hellos", slots.unproven) };
+    format!("node {}: {hellos} left by the time of who had not shown that it lives\n", slots.node)
 }
 
 /// What ordinary traffic did; what went wrong is told if it did.
@@ -65,6 +72,15 @@ fn tunnelled(node: &str, tunnel: &TunnelState) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_nobody_vouches_for_is_told_if_there_was_any() {
+        let slots = |unproven| SlotState { node: "arm".into(), unproven, ..SlotState::default() };
+        assert!(!kept([&slots(0)]).contains("hello"));
+        let line = "node arm: 3 hellos left by the time of who had not shown that it lives";
+        assert!(kept([&slots(3)]).lines().any(|told| told == line));
+        assert!(kept([&slots(1)]).contains("arm: 1 hello left"));
+    }
 
     #[test]
     fn a_tunnel_says_what_went_wrong_only_if_it_did() {

@@ -205,7 +205,7 @@ pub struct ClockState {
 }
 
 /// How a node keeps its time slots. Counts are since its router began, and only grow.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct SlotState {
     /// The node.
     pub node: String,
@@ -239,6 +239,8 @@ pub struct SlotState {
     pub synchronisations_late: u64,
     /// Datagrams that were made and missed the end of their slot, since the router stood still just then: they waited for the next one.
     pub held: u64,
+    /// Hellos that it said, having no time of its own, by the time of who had not shown that it lives: who repeats what was said brings about some.
+    pub unproven: u64,
     /// Changes of role: slave, master.
     pub roles: u64,
     /// From the router's call to the wire, the median, ns.

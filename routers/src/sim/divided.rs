@@ -54,6 +54,9 @@ impl Parts {
 pub struct Divisions {
     all: Vec<Division>,
     cycle_ns: u64,
+    /// Who is divided from another that began anew meanwhile must ask it before it goes by its time: where slots are rare, that takes so much
+    /// longer, ns.
+    pub(super) asks_ns: u64,
 }
 
 impl Divisions {
@@ -65,7 +68,7 @@ impl Divisions {
             let way_ns = if let Fault::Bad { quality, .. } = planned.fault { quality.way_ns_max() } else { 0 };
             Some(Division { from_ns: planned.from_ns, until_ns: planned.until_ns + way_ns, parts })
         });
-        Self { all: all.collect(), cycle_ns: plan.shape.interval_ns }
+        Self { all: all.collect(), cycle_ns: plan.shape.interval_ns, asks_ns: 0 }
     }
 
     /// Whether two nodes may not be blamed for transmitting at once. `began_ns`: when the times by which they go began.
@@ -73,7 +76,7 @@ impl Divisions {
     /// Nodes that go by one time never are excused, unless one of them only asks, by frames all of which were on their way for too long. Else a fault
     /// must part one from the other, or from a master of theirs, and that
     /// - for longer than [`HOLDOVER_NS`], or since before the times by which they go began; and
-    /// - not have been over for [`HEALED_CYCLES`].
+    /// - not have been over for [`HEALED_CYCLES`], or longer where slots are rare.
     ///
     /// Of two that begin a time neither can know of the other before it has heard it, for [`BEGINNERS_CYCLES`] at most.
     pub fn excuse(&self, one: &Transmission, other: &Transmission, began_ns: u64) -> bool {
@@ -97,7 +100,7 @@ impl Divisions {
 
     /// Those that are on, or have not been over for long.
     fn lasting(&self, at_ns: u64) -> impl Iterator<Item = &Division> {
-        let healed_ns = HEALED_CYCLES * self.cycle_ns;
+        let healed_ns = HEALED_CYCLES * self.cycle_ns + self.asks_ns;
         self.all.iter().filter(move |division| (division.from_ns..division.until_ns + healed_ns).contains(&at_ns))
     }
 }
@@ -141,7 +144,8 @@ mod tests {
             (cut, (0, 1), begins(0, AT_NS - BEGINNERS_CYCLES * CYCLE_NS - 1), begins(1, 0), 0, false, "long ago"),
             (cut, (0, 1), begins(0, AT_NS), own(1, 1), 0, false, "one of whom has time"),
         ] {
-            let divisions = Divisions { all: vec![Division { from_ns, until_ns, parts }], cycle_ns: CYCLE_NS };
+            let divisions =
+                Divisions { all: vec![Division { from_ns, until_ns, parts }], cycle_ns: CYCLE_NS, asks_ns: 0 };
             assert_eq!(divisions.excuse(&one, &other, began_ns), excused, "{why}");
         }
     }

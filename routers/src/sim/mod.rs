@@ -20,6 +20,7 @@ pub mod link;
 mod modules;
 pub mod packages;
 pub mod plan;
+mod rare;
 pub mod receiving;
 mod rough;
 pub mod run;

@@ -41,6 +41,8 @@ pub struct Slots {
     pub late_ppm: u32,
     /// The faults that divide the network.
     pub divisions: Divisions,
+    /// A router has system time and may send so long after it began, where nothing goes wrong but that others begin too; none: it is not asked.
+    pub joins_ns: Option<u64>,
 }
 
 impl Slots {
@@ -94,12 +96,18 @@ impl Slots {
 impl Plan {
     /// A network with time slots.
     pub fn slotted(seed: u64) -> Self {
+        Self::slotted_of(seed, (2, 6), 3)
+    }
+
+    /// One of so many nodes, from and to, of which so many at most may be master.
+    pub(super) fn slotted_of(seed: u64, nodes: (u64, u64), masters_max: usize) -> Self {
         let mut plan = Self::new(seed);
         let mut chance = Chance::new(seed ^ 0x51_07);
         let chance = &mut chance;
-        plan.nodes = (0..chance.between(2, 6) as usize).map(|index| super::plan::node(index, chance)).collect();
+        plan.nodes =
+            (0..chance.between(nodes.0, nodes.1) as usize).map(|index| super::plan::node(index, chance)).collect();
         plan.masters = super::plan::masters(plan.nodes.len(), chance);
-        plan.masters.truncate(3);
+        plan.masters.truncate(masters_max);
         let link_bytes_s = chance.pick(&[100, 100, 1000]) * 1_000_000 / 8;
         plan.shape.datagram_bytes_max = chance.pick(&[548, 1472, 1472]);
         plan.has_stamps = true;
@@ -110,8 +118,13 @@ impl Plan {
         plan.shape.interval_ns = table.cycle.as_nanos() as u64;
         plan.shape.rate_bytes_s = (0..plan.nodes.len()).map(|node| node_bytes_s(&table, node)).min().unwrap_or(0);
         plan.mended_ns = chance.between(2 * S, 4 * S);
-        plan.slots =
-            Some(Slots { table, masters: plan.masters.clone(), late_ppm: LATE_PPM, divisions: Divisions::default() });
+        plan.slots = Some(Slots {
+            table,
+            masters: plan.masters.clone(),
+            late_ppm: LATE_PPM,
+            divisions: Divisions::default(),
+            joins_ns: None,
+        });
         plan.time_slots();
         plan.draw_all(chance);
         plan.fit_traffic();
@@ -132,7 +145,7 @@ impl Plan {
     }
 
     /// When all must be well, and when it ends. Nobody is let off: the run goes on until who needs an epoch has had it, and then all must be well.
-    fn time_slots(&mut self) {
+    pub(super) fn time_slots(&mut self) {
         self.time();
         // Who joins hears some Syncs before it asks, and so long a master is given to answer.
         let joins_ns = 2 * u64::from(JOINING_SYNCS) * self.shape.interval_ns + DEAF_NS;
@@ -170,7 +183,7 @@ impl Plan {
 
     /// What slots carry well: a large package is through long before it is too old. Commands that wait behind it come all at once: no more
     /// of them than fit in a mailbox, else some are lost though all is well.
-    fn fit_traffic(&mut self) {
+    pub(super) fn fit_traffic(&mut self) {
         let most_bytes = self.shape.rate_bytes_s / 4;
         for flow in &mut self.flows {
             flow.bytes = (flow.bytes.0.min(most_bytes), flow.bytes.1.min(most_bytes));

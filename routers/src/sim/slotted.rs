@@ -32,6 +32,8 @@ pub struct Slotted {
     firsts: VecDeque<(Port, u64, u64)>,
     /// When the window began in which it last said a hello by what it had overheard, local ns.
     asked_ns: Option<u64>,
+    /// When it began, true ns; none as soon as it has joined.
+    joins_since_ns: Option<u64>,
 }
 
 impl Slotted {
@@ -49,6 +51,7 @@ impl Slotted {
             sent: [0; PORTS],
             firsts: VecDeque::new(),
             asked_ns: None,
+            joins_since_ns: Some(now.true_ns),
         }
     }
 
@@ -147,6 +150,19 @@ impl Slotted {
         }
     }
 
+    /// Whoever begins takes part in time.
+    fn watch_joining(&mut self, io: &mut Io<'_>) {
+        let Some(since_ns) = self.joins_since_ns else { return };
+        let took_ns = io.now.true_ns - since_ns;
+        if self.discipline.silent().is_none() {
+            self.joins_since_ns = None;
+            io.line(|| format!("has joined after {} ms", took_ns / 1_000_000));
+        } else if io.plan.slots.as_ref().and_then(|slots| slots.joins_ns).is_some_and(|joins_ns| took_ns > joins_ns) {
+            let text = format!("node {} has not joined after {} ms", io.node, took_ns / 1_000_000);
+            io.book.broken(io.now, Promise::Recovery, text);
+        }
+    }
+
     /// Whoever sends is off the time of its master by half of the guard at most, whatever it says itself.
     fn watch(&self, io: &mut Io<'_>, says: &Says) {
         let Some(reckoning) = says.reckoning else { return };
@@ -220,6 +236,7 @@ impl Layer for Slotted {
     }
 
     fn check(&mut self, io: &mut Io<'_>, well: bool) {
+        self.watch_joining(io);
         let clock = self.time.clock();
         let off_ns = io.book.times.off_ns(io.now, io.node, clock.term());
         let masters = clock.master().and_then(|master| io.book.times.page(master.into()));

@@ -188,6 +188,7 @@ impl Table {
             replies_in_synchronisation: self.share.replies_in_synchronisation,
             delay_max_ns: self.guard_ns / 2,
             allowance_ns: self.allowance_ns(),
+            slot_every_ns: self.cycle_ns.saturating_mul(self.rarest_cycles()),
             hello_every_ns: self.cycle_ns.saturating_mul(UNPROVEN_CYCLES.max(self.rarest_cycles())),
         }
     }

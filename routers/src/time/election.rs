@@ -8,6 +8,8 @@ use crate::frame::NodeIndex;
 
 /// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
 const DEAF_NS_MIN: u64 = 200_000_000;
+/// The same in slots of who asks and who answers.
+const DEAF_SLOTS: u64 = 4;
 /// In time slots others may be unheard for so long since the last frame was due, and send by a time that they have.
 const BEGINS_AFTER_NS: u64 = 100_000_000;
 /// In time slots a master that misses three Syncs has a successor in the third cycle: one that misses two may still be heard.
@@ -110,11 +112,12 @@ impl Election {
         }
     }
 
-    /// A slave takes so many intervals until it asks: a master must not be replaced before that for not having answered. A time begins
-    /// only where for so long nobody that has one was heard. A successor speaks before the silence of its master is over.
-    pub(super) fn asks_after(&mut self, intervals: u64) {
+    /// A slave takes so many intervals until it asks, and it asks and is answered in slots, which come this often: a master must not be replaced
+    /// before that for not having answered. A time begins only where for so long nobody that has one was heard. A successor speaks before the silence of its master is over.
+    pub(super) fn asks_after(&mut self, intervals: u64, slot_every_ns: u64) {
         self.succeeded_after_ns = self.interval_ns.saturating_mul(SUCCEEDED_HALF_INTERVALS) / 2;
-        self.deaf_ns = DEAF_NS_MIN.max(self.interval_ns.saturating_mul(2 * intervals));
+        let asks_ns = self.interval_ns.saturating_mul(2 * intervals);
+        self.deaf_ns = DEAF_NS_MIN.max(asks_ns).max(slot_every_ns.saturating_mul(DEAF_SLOTS));
         self.begins_after_ns = BEGINS_AFTER_NS.saturating_add(self.interval_ns.saturating_mul(intervals));
     }
 

@@ -22,7 +22,7 @@
 //! time waits longer still, when it has heard of one that has time. So a router that starts listens first; if there is a master, it is
 //! its slave, and it stays so until that one fails: each change of master makes the bound a little larger, and none is made without need.
 //!
-//! A master that is heard but answers nobody hears nobody; it is replaced as if it were silent.
+//! A master that is heard but answers nobody hears nobody; it is replaced as if it were silent. In time slots it is given some slots to answer.
 //!
 //! Of two masters that hear each other, the one that nobody follows yields; if both or neither are followed, that of the lower term.
 //! Terms are never shared, since a term has its master's rank in it. Who yields is a slave with the next [`Sync`](message::Sync), so

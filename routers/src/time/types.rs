@@ -133,6 +133,8 @@ pub struct InSlots {
     pub delay_max_ns: u64,
     /// Who sends may be off by so much at most, ns.
     pub allowance_ns: u64,
+    /// Each node that has slots has one at least this often, ns.
+    pub slot_every_ns: u64,
     /// Each node may say a hello at least this often, ns.
     pub hello_every_ns: u64,
 }

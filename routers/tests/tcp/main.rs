@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod beside;
+mod foreign_eyes;
 mod ground;
 mod hostile;
 #[allow(dead_code, reason = "each test uses a part")]
@@ -11,3 +12,4 @@ mod lan;
 mod network;
 mod sealed;
 mod sessions;
+mod versions;

@@ -20,7 +20,7 @@ const FAR: &str = "the client of system 1";
 const SECRET: &[u8] = b"nobody may read this";
 
 /// Past the test harness, which keeps what passing tests print to itself.
-fn skipped(what: &str) {
+pub(crate) fn skipped(what: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: {what}");
 }
 

@@ -115,7 +115,7 @@ fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
         ),
         (Some(forged), "foreign", "is foreign", "one of another authority"),
         (Some(other_system), "certificate is of system 7", "certificate is of system 7", "one of another system"),
-        (Some(nobody), "closed the connection", "names no node", "one that names no node"),
+        (Some(nobody), "does not fit: it names no node", "certificate: it names no node", "one that names no node"),
         (None, "TCP router", "does not speak TLS", "none, and no TLS"),
     ] {
         let client = System::sealed(3, "three", address, seal);

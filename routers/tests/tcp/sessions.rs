@@ -10,6 +10,20 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
+/// What a client says first.
+pub(crate) fn hello(system: u8, common: u64) -> Hello<'static> {
+    Hello {
+        system,
+        reaches_own: false,
+        common,
+        system_digest: system.into(),
+        life: 1000 + u64::from(system),
+        attempt: 1,
+        asked_ns: 0,
+        name: "raw",
+    }
+}
+
 /// A client that says what it likes.
 pub(crate) struct Raw(pub(crate) TcpStream);
 
@@ -17,16 +31,7 @@ impl Raw {
     pub(crate) fn new(server: SocketAddr, system: u8, common: u64) -> Self {
         let mut raw = Self(TcpStream::connect(server).unwrap());
         raw.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
-        raw.say(&Message::Hello(Hello {
-            system,
-            reaches_own: false,
-            common,
-            system_digest: system.into(),
-            life: 1000 + u64::from(system),
-            attempt: 1,
-            asked_ns: 0,
-            name: "raw",
-        }));
+        raw.say(&Message::Hello(hello(system, common)));
         raw
     }
 

@@ -1,5 +1,6 @@
 //! What the TCP router and the nodes of a system show each other, so that sessions are sealed and everyone is who he says.
 
+mod shown;
 mod written;
 
 use rcgen::{
@@ -9,13 +10,14 @@ use rcgen::{
 use rohrpost::config::Installation;
 use rohrpost::mailbox::realtime_ns;
 use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
+pub(super) use shown::show;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use written::{PUBLIC, SECRET, Written};
 
-const DAY: Duration = Duration::from_secs(24 * 3600);
+pub(super) const DAY: Duration = Duration::from_secs(24 * 3600);
 /// What the authority itself holds, days.
 const AUTHORITY_DAYS: u32 = 3650;
 /// Clocks of computers without a network are behind now and then.
@@ -77,40 +79,6 @@ fn holders(installation: &Installation) -> impl Iterator<Item = Holder> {
 fn files(folder: &Path, name: &str) -> [PathBuf; 2] {
     ["pem", "key"].map(|end| folder.join(format!("{name}.{end}")))
 }
-
-/// What there is of each who needs one, and of the authority.
-pub(super) fn show(installation: &Installation) -> Vec<String> {
-    let Some(folder) = folder(installation) else { return Vec::new() };
-    let [certificate, secret] = files(&folder, AUTHORITY);
-    let known = Authority::load(&certificate);
-    let mut lines = vec![match &known {
-        Err(_) if !certificate.exists() => format!("{}: is missing; {MAKES}", certificate.display()),
-        Err(error) => error.to_string(),
-        Ok(_) => format!("{}: is there", certificate.display()),
-    }];
-    lines.push(match &known {
-        _ if !secret.exists() => format!("{}: is not here; whoever makes certificates needs it", secret.display()),
-        Ok(_) if !is_pair(&certificate, &secret) => {
-            format!("{}: is not the key of {}", secret.display(), certificate.display())
-        }
-        _ => format!("{}: is there", secret.display()),
-    });
-    for holder in holders(installation) {
-        let state = state(&folder, known.as_ref().ok(), &holder);
-        lines.extend(files(&folder, &holder.file_name()).map(|file| match state {
-            State::Holds => format!("{}: is there", file.display()),
-            State::Missing if file.exists() => format!("{}: is there without the other file; {MAKES}", file.display()),
-            State::Missing => format!("{}: is missing; {MAKES}", file.display()),
-            State::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
-            State::Unsigned => {
-                format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
-            }
-        }));
-    }
-    lines
-}
-
-const MAKES: &str = "`rohrpost keys new` makes it";
 
 /// What is there of a holder.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -22,10 +22,11 @@ const LOOK_AGAIN: Duration = Duration::from_millis(600);
   rohrpost net --node arm --json
 `lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. `refused` are \
 those that came from the peer's address and were not taken. With time slots, `late` are those that were left out because the router woke \
-up too late, `skipped` those that went by while it stood still, `silent` those in which it was not sure enough of the time; `held` are datagrams that missed the end of their slot. Packages lost in routers stand \
+up too late, `skipped` those that went by while it stood still, `silent` those in which it was not sure enough of the time; `held` are datagrams that missed the end of their slot. \
+Where datagrams are sealed, a line counts hellos of a node that went by the time of who had not shown that it lives. Packages lost in routers stand \
 below, by class and cause (at the TCP router and its clients also those that were `replaced`: of data of which only the newest counts a newer one came while they \
 waited, which is no loss), and at the end the declared flows: how late each may be, and how late it was. The \
-exit code is 1 if a router does not answer or a peer is not alive.")]
+exit code is 1 if a router or a client of the TCP router does not answer, a peer is not alive, or a client takes no part.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,

@@ -27,6 +27,7 @@ pub(super) fn of(shell: &Shell, slots: &State) -> SlotState {
         synchronisations_missed: syncs.missed,
         synchronisations_late: counts.synchronisations_late,
         held: seen.held,
+        unproven: counts.unproven,
         roles: counts.roles,
         lead_ns: seen.lead_ns.0,
         tunnel: shell.tunnel().map(|passed| tunnel(passed)),

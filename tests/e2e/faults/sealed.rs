@@ -1,11 +1,14 @@
 //! Nodes that seal what they send: what can be read of it, who takes no part, and how keys are changed.
 
+use super::strangers::of_version_2;
 use super::{Field, LOG, configure, lines};
 use crate::harness::{OUTPUT, signal, wait};
 use crate::process::Said;
 use nix::sys::signal::Signal;
 use rohrpost::CallError;
 use rohrpost::interfaces::LinkState;
+use rohrpost_routers::frame::{FrameHead, Kind};
+use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -160,6 +163,28 @@ fn sealed_nodes_with_different_configurations_both_say_why() {
     for (node, peer) in [("base", "arm"), ("arm", "base")] {
         field.wait_for_state(node, peer, LinkState::Refused);
     }
+    field.stop();
+}
+
+#[test]
+fn a_sealed_node_says_that_another_speaks_another_wire_format() {
+    let Some(mut field) = Field::sealed(2) else { return };
+    field.launch(&["base"], &[]);
+    // The test is the router of the arm.
+    let arm = {
+        let _inside = field.lab.enter("arm").unwrap();
+        UdpSocket::bind(("10.78.0.2", 21117)).unwrap()
+    };
+    let (kind, digest) = (Kind::Packages, field.digest());
+    let head = FrameHead { kind, system: 1, from: 1, to: 0, digest, incarnation: 9, sequence: 0 };
+    let counted = || field.links("base").rejections.into_iter().find(|rejected| rejected.cause == "version");
+    let rejected = wait("base counts", || {
+        arm.send_to(&of_version_2(&head), ("10.78.0.1", 21117)).unwrap();
+        counted()
+    });
+    assert!(rejected.node == "arm" && rejected.datagrams > 0, "{rejected:?}");
+    let words = ["takes nothing from node arm (10.78.0.2)", "wire format 2, ours is 1", "same version of Rohrpost"];
+    field.wait_told("router.0", &words, 1);
     field.stop();
 }
 

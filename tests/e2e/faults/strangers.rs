@@ -73,7 +73,7 @@ fn crc32(bytes: impl Iterator<Item = u8>) -> u32 {
 }
 
 /// A datagram as a router of version 2 would send it, of which version 1 knows the first four bytes and the check.
-fn of_version_2(head: &FrameHead) -> Vec<u8> {
+pub(super) fn of_version_2(head: &FrameHead) -> Vec<u8> {
     let body = b"what comes in version 2";
     let mut datagram = [&head.to_bytes(&[body]), &body[..]].concat();
     datagram[2] = 2;

@@ -239,6 +239,11 @@ impl Server {
         }
     }
 
+    /// What a client has shown, before its hello, names nobody who may take part; it is told.
+    pub fn names_nobody(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
+        self.refuse(now_ns, client, Reason::Certificate, (0, 0), "it names no node", host);
+    }
+
     /// Bytes to be written to a client.
     pub fn ready(&self, client: ClientIndex) -> &[u8] {
         self.member(client).map_or(&[], |member| member.outgoing.ready())

@@ -1,7 +1,7 @@
 //! Data of which only the newest counts, on their way through a connection that takes nothing for a while.
 
-use super::ends::{MS, S};
 use super::plan::{QUOTA, module};
+use super::world::{MS, S};
 use crate::session::counts::Cause;
 use crate::session::frame::{FrameHead, HEAD_BYTES, LENGTH_MAX, Message};
 use crate::session::outgoing::{Fates, Outgoing, Parcel};

@@ -235,9 +235,7 @@ impl Work {
             Moved::Over(_) => self.broke(client),
             Moved::Nothing => drop(self.flush(client)),
             Moved::Bytes(_) if is_new && !self.is_known(client) => {
-                let error =
-                    io::Error::other("its certificate names no node; make new ones with `rohrpost keys rotate`");
-                self.unsealed(client, &error);
+                self.server.names_nobody(monotonic_ns(), client, &mut self.host);
             }
             Moved::Bytes(bytes) => {
                 self.server.received(monotonic_ns(), client, &self.piece[..bytes], &mut self.host);

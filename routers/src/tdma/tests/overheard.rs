@@ -248,6 +248,7 @@ fn rare_slots_are_waited_for() {
     slots.slots[0].period = 16;
     slots.slots[2].period = 32;
     let table = crate::tdma::Table::new(&slots, &MASTERS, 1, 3, super::world::HEADS);
+    assert_eq!(table.for_clock().slot_every_ns, 16 * CYCLE);
     assert_eq!(table.for_clock().hello_every_ns, 16 * CYCLE, "node 2 has another one in each third cycle");
 }
 

@@ -110,7 +110,9 @@ impl Clock {
     }
 
     pub(super) fn answers(&self, slave: &Slave, now_ns: u64) -> bool {
-        let recently_ns = self.interval_ns.saturating_mul(4).max(4 * EAGER_NS);
+        // In time slots a slave asks in its own slots alone.
+        let asks_ns = self.slots.as_ref().map_or(self.interval_ns, |slots| slots.settings.slot_every_ns);
+        let recently_ns = asks_ns.max(EAGER_NS).saturating_mul(4);
         slave.answered_ns.is_some_and(|answered| now_ns.saturating_sub(answered) < recently_ns)
     }
 

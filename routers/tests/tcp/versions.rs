@@ -1,0 +1,75 @@
+//! Ends of two versions, and of two installations: each says so for itself.
+
+use crate::ground::{COMMON, System, address, node, start, wait};
+use rohrpost_routers::session::frame::{HEAD_BYTES, Message, Reason, Refusal, VERSION};
+use rohrpost_routers::tcp::LinkState;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+
+/// Where a hello and a refusal have their version: behind the frame's head and the magic word.
+const VERSION_AT: usize = HEAD_BYTES + 4;
+const OTHER: u8 = VERSION + 1;
+
+fn written(message: &Message<'_>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    message.write(&mut bytes);
+    bytes
+}
+
+#[test]
+fn a_tcp_router_says_which_version_a_client_speaks_and_tells_it_its_own() {
+    let (address, (_folder, own)) = (address(), node());
+    let server = start(address, &own, 1).unwrap();
+    let mut hello = written(&Message::Hello(crate::sessions::hello(3, COMMON)));
+    assert_eq!(hello[VERSION_AT], VERSION);
+    hello[VERSION_AT] = OTHER;
+    let mut client = TcpStream::connect(address).unwrap();
+    client.write_all(&hello).unwrap();
+    let mut told = Vec::new();
+    client.read_to_end(&mut told).unwrap();
+    assert_eq!(told[VERSION_AT..VERSION_AT + 2], [VERSION, Reason::Version as u8], "so the client knows what to say");
+    let words = format!("session format {OTHER}, ours is {VERSION}; run the same version of Rohrpost at both ends");
+    wait("the TCP router says why", || server.members().refusal.contains(&words).then_some(()));
+    assert!(server.members().members.iter().all(|member| !member.is_member));
+}
+
+#[test]
+fn a_client_says_what_a_tcp_router_of_another_version_or_installation_objects_to() {
+    for (version, reason, words) in [
+        (
+            OTHER,
+            Reason::Version,
+            format!("the TCP router speaks session format {OTHER}, this end {VERSION}; run the same version"),
+        ),
+        (VERSION, Reason::Common, "the common digest here is 00000000000000c0, that of north 00000000000000c1".into()),
+    ] {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let refusal = Refusal { version, reason, yours: COMMON, ours: COMMON + 1, text: "north" };
+        let refusal = written(&Message::Refusal(refusal));
+        let client = System::new(1, "one", listener.local_addr().unwrap());
+        let (mut server, _) = listener.accept().unwrap();
+        // It reads what the client says, refuses it, and closes.
+        let mut hello = [0; VERSION_AT + 1];
+        server.read_exact(&mut hello).unwrap();
+        assert_eq!(hello[VERSION_AT], VERSION);
+        server.write_all(&refusal).unwrap();
+        wait(&words, || client.client.link().why.contains(&words).then_some(()));
+        assert_ne!(client.client.link().state, LinkState::Up);
+    }
+}
+
+#[test]
+fn of_two_installations_both_ends_say_whose_digests_differ() {
+    let (address, (_folder, own)) = (address(), node());
+    let server = start(address, &own, 1).unwrap();
+    let mut client = TcpStream::connect(address).unwrap();
+    client.write_all(&written(&Message::Hello(crate::sessions::hello(3, COMMON + 1)))).unwrap();
+    let mut told = Vec::new();
+    client.read_to_end(&mut told).unwrap();
+    assert_eq!(told[VERSION_AT + 1], Reason::Common as u8);
+    let digests = ["00000000000000c1", "00000000000000c0"];
+    wait("the TCP router says why", || {
+        let said = server.members().refusal;
+        digests.iter().all(|digest| said.contains(digest)).then_some(())
+    });
+}

@@ -1,0 +1,73 @@
+//! What there is of certificates, for people, and for how long it holds.
+
+use super::{AUTHORITY, DAY, State, files, folder, holders, is_pair, state};
+use rcgen::date_time_ymd;
+use rohrpost::config::Installation;
+use rohrpost::mailbox::realtime_ns;
+use rohrpost_routers::tcp::{Authority, holds_until_s};
+use std::path::Path;
+use std::time::Duration;
+
+/// Whoever holds for less should be renewed.
+const SOON_DAYS: u64 = 30;
+const MAKES: &str = "`rohrpost keys new` makes it";
+
+/// What there is of each who needs one, and of the authority.
+pub(in crate::cli::keys) fn show(installation: &Installation) -> Vec<String> {
+    let Some(folder) = folder(installation) else { return Vec::new() };
+    let [certificate, secret] = files(&folder, AUTHORITY);
+    let known = Authority::load(&certificate);
+    let mut lines = vec![match &known {
+        Err(_) if !certificate.exists() => format!("{}: is missing; {MAKES}", certificate.display()),
+        Err(error) => error.to_string(),
+        Ok(_) => format!("{}: is there", certificate.display()),
+    }];
+    lines.push(match &known {
+        _ if !secret.exists() => format!("{}: is not here; whoever makes certificates needs it", secret.display()),
+        Ok(_) if !is_pair(&certificate, &secret) => {
+            format!("{}: is not the key of {}", secret.display(), certificate.display())
+        }
+        _ => format!("{}: is there", secret.display()),
+    });
+    for holder in holders(installation) {
+        let state = state(&folder, known.as_ref().ok(), &holder);
+        lines.extend(files(&folder, &holder.file_name()).map(|file| match state {
+            State::Holds => format!("{}: is there{}", file.display(), lasts(&file)),
+            State::Missing if file.exists() => format!("{}: is there without the other file; {MAKES}", file.display()),
+            State::Missing => format!("{}: is missing; {MAKES}", file.display()),
+            State::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
+            State::Unsigned => {
+                format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
+            }
+        }));
+    }
+    lines
+}
+
+/// For how long a certificate holds that holds now; nothing of what is no certificate.
+fn lasts(file: &Path) -> String {
+    let now_s = realtime_ns() / 1_000_000_000;
+    holds_until_s(file).map_or_else(String::new, |until_s| text(until_s, until_s.saturating_sub(now_s) / DAY.as_secs()))
+}
+
+fn text(until_s: u64, days: u64) -> String {
+    let until = date_time_ymd(1970, 1, 1) + Duration::from_secs(until_s);
+    let left = if days == 1 { "1 day".into() } else { format!("{days} days") };
+    let warning = if days < SOON_DAYS { "; soon it does not: `rohrpost keys rotate` makes new ones" } else { "" };
+    format!(", holds for {left}, until {}{warning}", until.date())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ends_within_thirty_days_is_warned_of() {
+        const UNTIL_S: u64 = 1_795_252_380;
+        assert_eq!(text(UNTIL_S, 30), ", holds for 30 days, until 2026-11-21");
+        assert_eq!(
+            text(UNTIL_S, 1),
+            ", holds for 1 day, until 2026-11-21; soon it does not: `rohrpost keys rotate` makes new ones"
+        );
+    }
+}
