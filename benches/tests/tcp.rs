@@ -5,7 +5,10 @@
 mod support;
 
 use serde_json::{Map, Value};
-use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
+use support::{FAILED, bench, children, failures, interrupt, left_behind, rows, run, wait_for};
+
+/// What a contender says whose package did not come.
+const LOST: &str = "a package is lost";
 
 /// A row that is there whenever its case could run: case and who.
 const ROWS: [(&str, &str); 18] = [
@@ -32,8 +35,9 @@ const ROWS: [(&str, &str); 18] = [
 #[test]
 fn every_case_runs_and_every_line_is_complete() {
     let (mut output, mut prefix) = run("tcp", &["--quick", "--json"]);
-    if !output.status.success() {
+    if !output.status.success() && failures(&output).iter().all(|line| line.contains(LOST)) {
         // A computer that stands still for more than 1.5 s loses what is on its way. Not twice.
+        assert_eq!(left_behind(&prefix), [""; 0]);
         println!("once more, after\n{}", String::from_utf8_lossy(&output.stdout));
         (output, prefix) = run("tcp", &["--quick", "--json"]);
     }

@@ -265,3 +265,40 @@ fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
         link.close();
     }
 }
+
+#[test]
+fn a_call_to_all_systems_has_the_first_answer_and_no_fault_of_one_of_them() {
+    let mut ground = ground();
+    let everywhere = Name::new(rohrpost_mailbox::ALL_SYSTEMS, 200, 1, 0);
+    // Somebody has to take what goes there.
+    let node = ground.node.clone();
+    let all = Participant::join(&node, everywhere).unwrap().receiver(everywhere, Shape::default());
+    let mut all = all.unwrap();
+    let sequence = ground.begin(everywhere, 7, LONG).unwrap();
+    let command = take(&mut all);
+    let (incarnation, fault) = (command.envelope.incarnation, postcard::to_stdvec(&Fault::NoMailbox).unwrap());
+    ground.answer_as(Name::new(2, 200, 1, 0), incarnation, sequence, Options::ERROR, &fault);
+    // Another module is nobody whom it has called.
+    ground.answer_as(
+        Name::new(3, 201, 1, 0),
+        incarnation,
+        sequence,
+        Options::default(),
+        &postcard::to_stdvec(&1_u32).unwrap(),
+    );
+    ground.answer_as(
+        Name::new(3, 200, 1, 0),
+        incarnation,
+        sequence,
+        Options::default(),
+        &postcard::to_stdvec(&8_u32).unwrap(),
+    );
+    ground.answer_as(
+        Name::new(4, 200, 1, 0),
+        incarnation,
+        sequence,
+        Options::default(),
+        &postcard::to_stdvec(&9_u32).unwrap(),
+    );
+    assert_eq!(ground.wait(sequence).unwrap(), 8);
+}

@@ -8,6 +8,7 @@ mod common;
 use common::relay::Relay;
 use common::talk::{Ears, PAUSE, mouths, talk};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
+use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_routers::frame::Kind;
 use rohrpost_routers::shell::Failure;
 use rohrpost_routers::tdma::Silent;
@@ -106,8 +107,10 @@ fn a_master_whose_packages_come_is_replaced_by_nobody_who_misses_its_syncs() {
     let mut mouths = mouths(&segment, &[master, backup.own]);
     std::thread::scope(|scope| {
         scope.spawn(|| {
+            // A master that is kept from speaking for three cycles is replaced, and rightly.
+            let _ = schedule(Scheduling::Fifo(1));
             let since = Instant::now();
-            for id in (0..).take_while(|_| !is_over.load(Ordering::Relaxed) && since.elapsed() < 2 * PATIENCE) {
+            for id in (0..).take_while(|_| !is_over.load(Ordering::Relaxed) && since.elapsed() < PATIENCE) {
                 mouths.iter_mut().for_each(|mouth| mouth.say(id));
                 std::thread::sleep(PAUSE);
             }

@@ -129,7 +129,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say(format_args!("\n{}(modules at the TCP router that this configuration does not have)", table));
     }
     if listing.beyond_more > 0 {
-        say(format_args!("(and {} ranges of names that it does not tell)", listing.beyond_more));
+        say(format_args!(
+            "(the TCP router knows {} further ranges of names, of this system or others, and does not tell them)",
+            listing.beyond_more
+        ));
     }
     if let Some(why) = &listing.beyond_silent {
         say(format_args!("\nmodules at the TCP router are not known: {why}"));

@@ -169,7 +169,7 @@ fn by_a_bad_wifi_what_comes_is_fresh_and_an_outage_costs_a_gap_and_nothing_else(
     assert!(shown.contains("replaced") && shown.lines().any(replaced), "{shown}");
 
     let modules = || [("base", "probe.0"), ("far", "screen.0")].map(|(node, module)| wifi.robot(node).pid(module));
-    let (before, outages) = (modules(), wifi.net("far")["beyond"]["outages"].as_u64().unwrap());
+    let (before, outages) = (modules(), wait("net tells", || wifi.net("far")["beyond"]["outages"].as_u64()));
     wifi.lab.cut("far").unwrap();
     wait("far is away", || (wifi.net("far")["beyond"]["state"] == "away").then_some(()));
     wifi.lab.mend("far").unwrap();

@@ -156,7 +156,7 @@ impl Guest {
     fn write(&mut self, house: &House<'_>) -> Result<(), Failure> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
         let ready = self.client.ready();
-        let (moved, wanted) = (stream.write(ready), ready.len());
+        let (moved, wanted) = (stream.write(ready, self.client.has_waiting()), ready.len());
         let is_all = matches!(moved, Moved::Bytes(bytes) if bytes == wanted) && !stream.has_unsent();
         match moved {
             Moved::Bytes(bytes) => self.client.took(monotonic_ns(), bytes),

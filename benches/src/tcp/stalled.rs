@@ -35,7 +35,7 @@ impl Stalled {
         if self.signs.next_due(now_ns).is_some() {
             let mut sign = Vec::new();
             Message::Ask(now_ns).write(&mut sign);
-            if let Moved::Over(_) = self.stream.write(&sign) {
+            if let Moved::Over(_) = self.stream.write(&sign, false) {
                 return Err(Failure::Failed("who reads nothing was closed before the turn was over".into()));
             }
         }

@@ -24,14 +24,20 @@ pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
 pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
     let text = String::from_utf8_lossy(&output.stdout);
     // Of much that was said, what failed comes last.
-    let failed: Vec<&str> = text.lines().filter(|line| line.contains(FAILED)).collect();
-    assert!(output.status.success(), "{text}\n{}\n{failed:#?}", String::from_utf8_lossy(&output.stderr));
+    let (said, failed) = (String::from_utf8_lossy(&output.stderr), failures(output));
+    assert!(output.status.success(), "{text}\n{said}\n{failed:#?}");
     let mut lines: Vec<Map<String, Value>> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let (head, tail) = (lines.remove(0), lines.pop().unwrap());
     assert_eq!((&head["case"], &tail["case"]), (&"environment".into(), &"environment-after".into()));
     assert!(head["refused"].is_array() && head["kernel"].is_string());
     lines.iter().for_each(check_row);
     lines
+}
+
+/// Its lines of contenders that failed.
+pub(crate) fn failures(output: &Output) -> Vec<String> {
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines().filter(|line| line.contains(FAILED)).map(str::to_owned).collect()
 }
 
 /// What it printed, and the names that it may use in shared memory.

@@ -349,8 +349,10 @@ impl Link {
                     && call.answer.is_none()
             };
             let call = self.calls.iter_mut().find(its).filter(|_| envelope.incarnation == self.incarnation);
-            // One try that was refused says nothing of the others that are under way.
-            let refused = |call: &Call| call.repeated && head.options.has(Options::ERROR) && is_of_one_try(result);
+            // One try that was refused says nothing of the others that are under way, nor one system of others.
+            let is_one_of_many = |call: &Call| call.repeated || call.to.system() == ALL_SYSTEMS;
+            let refused =
+                |call: &Call| is_one_of_many(call) && head.options.has(Options::ERROR) && is_of_one_try(result);
             if let Some(call) = call.filter(|call| !refused(call)) {
                 call.answer = Some(*head);
                 call.body.clear();

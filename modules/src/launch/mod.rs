@@ -138,7 +138,7 @@ impl Launch {
         events: Receiver<Event>,
         keep: impl Fn(&Module) -> Option<OwnedFd>,
     ) -> Result<Self, LaunchError> {
-        program::hurry();
+        let usual_nice = program::hurry();
         let beside = executable.parent().map(PathBuf::from).unwrap_or_default();
         let missing = installation.missing_programs(node_name, &beside);
         let fatal: Vec<String> = missing.iter().filter(|p| !p.optional).map(ToString::to_string).collect();
@@ -159,7 +159,7 @@ impl Launch {
             .modules_on(node_name)
             .filter(|module| missing.iter().all(|program| program.module != module.name))
             .map(|module| {
-                let program = Program::new(module, &installation, &executable, keep(module));
+                let program = Program::new(module, &installation, &executable, keep(module), usual_nice);
                 Child::new(module, &installation, program, &relay)
             })
             .collect();

@@ -13,10 +13,12 @@ use std::process::{Child, Command, Stdio};
 /// calls that wait for it run out of time.
 const NICE: i8 = -15;
 
-/// From now on the calling thread, which starts modules, goes before ordinary programs, if it may.
-pub(super) fn hurry() {
-    // Without the right to it, all is a little later.
-    let _ = sys::schedule(sys::Scheduling::Normal(NICE));
+/// From now on the calling thread, which starts modules, goes before ordinary programs, if it may: then with its usual niceness, which modules that are
+/// not real time begin with. Whoever was started to give way does so.
+pub(super) fn hurry() -> Option<i8> {
+    let Ok(sys::Scheduling::Normal(usual)) = sys::scheduling() else { return None };
+    let may = (NICE + 1..=0).contains(&usual) && sys::schedule(sys::Scheduling::Normal(NICE)).is_ok();
+    may.then_some(usual)
 }
 
 /// How a module's process is started.
@@ -29,13 +31,20 @@ pub(super) struct Program {
     module: String,
     /// The standard input of all its processes, one after the other; none: there is nothing to read.
     kept: Option<OwnedFd>,
-    /// It starts as quickly as launch runs; others have a usual start.
-    is_real_time: bool,
+    /// What it begins with, if launch goes before ordinary programs and it is not real time.
+    nice: Option<i8>,
 }
 
 impl Program {
     /// `executable` is the `rohrpost` command, which holds the built-in modules.
-    pub(super) fn new(module: &Module, installation: &Installation, executable: &Path, kept: Option<OwnedFd>) -> Self {
+    /// `usual_nice`: what [`hurry`] has given.
+    pub(super) fn new(
+        module: &Module,
+        installation: &Installation,
+        executable: &Path,
+        kept: Option<OwnedFd>,
+        usual_nice: Option<i8>,
+    ) -> Self {
         let beside = executable.parent().unwrap_or(Path::new("."));
         let (path, arguments) = match &module.program {
             Configured::Builtin(name) if !module.is_in_file() => (executable.to_owned(), vec![name.clone()]),
@@ -48,7 +57,8 @@ impl Program {
         };
         let config = installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone());
         let is_real_time = matches!(installation.scheduling(module.name.class()), Scheduling::Fifo { .. });
-        Self { path, arguments, config, module: installation.classes.format(module.name), kept, is_real_time }
+        let nice = usual_nice.filter(|_| !is_real_time);
+        Self { path, arguments, config, module: installation.classes.format(module.name), kept, nice }
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -78,13 +88,11 @@ impl Program {
             .stdout(stdout)
             .stderr(stderr)
             .process_group(0);
-        if self.is_real_time {
-            return command.spawn();
-        }
+        let Some(nice) = self.nice else { return command.spawn() };
         // It inherits the niceness of this thread.
-        let _ = sys::schedule(sys::Scheduling::Normal(0));
+        sys::schedule(sys::Scheduling::Normal(nice))?;
         let spawned = command.spawn();
-        hurry();
+        let _ = sys::schedule(sys::Scheduling::Normal(NICE));
         spawned
     }
 }

@@ -255,6 +255,10 @@ fn schedule(wanted: Scheduling) {
         Scheduling::Normal { nice } => sys::Scheduling::Normal(nice),
     };
     if let Err(error) = sys::schedule(how) {
+        if let sys::Scheduling::Fifo(_) = how {
+            // Launch has started it before ordinary programs, perhaps.
+            let _ = sys::schedule(sys::Scheduling::Normal(0));
+        }
         tracing::warn!(
             "runs without {wanted}: {error}; allow it with a limit `rtprio` for this user (limits.conf) or CAP_SYS_NICE"
         );

@@ -156,6 +156,7 @@ impl Slotted {
         let took_ns = io.now.true_ns - since_ns;
         if self.discipline.silent().is_none() {
             self.joins_since_ns = None;
+            io.book.saw("joined");
             io.line(|| format!("has joined after {} ms", took_ns / 1_000_000));
         } else if io.plan.slots.as_ref().and_then(|slots| slots.joins_ns).is_some_and(|joins_ns| took_ns > joins_ns) {
             let text = format!("node {} has not joined after {} ms", io.node, took_ns / 1_000_000);

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The client and its kernel see what they would see of such a network: what a line does not carry yet is not read, so that it waits where it
-//! was sent from.
+//! was sent from. When the client closes, what has not arrived at the server by then is gone.
 
 use crate::impair::{Line, Settings};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
@@ -89,7 +89,15 @@ impl Work {
             let mut listens = [PollFd::new(self.listener.as_fd(), PollFlags::POLLIN)];
             // Interrupted, or too long: it looks again.
             let _ = poll(&mut listens, millis(LOOK));
-            let Ok((near, _)) = self.listener.accept() else { continue };
+            let near = match self.listener.accept() {
+                Ok((near, _)) => near,
+                Err(error) if is_for_now(&error) => continue,
+                Err(error) => {
+                    tracing::debug!("the bad line takes no connection: {error}");
+                    std::thread::sleep(LOOK);
+                    continue;
+                }
+            };
             if let Err(error) = self.carry(&near) {
                 // The client sees its connection end, and says so.
                 tracing::debug!("a connection by the bad line: {error}");
@@ -108,15 +116,16 @@ impl Work {
         far.set_nonblocking(true)?;
         far.set_nodelay(true)?;
         // Each connection has accidents of its own, and so has each way.
-        let way = |stream| Way { line: Line::new(self.settings, stream), is_over: false, is_full: false };
+        let line = |stream| Line::new(self.settings, stream);
+        let way = |stream| Way { line: line(stream), is_over: false, is_full: false, is_cut: false };
         let (mut up, mut down) = (way(2 * self.connections), way(2 * self.connections + 1));
         self.connections += 1;
-        let mut piece = vec![0; PIECE_BYTES];
+        let (mut piece, mut far_ended) = (vec![0; PIECE_BYTES], false);
         while !self.ends.load(Ordering::Acquire) {
             let now_ns = monotonic_ns();
-            up.step(now_ns, near, &far, &mut piece)?;
-            down.step(now_ns, &far, near, &mut piece)?;
-            if up.is_over || down.is_at_end() {
+            up.step(now_ns, near, &far, &mut piece);
+            down.step(now_ns, &far, near, &mut piece);
+            if up.is_over || down.is_cut || down.is_at_end() {
                 return Ok(());
             }
             let until_ns = up.line.until_ns(now_ns).min(down.line.until_ns(now_ns));
@@ -125,8 +134,17 @@ impl Work {
                 PollFd::new(near.as_fd(), up.wants(now_ns) | down.lacks()),
                 PollFd::new(far.as_fd(), down.wants(now_ns) | up.lacks()),
             ];
+            // What the server has said last may be on its way still. Of a socket that has ended poll would say so all the time.
+            let asked = if far_ended { &mut sockets[..1] } else { &mut sockets[..] };
             // Interrupted, it looks as well.
-            let _ = poll(&mut sockets, millis(wait));
+            let _ = poll(asked, millis(wait));
+            let has_ended = |socket: &PollFd<'_>| {
+                socket.revents().is_some_and(|seen| seen.intersects(PollFlags::POLLERR | PollFlags::POLLHUP))
+            };
+            if has_ended(&sockets[0]) {
+                return Ok(());
+            }
+            far_ended |= has_ended(&sockets[1]);
         }
         Ok(())
     }
@@ -144,33 +162,32 @@ struct Way {
     is_over: bool,
     /// Who is to get it takes nothing now.
     is_full: bool,
+    /// Nor ever again.
+    is_cut: bool,
 }
 
 impl Way {
-    fn step(&mut self, now_ns: u64, mut from: &TcpStream, mut to: &TcpStream, piece: &mut [u8]) -> io::Result<()> {
+    fn step(&mut self, now_ns: u64, mut from: &TcpStream, mut to: &TcpStream, piece: &mut [u8]) {
         let room = self.line.room(now_ns).min(piece.len());
         if room > 0 && !self.is_over {
             match from.read(&mut piece[..room]) {
                 Ok(0) => self.is_over = true,
                 Ok(bytes) => self.line.push(now_ns, &piece[..bytes]),
-                Err(error) => not_now(error)?,
+                Err(error) => self.is_over = !is_for_now(&error),
             }
         }
         self.is_full = false;
-        while !self.is_full {
+        while !self.is_full && !self.is_cut {
             let arrived = self.line.arrived(now_ns);
             if arrived.is_empty() {
                 break;
             }
             match to.write(arrived) {
                 Ok(bytes) => self.line.took(bytes),
-                Err(error) => {
-                    not_now(error)?;
-                    self.is_full = true;
-                }
+                Err(error) if is_for_now(&error) => self.is_full = true,
+                Err(_) => self.is_cut = true,
             }
         }
-        Ok(())
     }
 
     fn is_at_end(&self) -> bool {
@@ -189,6 +206,6 @@ impl Way {
     }
 }
 
-fn not_now(error: io::Error) -> io::Result<()> {
-    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) { Ok(()) } else { Err(error) }
+fn is_for_now(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }

@@ -107,14 +107,14 @@ impl Stream {
         })
     }
 
-    /// Hands on bytes, as many as are taken.
-    pub fn write(&mut self, bytes: &[u8]) -> Moved {
+    /// Hands on bytes, as many as are taken. `waits`: there is more where they come from.
+    pub fn write(&mut self, bytes: &[u8], waits: bool) -> Moved {
         let moved = moved(match &mut self.sealed {
             Some(sealed) => sealed.write(bytes, self.pace.unsent_bytes(), &mut self.socket),
             None => self.socket.write(bytes),
         });
         let taken = if let Moved::Bytes(taken) = moved { taken } else { 0 };
-        let is_all = taken == bytes.len() && !self.has_unsent();
+        let is_all = taken == bytes.len() && !self.has_unsent() && !waits;
         if let Some(holding) = self.pace.wrote(taken, is_all, monotonic_ns) {
             self.hold(holding);
         }
@@ -191,5 +191,50 @@ fn moved(result: io::Result<usize>) -> Moved {
 impl AsFd for Stream {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.socket.socket.as_fd()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::time::{Duration, Instant};
+
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    /// Writes what is made ready at a time until it is so; more waits all the time.
+    fn write_until(stream: &mut Stream, what: &str, is_so: impl Fn(&Stream) -> bool) {
+        let (began, piece) = (Instant::now(), vec![7; 64 * 1024]);
+        while !is_so(stream) {
+            assert!(began.elapsed() < PATIENCE, "waited in vain: {what}");
+            match stream.write(&piece[..stream.batch_bytes()], true) {
+                Moved::Bytes(_) => {}
+                Moved::Nothing => std::thread::sleep(Duration::from_millis(1)),
+                Moved::Over(error) => panic!("{error:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_connection_that_was_slow_for_a_while_is_not_taken_for_slow_when_it_is_fast_again() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut stream = Stream::connect(listener.local_addr().unwrap(), None).unwrap();
+        let (mut far, _) = listener.accept().unwrap();
+        let is_fast = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let mut taken = vec![0; 64 * 1024];
+                while !is_fast.load(Ordering::Relaxed) {
+                    std::thread::sleep(Duration::from_millis(10));
+                    far.read_exact(&mut taken[..100]).unwrap();
+                }
+                while far.read(&mut taken).unwrap() > 0 {}
+            });
+            write_until(&mut stream, "it is known to be slow", Stream::is_slow);
+            is_fast.store(true, Ordering::Relaxed);
+            write_until(&mut stream, "it is known to be fast", |stream| !stream.is_slow());
+            stream.end();
+        });
     }
 }

@@ -183,20 +183,23 @@ impl Table {
 
     /// What a clock in time slots has to know of them.
     pub fn for_clock(&self) -> InSlots {
+        let asks = |node| node == self.own || self.masters.contains(&node);
         InSlots {
             warm_ups: self.share.warm_ups,
             replies_in_synchronisation: self.share.replies_in_synchronisation,
             delay_max_ns: self.guard_ns / 2,
             allowance_ns: self.allowance_ns(),
-            slot_every_ns: self.cycle_ns.saturating_mul(self.rarest_cycles()),
-            hello_every_ns: self.cycle_ns.saturating_mul(UNPROVEN_CYCLES.max(self.rarest_cycles())),
+            slot_every_ns: self.cycle_ns.saturating_mul(self.rarest_cycles(|_| true)),
+            asks_every_ns: self.cycle_ns.saturating_mul(self.rarest_cycles(asks)),
+            hello_every_ns: self.cycle_ns.saturating_mul(UNPROVEN_CYCLES.max(self.rarest_cycles(|_| true))),
         }
     }
 
-    /// Each node that has slots has one at least once in so many cycles.
-    fn rarest_cycles(&self) -> u64 {
+    /// Each of these nodes that has slots has one at least once in so many cycles.
+    fn rarest_cycles(&self, of: impl Fn(NodeIndex) -> bool) -> u64 {
         let periods = |node| self.slots.iter().filter(move |slot| slot.node == node).map(|slot| slot.period);
-        self.slots.iter().filter_map(|slot| periods(slot.node).min()).max().unwrap_or(1)
+        let nodes = self.slots.iter().map(|slot| slot.node).filter(|node| of(*node));
+        nodes.filter_map(|node| periods(node).min()).max().unwrap_or(1)
     }
 
     fn own_slots(&self) -> impl Iterator<Item = (usize, &Slot)> {

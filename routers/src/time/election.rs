@@ -114,10 +114,10 @@ impl Election {
 
     /// A slave takes so many intervals until it asks, and it asks and is answered in slots, which come this often: a master must not be replaced
     /// before that for not having answered. A time begins only where for so long nobody that has one was heard. A successor speaks before the silence of its master is over.
-    pub(super) fn asks_after(&mut self, intervals: u64, slot_every_ns: u64) {
+    pub(super) fn asks_after(&mut self, intervals: u64, asks_every_ns: u64) {
         self.succeeded_after_ns = self.interval_ns.saturating_mul(SUCCEEDED_HALF_INTERVALS) / 2;
         let asks_ns = self.interval_ns.saturating_mul(2 * intervals);
-        self.deaf_ns = DEAF_NS_MIN.max(asks_ns).max(slot_every_ns.saturating_mul(DEAF_SLOTS));
+        self.deaf_ns = DEAF_NS_MIN.max(asks_ns).max(asks_every_ns.saturating_mul(DEAF_SLOTS));
         self.begins_after_ns = BEGINS_AFTER_NS.saturating_add(self.interval_ns.saturating_mul(intervals));
     }
 

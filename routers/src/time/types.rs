@@ -135,6 +135,8 @@ pub struct InSlots {
     pub allowance_ns: u64,
     /// Each node that has slots has one at least this often, ns.
     pub slot_every_ns: u64,
+    /// So have this node and all that may be master: it asks, and is answered.
+    pub asks_every_ns: u64,
     /// Each node may say a hello at least this often, ns.
     pub hello_every_ns: u64,
 }

@@ -34,9 +34,12 @@ fn who_begins_in_a_sealed_network_of_rare_slots_joins_in_time() {
         return replay(Plan::rare_joining(seed));
     }
     let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 4;
-    let seed = |index| if index == seeds { 21 } else { index };
+    let first = number("ROHRPOST_SIM_FIRST").unwrap_or(0);
+    let seed = |index| if index == seeds { 21 } else { first + index };
     for (seed, outcome) in for_all(seeds + 1, |index| (seed(index), run(Plan::rare_joining(seed(index)), guard, false)))
     {
         assert!(outcome.problems.is_empty(), "{}", told("who_begins_in_a_sealed", seed, &outcome.problems[0]));
+        let joined = outcome.seen.get("joined").copied().unwrap_or(0);
+        assert!(joined >= 2 * Plan::rare_joining(seed).nodes.len() as u64, "seed {seed}: {joined} have joined");
     }
 }

@@ -1,6 +1,6 @@
 //! Ends of two versions, and of two installations: each says so for itself.
 
-use crate::ground::{COMMON, System, address, node, start, wait};
+use crate::ground::{COMMON, PATIENCE, System, address, node, start, wait};
 use rohrpost_routers::session::frame::{HEAD_BYTES, Message, Reason, Refusal, VERSION};
 use rohrpost_routers::tcp::LinkState;
 use std::io::{Read, Write};
@@ -24,6 +24,7 @@ fn a_tcp_router_says_which_version_a_client_speaks_and_tells_it_its_own() {
     assert_eq!(hello[VERSION_AT], VERSION);
     hello[VERSION_AT] = OTHER;
     let mut client = TcpStream::connect(address).unwrap();
+    client.set_read_timeout(Some(PATIENCE)).unwrap();
     client.write_all(&hello).unwrap();
     let mut told = Vec::new();
     client.read_to_end(&mut told).unwrap();
@@ -47,7 +48,10 @@ fn a_client_says_what_a_tcp_router_of_another_version_or_installation_objects_to
         let refusal = Refusal { version, reason, yours: COMMON, ours: COMMON + 1, text: "north" };
         let refusal = written(&Message::Refusal(refusal));
         let client = System::new(1, "one", listener.local_addr().unwrap());
-        let (mut server, _) = listener.accept().unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let (mut server, _) = wait("the client connects", || listener.accept().ok());
+        server.set_nonblocking(false).unwrap();
+        server.set_read_timeout(Some(PATIENCE)).unwrap();
         // It reads what the client says, refuses it, and closes.
         let mut hello = [0; VERSION_AT + 1];
         server.read_exact(&mut hello).unwrap();
@@ -63,6 +67,7 @@ fn of_two_installations_both_ends_say_whose_digests_differ() {
     let (address, (_folder, own)) = (address(), node());
     let server = start(address, &own, 1).unwrap();
     let mut client = TcpStream::connect(address).unwrap();
+    client.set_read_timeout(Some(PATIENCE)).unwrap();
     client.write_all(&written(&Message::Hello(crate::sessions::hello(3, COMMON + 1)))).unwrap();
     let mut told = Vec::new();
     client.read_to_end(&mut told).unwrap();

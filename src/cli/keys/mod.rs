@@ -10,6 +10,7 @@ use rohrpost::config::{Installation, Key, Keys};
 use rohrpost_routers::security::{self, InstallationKey, KeyId};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -158,11 +159,12 @@ fn show(wanted: &Wanted) -> Result<Vec<String>, Failure> {
 
 /// How long ago the file was written, which is when its keys were made or changed, or copied here.
 fn age(file: &Path) -> Option<String> {
-    let days = file.metadata().ok()?.modified().ok()?.elapsed().ok()?.as_secs() / certificates::DAY.as_secs();
-    let ago = match days {
-        0 => "today".into(),
-        1 => "1 day ago".into(),
-        _ => format!("{days} days ago"),
+    let days = |since: Duration| since.as_secs() / certificates::DAY.as_secs();
+    let ago = match file.metadata().ok()?.modified().ok()?.elapsed().map(days) {
+        Ok(0) => "less than a day ago".into(),
+        Ok(1) => "1 day ago".into(),
+        Ok(days) => format!("{days} days ago"),
+        Err(_) => "by a clock that was ahead of the present time".into(),
     };
     Some(format!("{}: written {ago}", file.display()))
 }

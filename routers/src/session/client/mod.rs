@@ -307,6 +307,11 @@ impl Client {
         self.outgoing.ready()
     }
 
+    /// Whether more waits than is ready.
+    pub fn has_waiting(&self) -> bool {
+        self.outgoing.has_waiting()
+    }
+
     /// The stream has taken so many of them. If those were not all, nothing more is written until [`Client::writable`].
     pub fn took(&mut self, now_ns: u64, bytes: usize) {
         self.outgoing.took(bytes);

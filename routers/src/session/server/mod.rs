@@ -249,6 +249,11 @@ impl Server {
         self.member(client).map_or(&[], |member| member.outgoing.ready())
     }
 
+    /// Whether more waits than is ready.
+    pub fn has_waiting(&self, client: ClientIndex) -> bool {
+        self.member(client).is_some_and(|member| member.outgoing.has_waiting())
+    }
+
     /// The stream has taken so many of them. If those were not all, nothing more is written until [`Server::writable`].
     pub fn took(&mut self, now_ns: u64, client: ClientIndex, bytes: usize) {
         let Some(member) = self.member_mut(client) else { return };

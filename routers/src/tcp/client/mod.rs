@@ -308,17 +308,19 @@ impl Work {
 
     fn write(&mut self) {
         let Some(connection) = &mut self.connection else { return };
-        let ready = self.client.ready();
-        let moved = connection.stream.write(ready);
+        let (ready, waits) = (self.client.ready(), self.client.has_waiting());
+        let moved = connection.stream.write(ready, waits);
         let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len()) && !connection.stream.has_unsent();
         match moved {
             Moved::Bytes(bytes) => self.client.took(monotonic_ns(), bytes),
             Moved::Nothing => self.client.took(monotonic_ns(), 0),
             Moved::Over(error) => return self.broke(error.as_ref()),
         }
-        if !all {
+        if !all || waits {
             self.client.set_pace(connection.stream.is_slow(), connection.stream.batch_bytes());
             connection.stream.set_round_trip(self.client.round_trip_ns());
+        }
+        if !all {
             self.await_room(true);
         }
     }

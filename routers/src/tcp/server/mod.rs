@@ -267,17 +267,19 @@ impl Work {
 
     fn write(&mut self, client: ClientIndex) {
         let Some(connection) = connection(&mut self.connections, client) else { return };
-        let ready = self.server.ready(client);
-        let moved = connection.stream.write(ready);
+        let (ready, waits) = (self.server.ready(client), self.server.has_waiting(client));
+        let moved = connection.stream.write(ready, waits);
         let all = matches!(moved, Moved::Bytes(bytes) if bytes == ready.len()) && !connection.stream.has_unsent();
         match moved {
             Moved::Bytes(bytes) => self.server.took(monotonic_ns(), client, bytes),
             Moved::Nothing => self.server.took(monotonic_ns(), client, 0),
             Moved::Over(_) => return self.broke(client),
         }
-        if !all {
+        if !all || waits {
             connection.stream.set_round_trip(self.server.round_trip_ns(client));
             self.server.set_batch(client, connection.stream.batch_bytes());
+        }
+        if !all {
             self.await_room(client, true);
         }
     }

@@ -249,7 +249,13 @@ fn rare_slots_are_waited_for() {
     slots.slots[2].period = 32;
     let table = crate::tdma::Table::new(&slots, &MASTERS, 1, 3, super::world::HEADS);
     assert_eq!(table.for_clock().slot_every_ns, 16 * CYCLE);
+    assert_eq!(table.for_clock().asks_every_ns, 16 * CYCLE, "a master has it");
     assert_eq!(table.for_clock().hello_every_ns, 16 * CYCLE, "node 2 has another one in each third cycle");
+    let mut slots = super::world::tdma();
+    slots.slots.iter_mut().filter(|slot| slot.node == 2).for_each(|slot| slot.period = 32);
+    let asks = |own| crate::tdma::Table::new(&slots, &MASTERS, own, 3, super::world::HEADS).for_clock().asks_every_ns;
+    assert!(!MASTERS.contains(&2) && asks(1) < asks(2), "the others wait for nobody's rare slots");
+    assert_eq!(asks(2), 32 * CYCLE);
 }
 
 #[test]

@@ -86,7 +86,7 @@ impl Clock {
     /// From now on it sends only what it is asked for with [`Clock::poll_in`], and goes by the rules of time slots. The interval is the cycle.
     /// For a clock that is new: it listens first, whatever its page says.
     pub fn in_slots(mut self, settings: InSlots) -> Self {
-        self.election.asks_after(JOINING_SYNCS.into(), settings.slot_every_ns);
+        self.election.asks_after(JOINING_SYNCS.into(), settings.asks_every_ns);
         // Who hears nobody begins its terms anew, but not those of an earlier life, by which others may still go: a reign lasts longer than
         // a millisecond.
         if self.line.record().epoch > 0 {

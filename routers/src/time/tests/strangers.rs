@@ -83,7 +83,7 @@ proptest! {
         let mut now_ns = 1_000_000_000;
         let mut clock = Clock::new(settings(), now_ns, 1_790_000_000_000_000_000, None);
         if in_slots {
-            clock = clock.in_slots(InSlots { warm_ups: true, replies_in_synchronisation: false, delay_max_ns: 30_000, allowance_ns: 60_000, slot_every_ns: 5_000_000, hello_every_ns: 20_000_000 });
+            clock = clock.in_slots(InSlots { warm_ups: true, replies_in_synchronisation: false, delay_max_ns: 30_000, allowance_ns: 60_000, slot_every_ns: 5_000_000, asks_every_ns: 5_000_000, hello_every_ns: 20_000_000 });
         }
         let mut last = clock.reading(now_ns).time;
         for (message, from, waits_ns, came_before_ns) in told {

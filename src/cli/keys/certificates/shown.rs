@@ -20,7 +20,7 @@ pub(in crate::cli::keys) fn show(installation: &Installation) -> Vec<String> {
     let mut lines = vec![match &known {
         Err(_) if !certificate.exists() => format!("{}: is missing; {MAKES}", certificate.display()),
         Err(error) => error.to_string(),
-        Ok(_) => format!("{}: is there", certificate.display()),
+        Ok(_) => format!("{}: is there{}", certificate.display(), lasts(&certificate, "keys rotate --authority")),
     }];
     lines.push(match &known {
         _ if !secret.exists() => format!("{}: is not here; whoever makes certificates needs it", secret.display()),
@@ -32,7 +32,7 @@ pub(in crate::cli::keys) fn show(installation: &Installation) -> Vec<String> {
     for holder in holders(installation) {
         let state = state(&folder, known.as_ref().ok(), &holder);
         lines.extend(files(&folder, &holder.file_name()).map(|file| match state {
-            State::Holds => format!("{}: is there{}", file.display(), lasts(&file)),
+            State::Holds => format!("{}: is there{}", file.display(), lasts(&file, "keys rotate")),
             State::Missing if file.exists() => format!("{}: is there without the other file; {MAKES}", file.display()),
             State::Missing => format!("{}: is missing; {MAKES}", file.display()),
             State::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
@@ -44,16 +44,18 @@ pub(in crate::cli::keys) fn show(installation: &Installation) -> Vec<String> {
     lines
 }
 
-/// For how long a certificate holds that holds now; nothing of what is no certificate.
-fn lasts(file: &Path) -> String {
+/// For how long a certificate holds that holds now, and what `renews` it; nothing of what is no certificate.
+fn lasts(file: &Path, renews: &str) -> String {
     let now_s = realtime_ns() / 1_000_000_000;
-    holds_until_s(file).map_or_else(String::new, |until_s| text(until_s, until_s.saturating_sub(now_s) / DAY.as_secs()))
+    holds_until_s(file)
+        .map_or_else(String::new, |until_s| text(until_s, until_s.saturating_sub(now_s) / DAY.as_secs(), renews))
 }
 
-fn text(until_s: u64, days: u64) -> String {
+fn text(until_s: u64, days: u64, renews: &str) -> String {
     let until = date_time_ymd(1970, 1, 1) + Duration::from_secs(until_s);
     let left = if days == 1 { "1 day".into() } else { format!("{days} days") };
-    let warning = if days < SOON_DAYS { "; soon it does not: `rohrpost keys rotate` makes new ones" } else { "" };
+    let warning = format!("; soon it does not: `rohrpost {renews}` makes new ones");
+    let warning = if days < SOON_DAYS { warning } else { String::new() };
     format!(", holds for {left}, until {}{warning}", until.date())
 }
 
@@ -64,9 +66,9 @@ mod tests {
     #[test]
     fn what_ends_within_thirty_days_is_warned_of() {
         const UNTIL_S: u64 = 1_795_252_380;
-        assert_eq!(text(UNTIL_S, 30), ", holds for 30 days, until 2026-11-21");
+        assert_eq!(text(UNTIL_S, 30, "keys rotate"), ", holds for 30 days, until 2026-11-21");
         assert_eq!(
-            text(UNTIL_S, 1),
+            text(UNTIL_S, 1, "keys rotate"),
             ", holds for 1 day, until 2026-11-21; soon it does not: `rohrpost keys rotate` makes new ones"
         );
     }
