@@ -270,12 +270,10 @@ fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
 fn a_call_to_all_systems_has_the_first_answer_and_no_fault_of_one_of_them() {
     let mut ground = ground();
     let everywhere = Name::new(rohrpost_mailbox::ALL_SYSTEMS, 200, 1, 0);
-    // Somebody has to take what goes there.
-    let node = ground.node.clone();
-    let all = Participant::join(&node, everywhere).unwrap().receiver(everywhere, Shape::default());
-    let mut all = all.unwrap();
+    // What goes there some client takes.
+    ground.node.set_routes_beyond(OTHER, &[(everywhere, everywhere)]).unwrap();
     let sequence = ground.begin(everywhere, 7, LONG).unwrap();
-    let command = take(&mut all);
+    let command = take(&mut ground.other);
     let (incarnation, fault) = (command.envelope.incarnation, postcard::to_stdvec(&Fault::NoMailbox).unwrap());
     ground.answer_as(Name::new(2, 200, 1, 0), incarnation, sequence, Options::ERROR, &fault);
     // Another module is nobody whom it has called.
