@@ -158,7 +158,7 @@ fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
     drawing.has("/modules/pilot.0", 1..=8);
     let robot = drawing.said.split("\ngui ").nth(2).and_then(|row| row.lines().next()).unwrap();
     let counts: Vec<u64> = robot.split_whitespace().map_while(|word| word.parse().ok()).collect();
-    let [meant, _, came, ..] = counts[..] else { panic!("{robot}") };
+    let [meant, _left, _replaced, came, ..] = counts[..] else { panic!("{robot}") };
     assert!(meant > 200 && came * 5 > meant * 4, "of some thousand a gap's are missing: {robot}");
 }
 
