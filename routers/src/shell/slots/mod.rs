@@ -406,9 +406,6 @@ impl Slots {
     /// `now_ns`: local; when it was found to fit.
     fn hand_over(&mut self, permit: &mut Permit, now_ns: u64, to: NodeIndex, bytes: usize) {
         let handed_ns = monotonic_ns();
-        if permit.is_late(now_ns, bytes) {
-            self.outbound.slot_left_out(handed_ns);
-        }
         let sent = self.wire.send_made(handed_ns, to, &mut self.datagram, bytes);
         if sent.is_err_and(super::Failure::is_loss) {
             self.outbound.unsent(&self.datagram[..bytes], &[], &mut self.answers);
@@ -416,6 +413,9 @@ impl Slots {
             // The usual way to the wire; where the call took longer it was perhaps kept up before that.
             let (usual_ns, _) = self.discipline.lead_ns();
             let to_wire_ns = usual_ns.max(monotonic_ns().saturating_sub(handed_ns));
+            if permit.is_late(now_ns + (to_wire_ns - usual_ns), bytes) {
+                self.outbound.slot_left_out(handed_ns);
+            }
             self.outbound.sent(handed_ns + permit.arrives_after_ns(now_ns, bytes, to_wire_ns));
         }
         permit.takes(now_ns, bytes);
