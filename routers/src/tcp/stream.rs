@@ -219,10 +219,12 @@ mod tests {
     #[test]
     fn a_connection_that_was_slow_for_a_while_is_not_taken_for_slow_when_it_is_fast_again() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let mut stream = Stream::connect(listener.local_addr().unwrap(), None).unwrap();
+        let stream = Stream::connect(listener.local_addr().unwrap(), None).unwrap();
         let (mut far, _) = listener.accept().unwrap();
         let is_fast = AtomicBool::new(false);
         std::thread::scope(|scope| {
+            // Whatever fails, it is closed before the reader is waited for.
+            let mut stream = stream;
             scope.spawn(|| {
                 let mut taken = vec![0; 64 * 1024];
                 while !is_fast.load(Ordering::Relaxed) {
