@@ -158,8 +158,11 @@ pub struct Exchange {
     pub packages: u64,
     /// Commands that were sent again, since the answer was long in coming.
     pub repeated: u64,
-    /// Packages of data that should have come and did not (gaps in their numbers), or calls to which the other one gave no answer.
+    /// Packages of data that should have come and did not (gaps in their numbers), or calls to which the other one gave no answer:
+    /// not in their time, and (of the last 64 that were given up) not until now.
     pub lost: u64,
+    /// Calls that were given up, and answered when their time was over. None of data.
+    pub late: u64,
 }
 
 /// Some of those with whom a module exchanges something.

@@ -116,7 +116,7 @@ fn only_its_own_answer_ends_a_call() {
 }
 
 #[test]
-fn late_answers_and_those_to_forgotten_calls_are_dropped() {
+fn late_answers_are_counted_and_those_to_forgotten_calls_are_dropped() {
     let mut ground = ground();
     let late = ground.begin(SERVER, 1, Duration::from_millis(3)).unwrap();
     assert!(matches!(ground.wait(late), Err(CallError::Timeout(SERVER, _))));
@@ -126,6 +126,15 @@ fn late_answers_and_those_to_forgotten_calls_are_dropped() {
     while let Some(package) = ground.server.try_receive() {
         seen.push(CallEnvelope::split(package.body()).unwrap().0);
     }
+    let counts = |ground: &Ground| {
+        let [tally] = ground.link.tallies() else { panic!("{:?}", ground.link.tallies()) };
+        (tally.calls, tally.unanswered, tally.late)
+    };
+    assert_eq!(counts(&ground), (1, 1, 0), "one has ended, without an answer");
+    let refused = postcard::to_stdvec(&Fault::RouterFull).unwrap();
+    ground.answer_as(SERVER, seen[0].incarnation, seen[0].sequence, Options::ERROR, &refused);
+    ground.link.collect();
+    assert_eq!(counts(&ground), (1, 1, 0), "that one try was refused is no answer");
     for envelope in &seen {
         ground.answer_as(SERVER, envelope.incarnation, envelope.sequence, Options::default(), &[9]);
     }
@@ -138,6 +147,7 @@ fn late_answers_and_those_to_forgotten_calls_are_dropped() {
     let command = take(&mut ground.server);
     ground.answer(&command, &[30]);
     assert_eq!(ground.wait(call).unwrap(), 30);
+    assert_eq!(counts(&ground), (2, 0, 1), "the late one was answered after all");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::absent::Absent;
 use super::envelope::micros;
+use super::tally::{Ending, Tallies, Tally};
 use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type};
 use std::cell::RefCell;
@@ -31,7 +32,7 @@ pub struct Link {
     senders: Vec<Sender>,
     absent: Absent,
     calls: Vec<Call>,
-    tallies: Vec<Tally>,
+    tallies: Tallies,
     /// Buffers of calls that are over, to be used again.
     spare: Vec<Vec<u8>>,
     next_sequence: u32,
@@ -54,25 +55,10 @@ struct Call {
     answer: Option<Head>,
 }
 
-impl Call {
-    /// Whether who answers was called: itself, or that name in all systems, of which the first that answers counts.
-    fn is_to(&self, from: Name) -> bool {
-        let (to, from) = (self.to.module(), from.module());
-        to == from || to == Name::new(ALL_SYSTEMS, from.class().0, from.instance(), 0)
-    }
-}
-
-/// What came of the calls of one module.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Tally {
-    /// Who was called.
-    pub(crate) to: Name,
-    /// Calls that have ended.
-    pub(crate) calls: u64,
-    /// Commands that were sent again.
-    pub(crate) repeated: u64,
-    /// Calls that ended without an answer of who was called.
-    pub(crate) unanswered: u64,
+/// Whether who answers was called: itself, or that name in all systems, of which the first that answers counts.
+fn is_to(to: Name, from: Name) -> bool {
+    let (to, from) = (to.module(), from.module());
+    to == from || to == Name::new(ALL_SYSTEMS, from.class().0, from.instance(), 0)
 }
 
 impl Link {
@@ -88,7 +74,7 @@ impl Link {
             senders: Vec::new(),
             absent: Absent::default(),
             calls: Vec::new(),
-            tallies: Vec::new(),
+            tallies: Tallies::default(),
             spare: Vec::new(),
             // Sequence numbers may begin anywhere; from 1 they are easier to read.
             next_sequence: 1,
@@ -221,10 +207,9 @@ impl Link {
             Err(error) => {
                 self.spare.push(call.body);
                 // One whose server is not there is none of the calls that should have had an answer.
-                let is_lost = matches!(error, SendError::Full(_));
-                let tally = self.tally(to);
-                (tally.calls, tally.unanswered) =
-                    (tally.calls + u64::from(is_lost), tally.unanswered + u64::from(is_lost));
+                if matches!(error, SendError::Full(_)) {
+                    self.tallies.ended(sequence, to, Ending::Refused);
+                }
                 Err(error.into())
             }
         }
@@ -301,31 +286,19 @@ impl Link {
             },
             Some(_) => read(&call.body).map_err(|error| CallError::BadReply(call.to, error.to_string())),
         };
-        let unanswered = match &result {
-            Err(CallError::Timeout(..)) => true,
-            Err(CallError::Fault(_, fault)) => fault.is_of_this_try(),
-            _ => false,
+        let ending = match &result {
+            Err(CallError::Timeout(..)) => Ending::Overdue,
+            Err(CallError::Fault(_, fault)) => Ending::by(fault),
+            _ => Ending::Answered,
         };
-        let tally = self.tally(call.to);
-        tally.calls += 1;
-        tally.unanswered += u64::from(unanswered);
+        self.tallies.ended(call.sequence, call.to, ending);
         self.spare.push(call.body);
         result
     }
 
-    /// Where calls of this module are counted.
-    fn tally(&mut self, to: Name) -> &mut Tally {
-        let to = to.module();
-        let at = self.tallies.iter().position(|tally| tally.to == to).unwrap_or_else(|| {
-            self.tallies.push(Tally { to, calls: 0, repeated: 0, unanswered: 0 });
-            self.tallies.len() - 1
-        });
-        &mut self.tallies[at]
-    }
-
     /// Whom it has called, and what came of it.
-    pub(crate) fn tallies(&self) -> &[Tally] {
-        &self.tallies
+    pub fn tallies(&self) -> &[Tally] {
+        self.tallies.all()
     }
 
     /// Gives a call up; its answer, should it come, is dropped.
@@ -335,28 +308,33 @@ impl Link {
         }
     }
 
-    /// Moves the answers that have come to their calls. Answers to nobody (late, or to an earlier life) are dropped.
+    /// Moves the answers that have come to their calls. Late ones are counted, all others to nobody (to an earlier life) are dropped.
     pub fn collect(&mut self) {
         for _ in 0..BURST {
             let Some(package) = self.replies.try_receive() else { return };
             let head = package.head();
             let Ok((envelope, result)) = ReplyEnvelope::split(package.body()) else { continue };
+            if envelope.incarnation != self.incarnation {
+                continue;
+            }
             // The sequence number, not the 16-bit id, tells calls apart: ids wrap.
             let its = |call: &&mut Call| {
                 call.sequence == envelope.sequence
-                    && call.is_to(head.from)
+                    && is_to(call.to, head.from)
                     && head.kind.0 == -call.label.kind.0
                     && call.answer.is_none()
             };
-            let call = self.calls.iter_mut().find(its).filter(|_| envelope.incarnation == self.incarnation);
-            // One try that was refused says nothing of the others that are under way, nor one system of others.
-            let is_one_of_many = |call: &Call| call.repeated || call.to.system() == ALL_SYSTEMS;
-            let refused =
-                |call: &Call| is_one_of_many(call) && head.options.has(Options::ERROR) && is_of_one_try(result);
-            if let Some(call) = call.filter(|call| !refused(call)) {
-                call.answer = Some(*head);
-                call.body.clear();
-                call.body.extend_from_slice(result);
+            let of_one_try = head.options.has(Options::ERROR) && is_of_one_try(result);
+            match self.calls.iter_mut().find(its) {
+                // One try that was refused says nothing of the others that are under way, nor one system of others.
+                Some(call) if of_one_try && (call.repeated || call.to.system() == ALL_SYSTEMS) => {}
+                Some(call) => {
+                    call.answer = Some(*head);
+                    call.body.clear();
+                    call.body.extend_from_slice(result);
+                }
+                None if of_one_try => {}
+                None => self.tallies.came_late(envelope.sequence, |to| is_to(to, head.from)),
             }
         }
     }
@@ -373,7 +351,7 @@ impl Link {
         // A repeat that cannot be sent is as good as one that was lost: the next one, or the timeout, takes care.
         let _ = self.send(to, &label, &[&body]);
         self.calls[at].body = body;
-        self.tally(to).repeated += 1;
+        self.tallies.repeated(to);
     }
 }
 

@@ -1,15 +1,17 @@
 //! Calls: a command with an envelope, its reply, and what may go wrong between.
 //!
-//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side.
+//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side, `tally` counts what came of its calls.
 
 mod absent;
 mod envelope;
 mod error;
 mod link;
 mod once;
+mod tally;
 
 pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope};
 pub use error::{CallError, Fault};
 pub use link::{CALLS_MAX, Caller, Link, Pending};
 pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, TRANSIT_MAX, Verdict, WINDOW};
+pub use tally::Tally;

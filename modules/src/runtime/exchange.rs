@@ -7,13 +7,16 @@ use rohrpost_mailbox::Name;
 /// From this one on: first the data that it follows, then those that it calls.
 pub(super) fn page(context: &Context, from: u16) -> ExchangePage {
     let named = |module: Name| context.installation.classes.format(module);
-    let link = context.link.borrow();
+    let mut link = context.link.borrow_mut();
+    // Answers that nobody waits for any more.
+    link.collect();
     let followed = context.followings.tallies().map(|(publisher, number, came, lost)| Exchange {
         module: named(publisher),
         data: Some(number),
         packages: came,
         repeated: 0,
         lost,
+        late: 0,
     });
     let called = link.tallies().iter().map(|tally| Exchange {
         module: named(tally.to),
@@ -21,6 +24,7 @@ pub(super) fn page(context: &Context, from: u16) -> ExchangePage {
         packages: tally.calls,
         repeated: tally.repeated,
         lost: tally.unanswered,
+        late: tally.late,
     });
     let all: Vec<Exchange> = followed.chain(called).collect();
     let total = u16::try_from(all.len()).unwrap_or(u16::MAX);

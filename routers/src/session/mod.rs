@@ -15,6 +15,7 @@
 pub mod client;
 mod counts;
 pub mod frame;
+mod ledger;
 mod outgoing;
 mod reckoning;
 pub mod server;

@@ -5,6 +5,11 @@ use rohrpost::common::Exchange;
 use rohrpost::config::{Flow, Installation};
 use rohrpost::{Name, ToolLink};
 use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// How long an answer that is overdue is waited for, and how often it is asked for.
+const OVERDUE: Duration = Duration::from_secs(1);
+const AGAIN: Duration = Duration::from_millis(50);
 
 /// What modules say of their exchange with others.
 pub(super) struct Losses {
@@ -12,8 +17,21 @@ pub(super) struct Losses {
 }
 
 impl Losses {
-    /// Asks both ends of each declared flow. One that does not answer was told of elsewhere.
+    /// Asks both ends of each declared flow. One that does not answer was told of elsewhere. A call that was given up a moment ago may yet
+    /// be answered: that is waited for a little.
     pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Self {
+        let until = Instant::now() + OVERDUE;
+        loop {
+            let losses = Self::ask_once(installation, tool);
+            let calls = losses.told.values().flatten().filter(|exchange| exchange.data.is_none());
+            if calls.map(|exchange| exchange.lost).sum::<u64>() == 0 || Instant::now() > until {
+                return losses;
+            }
+            std::thread::sleep(AGAIN);
+        }
+    }
+
+    fn ask_once(installation: &Installation, tool: &mut ToolLink) -> Self {
         let ends = installation.flows.iter().flat_map(|flow| [flow.from, flow.to]);
         let mut told = BTreeMap::new();
         for module in ends {
@@ -29,20 +47,21 @@ impl Losses {
     /// A row for each kind of package that each declared flow between nodes carries.
     pub(super) fn table(&self, installation: &Installation) -> String {
         let name = |name| installation.classes.format(name);
-        let mut rows: Vec<[String; 5]> = Vec::new();
+        let mut rows: Vec<[String; 6]> = Vec::new();
         let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
         for flow in installation.flows.iter().filter(crosses) {
             let between = format!("{} → {}", name(flow.from), name(flow.to));
             for (what, exchange) in self.of(installation, flow) {
-                let Exchange { packages, repeated, lost, data, .. } = exchange;
-                let again = if data.is_some() { "-".into() } else { repeated.to_string() };
-                rows.push([between.clone(), what.into(), packages.to_string(), again, lost.to_string()]);
+                let of_calls = |count: u64| if exchange.data.is_some() { "-".into() } else { count.to_string() };
+                let [again, late] = [exchange.repeated, exchange.late].map(of_calls);
+                let [packages, lost] = [exchange.packages, exchange.lost].map(|count| count.to_string());
+                rows.push([between.clone(), what.into(), packages, again, late, lost]);
             }
         }
         rows.sort_unstable();
         // Several flows may be declared between the same two.
         rows.dedup();
-        table(["flow", "what", ">packages", ">sent again", ">lost"], rows)
+        table(["flow", "what", ">packages", ">sent again", ">too late", ">lost"], rows)
     }
 
     fn of<'a>(

@@ -125,7 +125,7 @@ fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, boo
             &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
     }
     if !installation.flows.is_empty() {
-        text += "\nDeclared flows from end to end, as the modules themselves have counted:\n\n";
+        text += "\nDeclared flows from end to end, as the modules themselves have counted; too late: answered, but after the caller's time:\n\n";
         text += &losses.table(installation);
     }
     text += &format!("\n{balance}\n{clocks}");

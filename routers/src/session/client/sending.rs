@@ -2,11 +2,12 @@
 
 use super::{Client, Host, Package, Registration, State};
 use crate::report::NotDelivered;
-use crate::session::counts::{Cause, Counts};
+use crate::session::counts::Cause;
 use crate::session::frame::{Carried, Message, Ranges};
+use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
-use crate::session::{Answers, WAIT_MAX_NS, answer_to, without_hurry};
-use rohrpost_mailbox::{Head, Name, Priority};
+use crate::session::{WAIT_MAX_NS, without_hurry};
+use rohrpost_mailbox::{Name, Priority};
 
 impl Client {
     /// A package is to go to the server.
@@ -79,33 +80,11 @@ impl Client {
         host: &mut H,
         work: impl FnOnce(&mut Outgoing, &mut Ledger<'_, H>),
     ) {
-        let mut ledger = Ledger { counts: &self.out, host: &mut *host, answers: Vec::new() };
+        let mut ledger = Ledger::new(&self.out, &mut *host, None);
         work(&mut self.outgoing, &mut ledger);
-        for (head, body) in ledger.answers {
+        for (head, body) in ledger.into_answers() {
             // Who has gone, or takes no more answers, waits for its timeout.
             let _ = host.deliver(&Carried { hops: 0, published_ns: now_ns, head, body: &body });
         }
-    }
-}
-
-/// What becomes of packages that leave.
-pub(super) struct Ledger<'a, H> {
-    counts: &'a Counts,
-    host: &'a mut H,
-    answers: Vec<(Head, Vec<u8>)>,
-}
-
-impl<H: Answers> Fates for Ledger<'_, H> {
-    fn passed(&mut self, head: &Head) {
-        self.counts.passed(head.priority);
-    }
-
-    fn replaced(&mut self, head: &Head) {
-        self.counts.replaced(head.priority);
-    }
-
-    fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
-        self.counts.lost(head.priority, cause);
-        self.answers.extend(answer_to(head, body, cause, None, self.host));
     }
 }

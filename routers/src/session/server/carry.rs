@@ -3,35 +3,12 @@
 use super::member::{Asked, Member, RoundTrip};
 use super::{Host, Server};
 use crate::broken::broken;
-use crate::session::counts::{Cause, Counts};
+use crate::session::counts::Cause;
 use crate::session::frame::{Carried, HOPS_MAX, Message, Refusal, TimeAnswer, VERSION, Verdict, Welcome};
-use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
-use crate::session::{Answers, ClientIndex, answer_to, in_system, without_hurry};
+use crate::session::ledger::Ledger;
+use crate::session::outgoing::{Outgoing, Parcel, is_stale};
+use crate::session::{ClientIndex, answer_to, in_system, without_hurry};
 use rohrpost_mailbox::{ALL_SYSTEMS, ERROR_UNKNOWN_NS, Head, Name, TimeRecord};
-
-/// What becomes of packages for one client: counted, and the answers that are due.
-pub(super) struct Ledger<'a, H> {
-    counts: &'a Counts,
-    host: &'a mut H,
-    /// For whom they were.
-    holder: &'a str,
-    answers: Vec<(Head, Vec<u8>)>,
-}
-
-impl<H: Answers> Fates for Ledger<'_, H> {
-    fn passed(&mut self, head: &Head) {
-        self.counts.passed(head.priority);
-    }
-
-    fn replaced(&mut self, head: &Head) {
-        self.counts.replaced(head.priority);
-    }
-
-    fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
-        self.counts.lost(head.priority, cause);
-        self.answers.extend(answer_to(head, body, cause, Some(self.holder), self.host));
-    }
-}
 
 impl Server {
     /// Hands a package of a client on.
@@ -146,9 +123,9 @@ impl Server {
     ) {
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return };
         let Member { outgoing, name, .. } = &mut **member;
-        let mut ledger = Ledger { counts: &self.counts, host: &mut *host, holder: name, answers: Vec::new() };
+        let mut ledger = Ledger::new(&self.counts, &mut *host, Some(name));
         work(outgoing, &mut ledger);
-        let answers = ledger.answers;
+        let answers = ledger.into_answers();
         self.say_all(now_ns, answers, host);
     }
 
