@@ -23,15 +23,15 @@ fn kills() -> usize {
     std::env::var("ROHRPOST_KILLS").ok().map_or(3, |kills| kills.parse().unwrap())
 }
 
-/// What came for a router that is not there waits in the kernel, and is too old for anybody 400 ms later: a computer that is so busy that its
-/// next life takes that long may lose data.
-const BACK_MS: f64 = 300.0;
+/// What waits for longer than a second is given up, and what came for a router that is not there is too old for anybody after 400 ms. A router that is
+/// killed is back in its slots long before, but not where most of the slots are left out: at 28 of 100 taken by the hypervisor it is 40 to 75 of 100.
+const LEFT_OUT_MAX: f64 = 0.33;
 
 /// What a router has taken for a slot just then dies with it: that is in its hands for less than a thousandth of the time.
 fn assert_kept(said: &str, kills: usize) {
     let lost: u64 = losses(said).sum();
-    if let Some(slowest) = outages_ms(said).into_iter().find(|outage| *outage > BACK_MS) {
-        println!("a router was there again after {slowest} ms only; {lost} lost, whatever the reason");
+    if is_starved(said) {
+        println!("{lost} lost by {kills} kills");
         return;
     }
     assert!(lost <= kills.div_ceil(20) as u64, "{lost} lost by {kills} kills:\n{said}");
@@ -48,19 +48,26 @@ fn assert_lost_of(said: &str, part: u64) {
     }
 }
 
-/// How long each router that died was away, ms.
-fn outages_ms(said: &str) -> Vec<f64> {
-    let outage = |text: &str| {
-        let (number, unit) = text.split_once(' ').unwrap_or_else(|| panic!("{text}"));
-        let number: f64 = number.parse().unwrap_or_else(|_| panic!("{text}"));
-        match unit {
-            "ms" => number,
-            "s" => 1e3 * number,
-            _ => panic!("{text}: which unit?"),
-        }
-    };
-    let parts = said.split("there again ").skip(1).filter_map(|rest| rest.split_once(" later"));
-    parts.map(|(text, _)| outage(text)).collect()
+/// Whether this computer had not enough time for its slots; then what is lost says nothing about takeovers.
+fn is_starved(said: &str) -> bool {
+    let (mut kept, mut left_out) = (0, 0);
+    for node in NODES {
+        let figures: Vec<u64> = slots_of(said, node).split_whitespace().map_while(|text| text.parse().ok()).collect();
+        let [used, empty, late, skipped, silent, ..] = figures[..] else { panic!("{node}: {figures:?}\n{said}") };
+        (kept, left_out) = (kept + used + empty, left_out + late + skipped + silent);
+    }
+    let share = left_out as f64 / (kept + left_out) as f64;
+    let is_starved = share > LEFT_OUT_MAX;
+    if is_starved {
+        println!("this computer is too busy for time slots: {:.0} of 100 were left out", 100.0 * share);
+    }
+    is_starved
+}
+
+/// A node's line of the table of slots, without its name.
+fn slots_of<'a>(said: &'a str, node: &str) -> &'a str {
+    let slots = said.split("In time slots").nth(1).unwrap_or_else(|| panic!("no slots:\n{said}"));
+    slots.lines().find_map(|line| line.strip_prefix(node)).unwrap_or_else(|| panic!("no {node}:\n{said}"))
 }
 
 /// The last column of the flows' table.
@@ -172,12 +179,13 @@ fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
     {
         assert!(out.contains(words), "no `{words}`:\n{out}");
     }
-    let slots = out.split("In time slots").nth(1).unwrap();
     for node in NODES {
-        let row = slots.lines().find_map(|line| line.strip_prefix(node)).unwrap_or_else(|| panic!("no {node}:\n{out}"));
+        let row = slots_of(&out, node);
         assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
     }
-    // A second of eight.
-    assert_lost_of(&out, 8);
+    if !is_starved(&out) {
+        // A second of eight.
+        assert_lost_of(&out, 8);
+    }
     place.assert_empty();
 }
