@@ -13,7 +13,9 @@ use std::process::{Command, ExitCode};
 
 /// All tests.
 pub(crate) fn test() -> Result<ExitCode, Failure> {
-    cargo::run("testing all but the GUI bridge", &mut cargo(&["test", "--workspace", "--exclude", BRIDGE]))?;
+    // All of them, so that one run says all that fails.
+    let all = ["test", "--workspace", "--exclude", BRIDGE, "--no-fail-fast"];
+    cargo::run("testing all but the GUI bridge", &mut cargo(&all))?;
     tsan::run()?;
     fuzz::short()?;
     let bridge = ["--profile", BRIDGE_PROFILE, "--package", BRIDGE];
