@@ -10,7 +10,7 @@ fn graph_shows_who_sends_what_to_whom() {
     let place = Place::new();
     let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
     let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));
-    let mut send = Running::start(place.command(&["send", "probe.0", "count", "5", "--rate", "50"]));
+    let mut send = Running::start(place.command(&["send", "probe.0", "count", "5", "--rate", "10"]));
     echo.wait_for("\n");
     wait("it counts", || (!place.counted().is_empty()).then_some(()));
     let graph = wait("both are in the graph", || {

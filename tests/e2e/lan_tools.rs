@@ -1,6 +1,6 @@
 //! Every tool works for any module on any node, from any node; a node that is silent is told as such, and nobody waits for it.
 
-use crate::harness::{NETWORK, OUTPUT, Place, Robot, halt, probe, signal, wait};
+use crate::harness::{NETWORK, OUTPUT, Place, Robot, halt, patient, probe, signal, wait};
 use crate::lan::addresses;
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
@@ -55,7 +55,7 @@ impl Two {
 
     /// From this node.
     fn say_at(&self, node: &str, arguments: &[&str]) -> Said {
-        self.place.say(&[arguments, &["--node", node]].concat())
+        self.place.say(&[&patient(arguments)[..], &["--node", node]].concat())
     }
 
     fn stop(self) {
@@ -147,7 +147,9 @@ fn figures_of_another_node_are_as_those_of_ones_own() {
     // Into its data mailbox; what goes to one of its own is no data of which a graph knows the name.
     assert!((10.0..65.0).contains(&per_s), "{per_s}");
     assert_eq!(module(&graph, "probe.1")["node"], "arm");
-    assert!(two.say(&["graph", "--seconds", "0.2", "--svg"]).ok().contains("on arm"));
+    wait("something of the arm is drawn", || {
+        two.say(&["graph", "--seconds", "0.2", "--svg"]).ok().contains("on arm").then_some(())
+    });
     two.stop();
 }
 
@@ -159,7 +161,7 @@ fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
         assert_eq!(called, format!("{count}\n"));
         assert_eq!(two.say_at(node, &["echo", "probe.1", "beat", "--count", "2"]).ok().lines().count(), 2);
         let sent = two.say_at(node, &["send", "probe.1", "count_again", "1", "--count", "3", "--rate", "50"]).ok();
-        assert_eq!(sent, "3 sent, 3 answered\n");
+        assert!(sent.starts_with("3 sent, 3 answered"), "what a busy computer left out is told, too: {sent}");
         let ping = two.say_at(node, &["ping", "probe.1", "-c", "2", "--interval", "0", "--json"]).ok();
         let ping: Value = serde_json::from_str(ping.lines().last().unwrap()).unwrap();
         assert_eq!(ping["answered"], 2);
@@ -171,7 +173,7 @@ fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
     }
     // What a module on `arm` says, the collector on `base` has.
     let line = |from: &str| {
-        let log = two.say_at(from, &["log", "--module", "probe.1"]).ok();
+        let log = two.say_at(from, &["log", "--module", "probe.1"]).out;
         log.lines().any(|line| line.contains("arm/probe.1: far away")).then_some(())
     };
     two.say(&["call", "probe.1", "say", "info", "far away"]).ok();

@@ -43,6 +43,7 @@ mod process;
 mod readme;
 mod restart;
 mod screen;
+mod stalls;
 mod start;
 mod subscribe;
 mod systems;

@@ -13,7 +13,7 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
         place.launched(&[&probe("probe.0", "rate-hz = 50.0", "restart = { policy = \"never\" }")]);
     let text = place.say(&["hz", "probe.0", "--count", "1"]).ok();
     let [beat, silence, blob] = text.lines().collect::<Vec<_>>()[..] else { panic!("{text}") };
-    assert!(beat.starts_with("beat     ") && beat.contains(" Hz  mean ") && beat.ends_with(" values"), "{text}");
+    assert!(beat.starts_with("beat     ") && beat.contains(" Hz  mean ") && beat.contains(" values"), "{text}");
     assert!(silence.contains("never published; `rohrpost status` tells"), "{text}");
     assert!(blob.starts_with("blob     "), "{text}");
     for (arguments, error) in [

@@ -77,7 +77,7 @@ fn a_set_value_is_what_the_module_works_with_and_is_told() {
     }
     wait_for(&place, " 0 1 16 StraightAhead false grüß dich [gain gain far-m side look label]");
     let log = wait("the change is told", || {
-        let log = place.say(&["log", "--module", "probe.0"]).ok();
+        let log = place.say(&["log", "--module", "probe.0"]).out;
         log.contains("label: ").then_some(log)
     });
     assert!(log.contains("probe.0: far-m: 9 -> 16 m (by tool."), "{log}");

@@ -124,7 +124,7 @@ fn lines_of_a_module_that_fails_reach_the_log() {
     launch.wait_for("probe.0 ended with 3; starts again in 50ms");
     robot.wait_restarted("probe.0", pid);
     wait("it says twice that it is on", || {
-        let text = place.say(&["log", "--module", "probe.0"]).ok();
+        let text = place.say(&["log", "--module", "probe.0"]).out;
         (text.matches("is on").count() == 2).then_some(())
     });
 }

@@ -298,12 +298,17 @@ impl Robot {
     /// The median lateness of so many beats, ns.
     pub(crate) fn window(&mut self, beats: u64) -> u64 {
         self.take();
-        // Not asked meanwhile: asking is work, too.
-        std::thread::sleep(BEAT * u32::try_from(beats).unwrap());
-        let times = self.take();
-        assert_eq!(times.lost, 0, "the robot has lost beats");
-        assert!(times.beats > 0, "no beat came");
-        times.p50_ns
+        // A computer that stands still for a window brings no beat in it.
+        for _ in 0..10 {
+            // Not asked meanwhile: asking is work, too.
+            std::thread::sleep(BEAT * u32::try_from(beats).unwrap());
+            let times = self.take();
+            assert_eq!(times.lost, 0, "the robot has lost beats");
+            if times.beats > 0 {
+                return times.p50_ns;
+            }
+        }
+        panic!("no beat came in ten windows");
     }
 
     /// A function of the bridge's that gives a structure of numbers.
