@@ -54,8 +54,8 @@ fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
     }
     let clock: Vec<&Map<String, Value>> = rows.iter().filter(|row| row["case"] == "clock").collect();
     assert_eq!(clock.iter().filter(|row| row["who"] == "rohrpost" && row["vs"].is_string()).count(), 3, "{clock:?}");
-    // A network between two nodes of one computer that are not busy loses nothing.
-    for row in rows.iter().filter(|row| row["unit"] == "%") {
+    // A network between two nodes of one computer that are not busy loses nothing; of what nobody paces the kernel's buffers may.
+    for row in rows.iter().filter(|row| row["unit"] == "%" && row["who"] != "udp") {
         assert_eq!(row["p50"], 0.0, "{row:?}");
     }
     assert_eq!(left_behind(&prefix), [""; 0]);

@@ -27,6 +27,8 @@ const ALL: [u8; 3] = [0, 1, 2];
 const FAST_PPB: i64 = 200_000;
 /// When they are so far from each other, the windows of the one lie in those of others by the other.
 const APART_NS: u64 = 1_300_000;
+/// So many frames of the one lie outside of their slots by the time of the other, before the network is one again.
+const FOREIGN: usize = 40;
 /// So many cycles after the network is one again nobody sends any more by the time that is given up.
 const HEALED_CYCLES: u32 = 16;
 
@@ -104,7 +106,9 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         capture.so_far(|crossed| OTHERS.iter().all(|own| crossed.iter().any(|frame| frame.from == *own)))
     });
     talk(&segment, &mut ears, &OTHERS, 100);
-    segment.wait_until("the parts have two times", |_| capture.so_far(are_apart));
+    segment.wait_until("the parts have two times, and have sent by them", |_| {
+        capture.so_far(|crossed| are_apart(crossed) && judge(crossed, &time_of_others(crossed)).outside.len() > FOREIGN)
+    });
 
     segment.lab.unite(&[&name(LONELY)]).unwrap();
     let united_ns = monotonic_ns();
@@ -113,8 +117,8 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         let is_heard = |own: &u8| lonely.shell().stats().state(*own, monotonic_ns()) == State::Alive;
         lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
     });
+    segment.wait_until("it yields to who is followed", |segment| lonely(segment).master == Some(OTHERS[0]));
     talk(&segment, &mut ears, &ALL, 100);
-    assert_eq!(lonely(&segment).master, Some(OTHERS[0]), "it yields to who is followed");
     ends.store(true, Ordering::Relaxed);
     reader.join().unwrap();
 
@@ -128,8 +132,13 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         [before, &rest[rest.partition_point(|frame| frame.at_ns < healed_ns)..]]
     };
     let foreign = judge(before, &time).outside.len();
-    assert!(foreign > 20, "the parts had two times: {foreign} frames of {}", before.len());
-    let reigns = ahead_ns(after, LONELY, 0).count();
-    assert_eq!(reigns, 0, "there is one master");
+    assert!(foreign > FOREIGN / 2, "the parts had two times: {foreign} frames of {}", before.len());
+    if let Some((reigns_ns, _)) = ahead_ns(after, LONELY, 0).next() {
+        // By the true clock, some of these may be replacements: of a master that stood still.
+        let last_ns =
+            ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).rfind(|at_ns| *at_ns < reigns_ns).unwrap();
+        let silent_ns = reigns_ns - last_ns;
+        assert!(silent_ns > table().cycle.as_nanos() as u64, "there is one master, and it spoke {silent_ns} ns before");
+    }
     assert_kept("two parts that are one again", after, &time);
 }

@@ -117,6 +117,7 @@ impl Scene {
         self.wait_until_all_send();
         let all = [MASTERS[0], MASTERS[1], WITNESS];
         let mut mouths = mouths(&self.segment, &all);
+        self.ears.acquaint(&mut mouths);
         self.talk(&mut mouths, 0..20);
         self.ears.hear_all(&all, &(0..20).collect::<Vec<_>>());
     }

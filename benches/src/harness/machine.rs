@@ -26,7 +26,7 @@ impl Machine {
 
     /// Of the processors' time since `before`, so much was the hypervisor's, percent.
     pub fn steal_percent(&self, before: &Self) -> f64 {
-        (self.stolen - before.stolen) as f64 * 100.0 / (self.all - before.all).max(1) as f64
+        self.stolen.saturating_sub(before.stolen) as f64 * 100.0 / self.all.saturating_sub(before.all).max(1) as f64
     }
 
     /// So long these threads have waited for a processor since then, all together, ms.

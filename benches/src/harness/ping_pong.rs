@@ -19,6 +19,8 @@ const HEAD_START: Duration = Duration::from_millis(10);
 
 /// A turn that takes so much longer than its cap hangs, and is killed.
 const GRACE: Duration = Duration::from_secs(30);
+/// The second end has so long when the first has ended: the last word to it may be lost, which it has to notice itself.
+const SECOND_ENDS: Duration = Duration::from_secs(8);
 
 /// Which of the two ends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -205,7 +207,7 @@ pub fn time_two_processes<L: Link>(
     // An end that fails leaves the other waiting for ever: what the first one says counts.
     let (first, second) = if echo.has_ended()? { (echo, measure) } else { (measure, echo) };
     first.finish(deadline)?;
-    second.finish(deadline.min(Instant::now() + Duration::from_secs(3)))?;
+    second.finish(deadline.min(Instant::now() + SECOND_ENDS))?;
     Ok(turn.samples.all())
 }
 

@@ -33,7 +33,7 @@ const LOOK_EVERY: u64 = 61;
 /// The sender looks at the clock after so many.
 const CLOCK_EVERY: u64 = 16;
 /// After this silence nothing more is on its way.
-pub const SILENCE: Duration = Duration::from_millis(60);
+pub const SILENCE: Duration = Duration::from_millis(250);
 /// A turn that takes so much longer than its cap hangs, and is killed.
 const GRACE: Duration = Duration::from_secs(30);
 

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 /// So many cycles before and behind it are looked at.
 const CYCLES: u32 = 20;
+const SYNCHRONISED_WITHIN: Duration = Duration::from_secs(10);
 const TAKEN_OVER_WITHIN: Duration = Duration::from_secs(10);
 /// How often pages are read meanwhile.
 const LOOK_EACH: Duration = Duration::from_micros(500);
@@ -65,7 +66,14 @@ pub fn kill_master(
     let cycle = Duration::from_micros(plan.cycle_us);
     let first = capture.len();
     std::thread::sleep(cycle * CYCLES + cycle.mul_f64(part_of_cycle));
-    let dead = master(&capture.since(first)).ok_or_else(|| Failure::Failed("nobody synchronises".into()))?;
+    let (began, nobody) = (Instant::now(), || Failure::Failed("nobody synchronises".into()));
+    let dead = loop {
+        match master(&capture.since(first)) {
+            Some(dead) => break dead,
+            None if began.elapsed() > SYNCHRONISED_WITHIN => return Err(nobody()),
+            None => std::thread::sleep(cycle),
+        }
+    };
     let others: Vec<u8> = (0..NODES).filter(|node| *node != dead).collect();
     let clocks = others.iter().map(|node| routers.clock(*node)).collect::<Result<Vec<_>, Failure>>()?;
     let time = routers.clock(dead)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;

@@ -196,13 +196,17 @@ impl Lab {
     }
 
     /// Divides the network: these nodes reach each other, and so do the others, but none of these any of those. [`Lab::capture`] sees both
-    /// parts. Once in the life of a lab.
+    /// parts. Who was parted before stays parted, until [`Lab::unite`].
     ///
     /// # Errors
     /// As for [`Lab::cut`].
     pub fn divide(&self, nodes: &[&str]) -> Result<(), LabError> {
         let (mut hub, second) = (self.hub.netlink()?, FIRST_PORT + self.nodes.len() as Device);
-        told("make a second bridge", hub.add_bridge(second, "second", self.mtu))?;
+        match hub.add_bridge(second, "second", self.mtu) {
+            // Of an earlier division.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            made => told("make a second bridge", made)?,
+        }
         told("set the second bridge up", hub.set_up(second, true))?;
         self.move_to(nodes, second)
     }

@@ -29,7 +29,7 @@ pub(crate) struct Raw(pub(crate) TcpStream);
 
 impl Raw {
     pub(crate) fn new(server: SocketAddr, system: u8, common: u64) -> Self {
-        let mut raw = Self(TcpStream::connect(server).unwrap());
+        let mut raw = Self(wait("it listens", || TcpStream::connect(server).ok()));
         raw.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
         raw.say(&Message::Hello(hello(system, common)));
         raw
