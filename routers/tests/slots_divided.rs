@@ -6,6 +6,7 @@
 mod common;
 
 use common::process::{Router, be_a_router};
+use common::stalls::Stalls;
 use common::talk::{Ears, talk};
 use common::{Capture, Crossed, MASTERS, Segment, assert_kept, judge, name, table};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
@@ -98,7 +99,7 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
     segment.wait_until("the first is master", |_| capture.so_far(speaks));
     segment.lab.divide(&[&name(LONELY)]).unwrap();
     let _routers = OTHERS.map(|own| Router::start(&segment, own, PROCESS));
-    let mut ears = Ears::new(&segment);
+    let (mut ears, stalls) = (Ears::new(&segment), Stalls::watched());
     let lonely = |segment: &Segment| segment.stations[usize::from(LONELY)].clock();
     assert_eq!(lonely(&segment).role, Role::Master, "nobody disturbs it");
     // Where they may send to each other, their routers have begun.
@@ -140,5 +141,8 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         let silent_ns = reigns_ns - last_ns;
         assert!(silent_ns > table().cycle.as_nanos() as u64, "there is one master, and it spoke {silent_ns} ns before");
     }
-    assert_kept("two parts that are one again", after, &time);
+    // Where masters stand still there may be a third reign, whose time is another.
+    if !stalls.starved() {
+        assert_kept("two parts that are one again", after, &time);
+    }
 }

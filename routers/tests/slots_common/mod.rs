@@ -5,6 +5,7 @@
 pub(crate) mod hog;
 pub(crate) mod process;
 pub(crate) mod relay;
+pub(crate) mod stalls;
 pub(crate) mod talk;
 
 use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
