@@ -51,13 +51,22 @@ impl Shells {
         Ok(Self { members: members.collect::<Result<_, _>>()? })
     }
 
-    /// Until all follow the first one, and have measured enough.
+    /// Until all others follow one master, the first one or who took its place where that stood still, and have measured enough; who it is.
     ///
     /// # Errors
-    /// What the others show, if one does not.
-    pub fn await_settled(&self) -> Result<(), Failure> {
+    /// What they show, if one does not.
+    pub fn await_settled(&self) -> Result<u8, Failure> {
         let give_up = Instant::now() + SETTLES_WITHIN;
-        while !self.members.iter().skip(1).all(Member::is_settled) {
+        loop {
+            if let Some(master) = self.master()
+                && self
+                    .members
+                    .iter()
+                    .enumerate()
+                    .all(|(node, member)| node == usize::from(master) || member.is_settled())
+            {
+                return Ok(master);
+            }
             if Instant::now() > give_up {
                 let shells = self.members.iter().filter_map(|member| member.shell.as_ref()?.clock());
                 let seen: Vec<_> = shells.map(|clock| clock.snapshot()).collect();
@@ -65,7 +74,12 @@ impl Shells {
             }
             std::thread::sleep(LOOK_EACH);
         }
-        Ok(())
+    }
+
+    /// Who takes itself for the master, if that is one alone.
+    pub fn master(&self) -> Option<u8> {
+        let mut masters = (0..NODES).zip(&self.members).filter(|(_, member)| member.is(Role::Master));
+        masters.next().map(|(node, _)| node).filter(|_| masters.next().is_none())
     }
 
     /// Ends the routers of these nodes.
@@ -108,6 +122,10 @@ impl Member {
         let parts = Parts { node: &node, name, settings, faults, socket: None, impair: None, clock };
         let shell = Shell::start(parts).map_err(|error| Failure::of("router", error))?;
         Ok(Self { skew, shell: Some(shell) })
+    }
+
+    fn is(&self, role: Role) -> bool {
+        self.shell.as_ref().and_then(Shell::clock).is_some_and(|clock| clock.snapshot().role == role)
     }
 
     fn is_settled(&self) -> bool {

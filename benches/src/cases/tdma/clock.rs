@@ -119,12 +119,16 @@ fn errors_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
     let _load = stage.load()?;
     sample_in_child(PATIENCE, |samples| {
         let shells = Shells::start(stage, &LOADED, &scratch)?;
-        shells.await_settled()?;
+        let mut master = shells.await_settled()?;
         std::thread::sleep(measures(settings));
         for _ in 0..settings.count(SAMPLES) {
             std::thread::sleep(EACH);
-            for slave in 1..NODES {
-                samples.push(error_us(&shells.shown(0)?, &shells.shown(slave)?)?);
+            // By another master's time only those are right who have measured it.
+            if shells.master() != Some(master) {
+                master = shells.await_settled()?;
+            }
+            for slave in (0..NODES).filter(|node| *node != master) {
+                samples.push(error_us(&shells.shown(master)?, &shells.shown(slave)?)?);
             }
         }
         Ok(())
@@ -140,7 +144,7 @@ fn off_after_silence_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, 
             let mut shells = Shells::start(stage, &LOADED, scratch)?;
             shells.await_settled()?;
             std::thread::sleep(measures(settings));
-            let master = shells.shown(0)?;
+            let master = shells.shown(shells.await_settled()?)?;
             shells.end(MASTERS);
             std::thread::sleep(SILENT_FOR);
             samples.push(error_us(&master, &shells.shown(SLAVE)?)?);
