@@ -6,14 +6,13 @@
 mod common;
 
 use common::process::{Router, be_a_router};
-use common::stalls::Stalls;
 use common::talk::{Ears, talk};
 use common::{Capture, Crossed, MASTERS, Segment, assert_kept, judge, name, table};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::link::State;
 use rohrpost_routers::time::Role;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Weak};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -33,12 +32,12 @@ const FOREIGN: usize = 40;
 /// So many cycles after the network is one again nobody sends any more by the time that is given up.
 const HEALED_CYCLES: u32 = 16;
 
-/// Reads the page of a node all the time: what it says goes back in no epoch.
-fn watch_time(node: &Arc<Node>, ends: &Arc<AtomicBool>) -> JoinHandle<()> {
-    let (clock, ends) = (SystemClock::open(node), ends.clone());
+/// Reads the page of a node as long as somebody holds the other end: what it says goes back in no epoch.
+fn watch_time(node: &Arc<Node>, held: Weak<()>) -> JoinHandle<()> {
+    let clock = SystemClock::open(node);
     std::thread::spawn(move || {
         let mut before = clock.now();
-        while !ends.load(Ordering::Relaxed) {
+        while held.upgrade().is_some() {
             let now = clock.now();
             assert!((now.epoch, now.ns) >= (before.epoch, before.ns), "from {before:?} to {now:?}");
             before = now;
@@ -85,64 +84,70 @@ fn in_a_process_of_its_own() {
 
 #[test]
 fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
-    let Some(mut segment) = Segment::at_rest(None) else { return };
-    let Segment { stations, lab, .. } = &mut segment;
-    stations[usize::from(OTHERS[0])].skew.rate_ppb = FAST_PPB;
-    let lonely = &mut stations[usize::from(LONELY)];
-    lonely.skew = Default::default();
-    let capture = Capture::start(lab);
-    lonely.start(lab);
-    let ends = Arc::new(AtomicBool::new(false));
-    let reader = watch_time(&lonely.node, &ends);
-    // Its kernel has to know where it sends them, else nobody would see them later on.
-    let speaks = |crossed: &[Crossed]| ahead_ns(crossed, LONELY, 0).count() > 10;
-    segment.wait_until("the first is master", |_| capture.so_far(speaks));
-    segment.lab.divide(&[&name(LONELY)]).unwrap();
-    let _routers = OTHERS.map(|own| Router::start(&segment, own, PROCESS));
-    let (mut ears, stalls) = (Ears::new(&segment), Stalls::watched());
-    let lonely = |segment: &Segment| segment.stations[usize::from(LONELY)].clock();
-    assert_eq!(lonely(&segment).role, Role::Master, "nobody disturbs it");
-    // Where they may send to each other, their routers have begun.
-    segment.wait_until("the others send", |_| {
-        capture.so_far(|crossed| OTHERS.iter().all(|own| crossed.iter().any(|frame| frame.from == *own)))
-    });
-    talk(&segment, &mut ears, &OTHERS, 100);
-    segment.wait_until("the parts have two times, and have sent by them", |_| {
-        capture.so_far(|crossed| are_apart(crossed) && judge(crossed, &time_of_others(crossed)).outside.len() > FOREIGN)
-    });
+    judged(Watched::RealTime, || {
+        let Some(mut segment) = Segment::at_rest(None) else { return };
+        let Segment { stations, lab, .. } = &mut segment;
+        stations[usize::from(OTHERS[0])].skew.rate_ppb = FAST_PPB;
+        let lonely = &mut stations[usize::from(LONELY)];
+        lonely.skew = Default::default();
+        let capture = Capture::start(lab);
+        lonely.start(lab);
+        let held = Arc::new(());
+        let reader = watch_time(&lonely.node, Arc::downgrade(&held));
+        // Its kernel has to know where it sends them, else nobody would see them later on.
+        let speaks = |crossed: &[Crossed]| ahead_ns(crossed, LONELY, 0).count() > 10;
+        segment.wait_until("the first is master", |_| capture.so_far(speaks));
+        segment.lab.divide(&[&name(LONELY)]).unwrap();
+        let _routers = OTHERS.map(|own| Router::start(&segment, own, PROCESS));
+        let mut ears = Ears::new(&segment);
+        let lonely = |segment: &Segment| segment.stations[usize::from(LONELY)].clock();
+        assert_eq!(lonely(&segment).role, Role::Master, "nobody disturbs it");
+        // Where they may send to each other, their routers have begun.
+        segment.wait_until("the others send", |_| {
+            capture.so_far(|crossed| OTHERS.iter().all(|own| crossed.iter().any(|frame| frame.from == *own)))
+        });
+        talk(&segment, &mut ears, &OTHERS, 100);
+        segment.wait_until("the parts have two times, and have sent by them", |_| {
+            capture.so_far(|crossed| {
+                are_apart(crossed) && judge(crossed, &time_of_others(crossed)).outside.len() > FOREIGN
+            })
+        });
 
-    segment.lab.unite(&[&name(LONELY)]).unwrap();
-    let united_ns = monotonic_ns();
-    segment.wait_until("all send", |segment| {
-        let lonely = &segment.stations[usize::from(LONELY)];
-        let is_heard = |own: &u8| lonely.shell().stats().state(*own, monotonic_ns()) == State::Alive;
-        lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
-    });
-    segment.wait_until("it yields to who is followed", |segment| lonely(segment).master == Some(OTHERS[0]));
-    talk(&segment, &mut ears, &ALL, 100);
-    ends.store(true, Ordering::Relaxed);
-    reader.join().unwrap();
+        segment.lab.unite(&[&name(LONELY)]).unwrap();
+        let united_ns = monotonic_ns();
+        segment.wait_until("all send", |segment| {
+            let lonely = &segment.stations[usize::from(LONELY)];
+            let is_heard = |own: &u8| lonely.shell().stats().state(*own, monotonic_ns()) == State::Alive;
+            lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
+        });
+        segment.wait_until("it yields to who is followed", |segment| lonely(segment).master == Some(OTHERS[0]));
+        talk(&segment, &mut ears, &ALL, 100);
+        drop(held);
+        reader.join().unwrap();
 
-    let crossed = capture.end();
-    let time = time_of_others(&crossed);
-    // When both know of each other.
-    let meets_ns = ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).find(|at_ns| *at_ns > united_ns).unwrap();
-    let healed_ns = meets_ns + (HEALED_CYCLES * table().cycle).as_nanos() as u64;
-    let [before, after] = {
-        let (before, rest) = crossed.split_at(crossed.partition_point(|frame| frame.at_ns < united_ns));
-        [before, &rest[rest.partition_point(|frame| frame.at_ns < healed_ns)..]]
-    };
-    let foreign = judge(before, &time).outside.len();
-    assert!(foreign > FOREIGN / 2, "the parts had two times: {foreign} frames of {}", before.len());
-    if let Some((reigns_ns, _)) = ahead_ns(after, LONELY, 0).next() {
-        // By the true clock, some of these may be replacements: of a master that stood still.
-        let last_ns =
-            ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).rfind(|at_ns| *at_ns < reigns_ns).unwrap();
-        let silent_ns = reigns_ns - last_ns;
-        assert!(silent_ns > table().cycle.as_nanos() as u64, "there is one master, and it spoke {silent_ns} ns before");
-    }
-    // Where masters stand still there may be a third reign, whose time is another.
-    if !stalls.starved() {
+        let crossed = capture.end();
+        let time = time_of_others(&crossed);
+        // When both know of each other.
+        let meets_ns =
+            ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).find(|at_ns| *at_ns > united_ns).unwrap();
+        let healed_ns = meets_ns + (HEALED_CYCLES * table().cycle).as_nanos() as u64;
+        let [before, after] = {
+            let (before, rest) = crossed.split_at(crossed.partition_point(|frame| frame.at_ns < united_ns));
+            [before, &rest[rest.partition_point(|frame| frame.at_ns < healed_ns)..]]
+        };
+        let foreign = judge(before, &time).outside.len();
+        assert!(foreign > FOREIGN / 2, "the parts had two times: {foreign} frames of {}", before.len());
+        if let Some((reigns_ns, _)) = ahead_ns(after, LONELY, 0).next() {
+            // By the true clock, some of these may be replacements: of a master that stood still.
+            let last_ns =
+                ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).rfind(|at_ns| *at_ns < reigns_ns).unwrap();
+            let silent_ns = reigns_ns - last_ns;
+            assert!(
+                silent_ns > table().cycle.as_nanos() as u64,
+                "there is one master, and it spoke {silent_ns} ns before"
+            );
+        }
+        // Where masters stand still there may be a third reign, whose time is another.
         assert_kept("two parts that are one again", after, &time);
-    }
+    });
 }

@@ -6,11 +6,11 @@
 mod common;
 
 use common::relay::Relay;
-use common::stalls::Stalls;
 use common::talk::{Ears, PAUSE, mouths, talk};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_routers::frame::Kind;
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::shell::Failure;
 use rohrpost_routers::tdma::Silent;
 use std::io::Write;
@@ -35,49 +35,52 @@ fn knows_its_rate(station: &Station) -> bool {
 
 #[test]
 fn a_slave_whose_clock_drifts_and_changes_its_rate_keeps_its_slots() {
-    let Some(mut segment) = Segment::at_rest(None) else { return };
-    let Segment { stations, lab, .. } = &mut segment;
-    stations[2].skew.rate_ppb = DRIFT_PPB;
-    stations[2].skew.wander_ppb = SWING_PPB;
-    stations.iter_mut().for_each(|station| station.start(lab));
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-    let (mut ears, time, began) = (Ears::new(&segment), segment.stations[0].clock().record, Instant::now());
-    let capture = Capture::start(&segment.lab);
-    let stalls = Stalls::watched();
-    let knows_its_rate = || (segment.stations[2].clock().rate_ppb.abs() - DRIFT_PPB).abs() < 2 * SWING_PPB as i64;
-    // A new master is measured anew.
-    while began.elapsed() < DRIFTS || (!knows_its_rate() && began.elapsed() < PATIENCE) {
-        talk(&segment, &mut ears, &ALL, 100);
-    }
-    assert!(knows_its_rate() || stalls.starved(), "{} ppb", segment.stations[2].clock().rate_ppb);
-    assert_kept("two clocks that drift", &capture.end(), &time);
+    judged(Watched::RealTime, || {
+        let Some(mut segment) = Segment::at_rest(None) else { return };
+        let Segment { stations, lab, .. } = &mut segment;
+        stations[2].skew.rate_ppb = DRIFT_PPB;
+        stations[2].skew.wander_ppb = SWING_PPB;
+        stations.iter_mut().for_each(|station| station.start(lab));
+        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+        let (mut ears, time, began) = (Ears::new(&segment), segment.stations[0].clock().record, Instant::now());
+        let capture = Capture::start(&segment.lab);
+        let knows_its_rate = || (segment.stations[2].clock().rate_ppb.abs() - DRIFT_PPB).abs() < 2 * SWING_PPB as i64;
+        // A new master is measured anew.
+        while began.elapsed() < DRIFTS || (!knows_its_rate() && began.elapsed() < PATIENCE) {
+            talk(&segment, &mut ears, &ALL, 100);
+        }
+        assert!(knows_its_rate(), "{} ppb", segment.stations[2].clock().rate_ppb);
+        assert_kept("two clocks that drift", &capture.end(), &time);
+    });
 }
 
 #[test]
 fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_and_says_why() {
-    let Some(mut segment) = Segment::at_rest(None) else { return };
-    let Segment { stations, lab, .. } = &mut segment;
-    stations[2].late = Some("delay=2ms,jitter=500us,seed=7".parse().unwrap());
-    stations.iter_mut().for_each(|station| station.start(lab));
-    let capture = Capture::start(lab);
-    segment.wait_until("node 2 knows the time too badly", |segment| {
-        let (clock, slots) = (segment.stations[2].clock(), segment.stations[2].slots());
-        clock.exchanges > 5 && matches!(slots.silent, Some(Silent::BoundTooLarge { .. }))
-    });
-    let mut ears = Ears::new(&segment);
-    talk(&segment, &mut ears, &[0, 1], 100);
-    let crossed = capture.end();
-    let speaks = |kind| matches!(kind, Kind::Alive | Kind::Packages);
-    assert!(crossed.iter().any(|frame| frame.from == 2), "it asks for the time");
-    assert!(!crossed.iter().any(|frame| frame.from == 2 && speaks(frame.kind)), "and says nothing else");
+    judged(Watched::RealTime, || {
+        let Some(mut segment) = Segment::at_rest(None) else { return };
+        let Segment { stations, lab, .. } = &mut segment;
+        stations[2].late = Some("delay=2ms,jitter=500us,seed=7".parse().unwrap());
+        stations.iter_mut().for_each(|station| station.start(lab));
+        let capture = Capture::start(lab);
+        segment.wait_until("node 2 knows the time too badly", |segment| {
+            let (clock, slots) = (segment.stations[2].clock(), segment.stations[2].slots());
+            clock.exchanges > 5 && matches!(slots.silent, Some(Silent::BoundTooLarge { .. }))
+        });
+        let mut ears = Ears::new(&segment);
+        talk(&segment, &mut ears, &[0, 1], 100);
+        let crossed = capture.end();
+        let speaks = |kind| matches!(kind, Kind::Alive | Kind::Packages);
+        assert!(crossed.iter().any(|frame| frame.from == 2), "it asks for the time");
+        assert!(!crossed.iter().any(|frame| frame.from == 2 && speaks(frame.kind)), "and says nothing else");
 
-    // The bridge is as quick as others again.
-    let Segment { stations, lab, .. } = &mut segment;
-    stations[2].shell = None;
-    stations[2].late = None;
-    stations[2].start(lab);
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-    talk(&segment, &mut ears, &ALL, 50);
+        // The bridge is as quick as others again.
+        let Segment { stations, lab, .. } = &mut segment;
+        stations[2].shell = None;
+        stations[2].late = None;
+        stations[2].start(lab);
+        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+        talk(&segment, &mut ears, &ALL, 50);
+    });
 }
 
 /// A master that stands still for three cycles is replaced, and rightly: then it is tried again, so many times in all.
@@ -85,15 +88,17 @@ const TRIES: usize = 8;
 
 #[test]
 fn behind_a_bridge_that_becomes_slow_a_node_keeps_its_slots_and_loses_nothing() {
-    let Some(segment) = Segment::start() else { return };
-    let (mut ears, stalls) = (Ears::new(&segment), Stalls::watched());
-    let is_kept = (0..TRIES).any(|_| {
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-        segment.wait_until("node 2 knows its rate", |segment| knows_its_rate(&segment.stations[2]));
-        goes_on_behind_a_slow_bridge(&segment, &mut ears)
+    judged(Watched::RealTime, || {
+        let Some(segment) = Segment::start() else { return };
+        let mut ears = Ears::new(&segment);
+        let is_kept = (0..TRIES).any(|_| {
+            segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+            segment.wait_until("node 2 knows its rate", |segment| knows_its_rate(&segment.stations[2]));
+            goes_on_behind_a_slow_bridge(&segment, &mut ears)
+        });
+        assert!(is_kept, "there was another master in each of {TRIES} tries");
+        talk(&segment, &mut ears, &ALL, 50);
     });
-    assert!(is_kept || stalls.starved(), "there was another master in each of {TRIES} tries");
-    talk(&segment, &mut ears, &ALL, 50);
 }
 
 /// False when another master began meanwhile: its time cannot be measured from behind such a bridge.
@@ -106,13 +111,12 @@ fn goes_on_behind_a_slow_bridge(segment: &Segment, ears: &mut Ears) -> bool {
     let capture = Capture::start(&segment.lab);
     let relay = Relay::start(segment, 2, HELD_BACK, |_| false);
     ears.say_all(&mut mouths, ROUNDS);
-    let heard = ears.try_hear_all(&ALL, &(0..ROUNDS).collect::<Vec<_>>());
     let silent = segment.stations[2].slots().silent;
     assert!(relay.end() > 300, "data and time take that way");
-    if terms() != before || (heard.is_err() && ears.is_excused()) {
+    if terms() != before {
         return false;
     }
-    assert_eq!(heard, Ok(()));
+    ears.hear_all(&ALL, &(0..ROUNDS).collect::<Vec<_>>());
     assert_kept("behind a slow bridge", &capture.end(), &time);
     assert_eq!(silent, None);
     true
@@ -120,17 +124,21 @@ fn goes_on_behind_a_slow_bridge(segment: &Segment, ears: &mut Ears) -> bool {
 
 #[test]
 fn a_master_whose_packages_come_is_replaced_by_nobody_who_misses_its_syncs() {
-    let Some(segment) = Segment::start() else { return };
-    assert!(
-        (0..TRIES).any(|_| stays_master_without_syncs(&segment)),
-        "replaced {TRIES} times, though its packages came"
-    );
+    judged(Watched::RealTime, || {
+        let Some(segment) = Segment::start() else { return };
+        assert!(
+            (0..TRIES).any(|_| stays_master_without_syncs(&segment)),
+            "replaced {TRIES} times, though its packages came"
+        );
+    });
 }
 
 /// Whether the master stays one while it speaks, and its Syncs do not reach the backup.
 fn stays_master_without_syncs(segment: &Segment) -> bool {
     segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-    let master = segment.stations[2].clock().master.unwrap();
+    let heard_of = || segment.stations[2].clock().master;
+    segment.wait_until("there is a master", |_| heard_of().is_some());
+    let Some(master) = heard_of() else { return false };
     let backup = &segment.stations[usize::from(MASTERS[0] + MASTERS[1] - master)];
     segment.wait_until("the backup follows, and knows its rate", |_| {
         backup.clock().master == Some(master) && knows_its_rate(backup)
@@ -167,28 +175,30 @@ fn shape(segment: &Segment, node: u8, words: &str) -> bool {
 
 #[test]
 fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
-    let Some(segment) = Segment::start() else { return };
-    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-    // A thousandth of what `link` says.
-    if !shape(&segment, 2, "qdisc add dev lan root tbf rate 1mbit burst 1600 limit 10000000") {
-        // Past the test harness, which keeps what passing tests print to itself.
-        let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: a device that is too slow (`tc` with tbf)");
-        return;
-    }
-    let (mut ears, slow) = (Ears::new(&segment), &segment.stations[2]);
-    let full = || slow.shell().failures().of(Failure::Full);
-    let (mut flood, mut id, began) = (slow.sender(1), 0, Instant::now());
-    while full() < 100 {
-        assert!(began.elapsed() < PATIENCE, "all is taken: {:?}", slow.slots());
-        // What finds no room in the router's mailbox comes a little later.
-        if flood.send(&label(2, 100, id), &[&[7; 1000]]).is_err() {
-            std::thread::sleep(Duration::from_micros(200));
+    judged(Watched::RealTime, || {
+        let Some(segment) = Segment::start() else { return };
+        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+        // A thousandth of what `link` says.
+        if !shape(&segment, 2, "qdisc add dev lan root tbf rate 1mbit burst 1600 limit 10000000") {
+            // Past the test harness, which keeps what passing tests print to itself.
+            let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: a device that is too slow (`tc` with tbf)");
+            return;
         }
-        id = id.wrapping_add(1);
-    }
-    let used = slow.slots().counts.used;
-    talk(&segment, &mut ears, &[0, 1], 50);
-    segment.wait_until("it goes on with its slots", |segment| segment.stations[2].slots().counts.used > used);
-    assert!(shape(&segment, 2, "qdisc del dev lan root"));
-    talk(&segment, &mut ears, &[0, 2], 50);
+        let (mut ears, slow) = (Ears::new(&segment), &segment.stations[2]);
+        let full = || slow.shell().failures().of(Failure::Full);
+        let (mut flood, mut id, began) = (slow.sender(1), 0, Instant::now());
+        while full() < 100 {
+            assert!(began.elapsed() < PATIENCE, "all is taken: {:?}", slow.slots());
+            // What finds no room in the router's mailbox comes a little later.
+            if flood.send(&label(2, 100, id), &[&[7; 1000]]).is_err() {
+                std::thread::sleep(Duration::from_micros(200));
+            }
+            id = id.wrapping_add(1);
+        }
+        let used = slow.slots().counts.used;
+        talk(&segment, &mut ears, &[0, 1], 50);
+        segment.wait_until("it goes on with its slots", |segment| segment.stations[2].slots().counts.used > used);
+        assert!(shape(&segment, 2, "qdisc del dev lan root"));
+        talk(&segment, &mut ears, &[0, 2], 50);
+    });
 }

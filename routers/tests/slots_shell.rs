@@ -8,6 +8,7 @@ mod common;
 use common::talk::{Ears, PAUSE, mouths};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, assert_kept, judge};
 use rohrpost_routers::frame::Kind;
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::time::Role;
 use std::time::Instant;
 
@@ -15,95 +16,102 @@ use std::time::Instant;
 const ROUNDS: u16 = 150;
 #[test]
 fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
-    let Some(mut segment) = Segment::start() else { return };
-    segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
-    let all: Vec<u8> = (0..NODES).collect();
-    let (mut ears, mut mouths_of_all) = (Ears::new(&segment), mouths(&segment, &all));
-    ears.acquaint(&mut mouths_of_all);
-    let time = segment.stations[0].clock().record;
-    let capture = Capture::start(&segment.lab);
-    for id in 0..ROUNDS {
-        mouths_of_all.iter_mut().for_each(|mouth| mouth.say(id));
-        ears.listen();
-        std::thread::sleep(PAUSE);
-    }
-    ears.hear_all(&all, &(0..ROUNDS).collect::<Vec<_>>());
-    let crossed = capture.end();
-    for kind in [Kind::Packages, Kind::Sync, Kind::Request, Kind::Reply] {
-        assert!(crossed.iter().any(|frame| frame.kind == kind), "{kind:?} crossed the bridge");
-    }
-    assert_kept("with a master", &crossed, &time);
-
-    // The master ends in the middle of it: the others go on, and lose nothing.
-    let capture = Capture::start(&segment.lab);
-    // Where the first was slow to begin the other is master.
-    let master = || segment.stations[2].clock().master;
-    segment.wait_until("there is a master", |_| master().is_some());
-    let master = master().unwrap();
-    let next = MASTERS[0] + MASTERS[1] - master;
-    let others = [next, 2];
-    let mut mouths_of_others = mouths(&segment, &others);
-    let left_out = |segment: &Segment| {
-        let counts = segment.stations[usize::from(next)].slots().counts;
-        (counts.syncs.replacements_sent, counts.late + counts.skipped + counts.synchronisations_late)
-    };
-    let before = left_out(&segment);
-    for id in 0..2 * ROUNDS {
-        if id == ROUNDS / 2 {
-            segment.stations[usize::from(master)].shell = None;
+    judged(Watched::RealTime, || {
+        let Some(mut segment) = Segment::start() else { return };
+        segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
+        let all: Vec<u8> = (0..NODES).collect();
+        let (mut ears, mut mouths_of_all) = (Ears::new(&segment), mouths(&segment, &all));
+        ears.acquaint(&mut mouths_of_all);
+        let time = segment.stations[0].clock().record;
+        let capture = Capture::start(&segment.lab);
+        for id in 0..ROUNDS {
+            mouths_of_all.iter_mut().for_each(|mouth| mouth.say(id));
+            ears.listen();
+            std::thread::sleep(PAUSE);
         }
-        mouths_of_others.iter_mut().for_each(|mouth| mouth.say(id));
-        ears.listen();
-        std::thread::sleep(PAUSE);
-    }
-    ears.hear_all(&others, &(0..2 * ROUNDS).collect::<Vec<_>>());
-    segment.wait_until("the next is the master", |segment| {
-        segment.stations[usize::from(next)].clock().role == Role::Master
-    });
-    segment.wait_until("node 2 follows", |segment| segment.stations[2].clock().master == Some(next));
-    let crossed = capture.end();
-    assert_kept("while the master dies", &crossed, &time);
-    let (stood_in, missed) = left_out(&segment);
-    assert!(stood_in > before.0 || missed > before.1, "it stood in before it took over, or woke up too late for that");
-    // On a busy computer many wake-ups are late; that such slots are skipped is what keeps the frames above where they belong.
-    for station in others.map(|own| &segment.stations[usize::from(own)]) {
-        let counts = station.slots().counts;
-        assert!(counts.used > 0, "node {}: {counts:?}", station.own);
-    }
+        ears.hear_all(&all, &(0..ROUNDS).collect::<Vec<_>>());
+        let crossed = capture.end();
+        for kind in [Kind::Packages, Kind::Sync, Kind::Request, Kind::Reply] {
+            assert!(crossed.iter().any(|frame| frame.kind == kind), "{kind:?} crossed the bridge");
+        }
+        assert_kept("with a master", &crossed, &time);
 
-    // It comes back, listens, and speaks again.
-    let Segment { stations, lab, .. } = &mut segment;
-    stations[usize::from(master)].start(lab);
-    segment.wait_until("all send again", |segment| segment.stations.iter().all(common::Station::is_ready));
-    ears.acquaint(&mut mouths_of_all);
-    let numbers: Vec<_> = (0..20).collect();
-    numbers.iter().for_each(|id| mouths_of_all.iter_mut().for_each(|mouth| mouth.say(*id)));
-    ears.hear_all(&all, &numbers);
+        // The master ends in the middle of it: the others go on, and lose nothing.
+        let capture = Capture::start(&segment.lab);
+        // Where the first was slow to begin the other is master.
+        let master = || segment.stations[2].clock().master;
+        segment.wait_until("there is a master", |_| master().is_some());
+        let master = master().unwrap();
+        let next = MASTERS[0] + MASTERS[1] - master;
+        let others = [next, 2];
+        let mut mouths_of_others = mouths(&segment, &others);
+        let left_out = |segment: &Segment| {
+            let counts = segment.stations[usize::from(next)].slots().counts;
+            (counts.syncs.replacements_sent, counts.late + counts.skipped + counts.synchronisations_late)
+        };
+        let before = left_out(&segment);
+        for id in 0..2 * ROUNDS {
+            if id == ROUNDS / 2 {
+                segment.stations[usize::from(master)].shell = None;
+            }
+            mouths_of_others.iter_mut().for_each(|mouth| mouth.say(id));
+            ears.listen();
+            std::thread::sleep(PAUSE);
+        }
+        ears.hear_all(&others, &(0..2 * ROUNDS).collect::<Vec<_>>());
+        segment.wait_until("the next is the master", |segment| {
+            segment.stations[usize::from(next)].clock().role == Role::Master
+        });
+        segment.wait_until("node 2 follows", |segment| segment.stations[2].clock().master == Some(next));
+        let crossed = capture.end();
+        assert_kept("while the master dies", &crossed, &time);
+        let (stood_in, missed) = left_out(&segment);
+        assert!(
+            stood_in > before.0 || missed > before.1,
+            "it stood in before it took over, or woke up too late for that"
+        );
+        // On a busy computer many wake-ups are late; that such slots are skipped is what keeps the frames above where they belong.
+        for station in others.map(|own| &segment.stations[usize::from(own)]) {
+            let counts = station.slots().counts;
+            assert!(counts.used > 0, "node {}: {counts:?}", station.own);
+        }
+
+        // It comes back, listens, and speaks again.
+        let Segment { stations, lab, .. } = &mut segment;
+        stations[usize::from(master)].start(lab);
+        segment.wait_until("all send again", |segment| segment.stations.iter().all(common::Station::is_ready));
+        ears.acquaint(&mut mouths_of_all);
+        let numbers: Vec<_> = (0..20).collect();
+        numbers.iter().for_each(|id| mouths_of_all.iter_mut().for_each(|mouth| mouth.say(*id)));
+        ears.hear_all(&all, &numbers);
+    });
 }
 
 #[test]
 fn a_refusal_waits_for_a_slot() {
-    let Some(mut segment) = Segment::start() else { return };
-    segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
-    let time = segment.stations[0].clock().record;
-    segment.stations[2].shell = None;
-    let capture = Capture::start(&segment.lab);
-    // In the place of node 2 now somebody speaks who has another configuration, and whenever he likes.
-    let stranger = segment.socket(2);
-    let (mut heard, began) = ([0; 128], Instant::now());
-    let refusals = loop {
-        for node in [0, 1] {
-            stranger.send_to(&common::of_another_digest(2, node), common::at(node)).unwrap();
-        }
-        let seen = common::frames(&stranger, &mut heard).filter(|kind| *kind == Kind::Refusal).count();
-        if seen > 0 {
-            break seen;
-        }
-        assert!(began.elapsed() < PATIENCE, "nobody refuses");
-    };
-    let mut crossed = capture.end();
-    crossed.retain(|frame| frame.kind == Kind::Refusal);
-    assert!(crossed.len() >= refusals);
-    let judged = judge(&crossed, &time);
-    assert!(judged.outside.is_empty(), "{judged:?}");
+    judged(Watched::RealTime, || {
+        let Some(mut segment) = Segment::start() else { return };
+        segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
+        let time = segment.stations[0].clock().record;
+        segment.stations[2].shell = None;
+        let capture = Capture::start(&segment.lab);
+        // In the place of node 2 now somebody speaks who has another configuration, and whenever he likes.
+        let stranger = segment.socket(2);
+        let (mut heard, began) = ([0; 128], Instant::now());
+        let refusals = loop {
+            for node in [0, 1] {
+                stranger.send_to(&common::of_another_digest(2, node), common::at(node)).unwrap();
+            }
+            let seen = common::frames(&stranger, &mut heard).filter(|kind| *kind == Kind::Refusal).count();
+            if seen > 0 {
+                break seen;
+            }
+            assert!(began.elapsed() < PATIENCE, "nobody refuses");
+        };
+        let mut crossed = capture.end();
+        crossed.retain(|frame| frame.kind == Kind::Refusal);
+        assert!(crossed.len() >= refusals);
+        let judged = judge(&crossed, &time);
+        assert!(judged.outside.is_empty(), "{judged:?}");
+    });
 }

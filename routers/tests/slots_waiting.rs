@@ -8,6 +8,7 @@ mod common;
 use common::{PATIENCE, Pair, Side, label, module, router, turns};
 use rohrpost_config::{TRANSIT, Tdma};
 use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::net::IpAddr;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -73,35 +74,37 @@ fn adopt(side: &Side) -> Receiver {
 
 #[test]
 fn what_waits_for_a_slot_outlives_a_router_that_is_killed() {
-    let mut pair = Pair::with(Some(seldom()));
-    pair.sides[0].shell = None;
-    let there = Shape { slots: 256, ..Shape::default() };
-    let mut receiver = pair.sides[1].receiver(module(1), there);
-    let mut sender = pair.sides[0].sender(module(1));
-    let waiting = || pair.sides[0].node.look_at(transit()).map_or(0, |mailbox| mailbox.depth);
-    let mut kept = 0;
-    for round in 0..ROUNDS {
-        let killed = start(&pair.sides[0], round);
-        // Its slots have begun, and one has just taken what there was.
-        let began = Instant::now();
-        let mut hello = || {
-            let _ = sender.send(&label(module(0), 100, u16::MAX), &[b"hello"]);
-            receiver.receive_timeout(Duration::from_millis(100)).is_some()
-        };
-        while !hello() || waiting() > 0 {
-            assert!(began.elapsed() < PATIENCE, "round {round}: nothing comes");
+    judged(Watched::RealTime, || {
+        let mut pair = Pair::with(Some(seldom()));
+        pair.sides[0].shell = None;
+        let there = Shape { slots: 256, ..Shape::default() };
+        let mut receiver = pair.sides[1].receiver(module(1), there);
+        let mut sender = pair.sides[0].sender(module(1));
+        let waiting = || pair.sides[0].node.look_at(transit()).map_or(0, |mailbox| mailbox.depth);
+        let mut kept = 0;
+        for round in 0..ROUNDS {
+            let killed = start(&pair.sides[0], round);
+            // Its slots have begun, and one has just taken what there was.
+            let began = Instant::now();
+            let mut hello = || {
+                let _ = sender.send(&label(module(0), 100, u16::MAX), &[b"hello"]);
+                receiver.receive_timeout(Duration::from_millis(100)).is_some()
+            };
+            while !hello() || waiting() > 0 {
+                assert!(began.elapsed() < PATIENCE, "round {round}: nothing comes");
+            }
+            for id in 0..PACKAGES {
+                sender.send(&label(module(0), 100, id), &[b"waits for a slot"]).unwrap();
+            }
+            std::thread::sleep(AWHILE);
+            drop(killed);
+            let mut left = adopt(&pair.sides[0]);
+            let ids: Vec<_> = std::iter::from_fn(|| left.try_receive().map(|package| package.head().id)).collect();
+            // On a busy computer a slot may have come in between.
+            kept += u16::from(ids == (0..PACKAGES).collect::<Vec<_>>());
+            println!("round {round}: {} of {PACKAGES} left", ids.len());
+            while receiver.try_receive().is_some() {}
         }
-        for id in 0..PACKAGES {
-            sender.send(&label(module(0), 100, id), &[b"waits for a slot"]).unwrap();
-        }
-        std::thread::sleep(AWHILE);
-        drop(killed);
-        let mut left = adopt(&pair.sides[0]);
-        let ids: Vec<_> = std::iter::from_fn(|| left.try_receive().map(|package| package.head().id)).collect();
-        // On a busy computer a slot may have come in between.
-        kept += u16::from(ids == (0..PACKAGES).collect::<Vec<_>>());
-        println!("round {round}: {} of {PACKAGES} left", ids.len());
-        while receiver.try_receive().is_some() {}
-    }
-    assert!(kept * 2 >= ROUNDS, "all were kept in {kept} of {ROUNDS} rounds");
+        assert!(kept * 2 >= ROUNDS, "all were kept in {kept} of {ROUNDS} rounds");
+    });
 }

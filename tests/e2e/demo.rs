@@ -1,9 +1,10 @@
 //! The demo, as its user sees it.
 
 use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, runs, wait};
-use crate::process::{Running, Said};
+use crate::process::Running;
 use nix::sys::signal::Signal;
 use rohrpost::launch::{Phase, launcher_of};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::path::Path;
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
@@ -13,24 +14,6 @@ fn number(text: &str, words: &str) -> u64 {
     let before = text.split(words).next().filter(|before| before.len() < text.len());
     let before = before.unwrap_or_else(|| panic!("no `{words}` in:\n{text}"));
     before.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
-}
-
-/// Whether a demo failed since others left a router or a module no processor for so long that it was not heard, or did not answer in time.
-pub(crate) fn is_for_want_of_time(said: &str) -> bool {
-    let words = ["does not say how it is", "is silent; is it on", "does not hear this one", "no answer within"];
-    words.iter().any(|words| said.contains(words))
-}
-
-/// A demo over several nodes, which is tried again, twice at most, where it failed for want of time alone.
-pub(crate) fn demo_heard(place: &Place, arguments: &[&str]) -> Said {
-    let mut said = place.say(arguments);
-    for _ in 0..2 {
-        if said.code == Some(0) || !is_for_want_of_time(&(said.out.clone() + &said.err)) {
-            break;
-        }
-        said = place.say(arguments);
-    }
-    said
 }
 
 #[test]
@@ -58,52 +41,56 @@ fn the_simulated_robot_maps_and_says_what_came_of_it() {
 /// The same robot over three nodes, on a network that loses, delays and reorders.
 #[test]
 fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_for() {
-    let place = Place::new();
-    let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
-    let said = demo_heard(&place, &["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "--impair", bad]);
-    if lacks_namespaces(&said.err) {
-        return;
-    }
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let said = said.out;
-    assert!(said.contains("the accounts balance\n"), "{said}");
-    assert!(number(&said, " scans mapped (") > 5, "{said}");
-    assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
-    let lost = said.lines().find_map(|line| line.strip_prefix("base → brain"));
-    let lost: Vec<u64> = lost.unwrap().split_whitespace().filter_map(|word| word.parse().ok()).collect();
-    assert!(lost[4] > 0, "5 % of some hundred datagrams:\n{said}");
-    place.assert_empty();
+    judged(Watched::Ordinary, || {
+        let place = Place::new();
+        let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
+        let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "--impair", bad]);
+        if lacks_namespaces(&said.err) {
+            return;
+        }
+        assert_eq!(said.code, Some(0), "{said:?}");
+        let said = said.out;
+        assert!(said.contains("the accounts balance\n"), "{said}");
+        assert!(number(&said, " scans mapped (") > 5, "{said}");
+        assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+        let lost = said.lines().find_map(|line| line.strip_prefix("base → brain"));
+        let lost: Vec<u64> = lost.unwrap().split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        assert!(lost[4] > 0, "5 % of some hundred datagrams:\n{said}");
+        place.assert_empty();
+    });
 }
 
 /// The same robot, each node in its own time slots.
 #[test]
 fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
-    let place = Place::new();
-    let said = demo_heard(&place, &["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet"]);
-    if lacks_namespaces(&said.err) {
-        return;
-    }
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let said = said.out;
-    assert!(said.contains("the accounts balance\n") && number(&said, " scans mapped (") > 5, "{said}");
-    let slots = said.split("In time slots").nth(1).unwrap();
-    for node in ["base", "brain", "desk"] {
-        let row =
-            slots.lines().find_map(|line| line.strip_prefix(node)).unwrap_or_else(|| panic!("no {node}:\n{said}"));
-        assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
-    }
-    let flows = slots.split("\nflow ").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap();
-    let rows: Vec<_> = flows.lines().skip(1).collect();
-    assert_eq!(rows.len(), 11, "all of config/demo-tdma.toml: {flows}");
-    for row in rows {
-        let columns: Vec<_> = row.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
-        let [flow, _, packages, bound, _, slowest, _, within, ..] = columns[..] else { panic!("{row}") };
-        assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
-        assert!(flow != "laser.0 → pilot.0" || ["10.00 ms", "900.00 ms"].contains(&within), "{row}");
-    }
-    place.assert_empty();
-    let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
-    assert!(said.contains("say --nodes 3"), "{said}");
+    judged(Watched::Ordinary, || {
+        let place = Place::new();
+        let said = place.say(&["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet"]);
+        if lacks_namespaces(&said.err) {
+            return;
+        }
+        assert_eq!(said.code, Some(0), "{said:?}");
+        let said = said.out;
+        assert!(said.contains("the accounts balance\n") && number(&said, " scans mapped (") > 5, "{said}");
+        let slots = said.split("In time slots").nth(1).unwrap();
+        for node in ["base", "brain", "desk"] {
+            let row =
+                slots.lines().find_map(|line| line.strip_prefix(node)).unwrap_or_else(|| panic!("no {node}:\n{said}"));
+            assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
+        }
+        let flows = slots.split("\nflow ").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap();
+        let rows: Vec<_> = flows.lines().skip(1).collect();
+        assert_eq!(rows.len(), 11, "all of config/demo-tdma.toml: {flows}");
+        for row in rows {
+            let columns: Vec<_> = row.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
+            let [flow, _, packages, bound, _, slowest, _, within, ..] = columns[..] else { panic!("{row}") };
+            assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
+            assert!(flow != "laser.0 → pilot.0" || ["10.00 ms", "900.00 ms"].contains(&within), "{row}");
+        }
+        place.assert_empty();
+        let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
+        assert!(said.contains("say --nodes 3"), "{said}");
+    });
 }
 
 #[test]

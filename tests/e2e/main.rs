@@ -43,7 +43,6 @@ mod process;
 mod readme;
 mod restart;
 mod screen;
-mod stalls;
 mod start;
 mod subscribe;
 mod systems;

@@ -1,15 +1,14 @@
 //! The demo in time slots, whose master's router is killed: what is told of it, and that next to nothing of a declared flow is lost.
 
-use crate::demo::{demo_heard, is_for_want_of_time};
 use crate::harness::{Place, Robot, lacks_namespaces, signal, wait};
 use crate::process::{Running, Said};
-use crate::stalls::Stalls;
 use nix::sys::signal::Signal;
 use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::RouterInterface;
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::value::Data;
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::path::Path;
 use std::time::Duration;
 
@@ -28,13 +27,11 @@ fn kills() -> usize {
 /// What waits for longer than a second is given up, and what came for a router that is not there is too old for anybody after 400 ms. A router that is
 /// killed is back in its slots long before, but not where most of the slots are left out: at 28 of 100 taken by the hypervisor it is 40 to 75 of 100.
 const LEFT_OUT_MAX: f64 = 0.33;
-/// Nor where it stands still for so long at a time.
-const STOOD_STILL: Duration = Duration::from_millis(250);
 
 /// What a router has taken for a slot just then dies with it: that is in its hands for less than a thousandth of the time.
-fn assert_kept(said: &str, kills: usize, stalls: Stalls) {
+fn assert_kept(said: &str, kills: usize) {
     let lost: u64 = losses(said).sum();
-    if is_starved(said) || has_stood_still(stalls) {
+    if is_starved(said) {
         println!("{lost} lost by {kills} kills");
         return;
     }
@@ -66,16 +63,6 @@ fn is_starved(said: &str) -> bool {
         println!("this computer is too busy for time slots: {:.0} of 100 were left out", 100.0 * share);
     }
     is_starved
-}
-
-/// Whether it stood still for so long that what a router was sent became too old.
-fn has_stood_still(stalls: Stalls) -> bool {
-    let longest = stalls.longest();
-    let stood_still = longest > STOOD_STILL;
-    if stood_still {
-        println!("this computer stood still for {longest:?}");
-    }
-    stood_still
 }
 
 /// A node's line of the table of slots, without its name.
@@ -148,76 +135,83 @@ fn killed_again(place: &Place) -> Option<Said> {
 
 #[test]
 fn killed_again_and_again_the_master_costs_no_package_of_a_declared_flow() {
-    let place = Place::new();
-    let stalls = Stalls::watched();
-    let Some(mut said) = killed_again(&place) else { return };
-    for _ in 0..2 {
-        if said.code != Some(0) && is_for_want_of_time(&(said.out.clone() + &said.err)) {
-            said = killed_again(&place).unwrap();
-        }
-    }
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let said = said.out;
-    let events = said.lines().filter(|line| line.contains("not by this command); there again ")).count();
-    assert_eq!(events, kills(), "{said}");
-    // Where slots are left out masters change by themselves, so that it may not be the master any more that is killed.
-    let masters = said.lines().filter(|line| line.contains("It was the master. ")).count();
-    assert!(if is_starved(&said) { masters > 0 } else { masters == kills() }, "{masters} masters:\n{said}");
-    assert!(said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"), "{said}");
-    println!(
-        "{}",
-        said.lines().filter(|line| line.contains(" → ") || line.contains("there again")).collect::<Vec<_>>().join("\n")
-    );
-    assert_kept(&said, kills(), stalls);
-    place.assert_empty();
+    judged(Watched::Ordinary, || {
+        let place = Place::new();
+        let Some(said) = killed_again(&place) else { return };
+        assert_eq!(said.code, Some(0), "{said:?}");
+        let said = said.out;
+        let events = said.lines().filter(|line| line.contains("not by this command); there again ")).count();
+        assert_eq!(events, kills(), "{said}");
+        // Where slots are left out masters change by themselves, so that it may not be the master any more that is killed.
+        let masters = said.lines().filter(|line| line.contains("It was the master. ")).count();
+        assert!(if is_starved(&said) { masters > 0 } else { masters == kills() }, "{masters} masters:\n{said}");
+        assert!(
+            said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"),
+            "{said}"
+        );
+        println!(
+            "{}",
+            said.lines()
+                .filter(|line| line.contains(" → ") || line.contains("there again"))
+                .collect::<Vec<_>>()
+                .join("\n")
+        );
+        assert_kept(&said, kills());
+        place.assert_empty();
+    });
 }
 
 #[test]
 fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
-    let place = Place::new();
-    let arguments = ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "--kill-master"];
-    let stalls = Stalls::watched();
-    let said = demo_heard(&place, &arguments);
-    if lacks_namespaces(&said.err) {
-        return;
-    }
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let said = said.out;
-    for words in
-        ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
-    {
-        assert!(said.contains(words), "no `{words}`:\n{said}");
-    }
-    assert!(said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"), "{said}");
-    assert_kept(&said, 1, stalls);
-    place.assert_empty();
+    judged(Watched::Ordinary, || {
+        let place = Place::new();
+        let arguments = ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "--kill-master"];
+        let said = place.say(&arguments);
+        if lacks_namespaces(&said.err) {
+            return;
+        }
+        assert_eq!(said.code, Some(0), "{said:?}");
+        let said = said.out;
+        for words in
+            ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
+        {
+            assert!(said.contains(words), "no `{words}`:\n{said}");
+        }
+        assert!(
+            said.contains("had counted before it died is gone") && said.contains("the accounts balance\n"),
+            "{said}"
+        );
+        assert_kept(&said, 1);
+        place.assert_empty();
+    });
 }
 
 /// Sealed, its next life knows nobody, and hears the time before anybody has shown that it lives.
 #[test]
 fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
-    let place = Place::new();
-    let arguments = ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "--kill-master"];
-    let stalls = Stalls::watched();
-    let said = demo_heard(&place, &arguments);
-    if lacks_namespaces(&said.err) {
-        return;
-    }
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let Said { out, err, .. } = said;
-    assert!(err.contains("is sealed with") || out.contains("is sealed with"), "{out}{err}");
-    for words in
-        ["killed on purpose); there again ", "It was the master. ", "Master at the end: ", "the accounts balance\n"]
-    {
-        assert!(out.contains(words), "no `{words}`:\n{out}");
-    }
-    for node in NODES {
-        let row = slots_of(&out, node);
-        assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
-    }
-    if !is_starved(&out) && !has_stood_still(stalls) {
-        // A second of eight.
-        assert_lost_of(&out, 8);
-    }
-    place.assert_empty();
+    judged(Watched::Ordinary, || {
+        let place = Place::new();
+        let arguments = ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "--kill-master"];
+        let said = place.say(&arguments);
+        if lacks_namespaces(&said.err) {
+            return;
+        }
+        assert_eq!(said.code, Some(0), "{said:?}");
+        let Said { out, err, .. } = said;
+        assert!(err.contains("is sealed with") || out.contains("is sealed with"), "{out}{err}");
+        for words in
+            ["killed on purpose); there again ", "It was the master. ", "Master at the end: ", "the accounts balance\n"]
+        {
+            assert!(out.contains(words), "no `{words}`:\n{out}");
+        }
+        for node in NODES {
+            let row = slots_of(&out, node);
+            assert!(row.split_whitespace().next().unwrap().parse::<u64>().unwrap() > 10, "slots used: {row}");
+        }
+        if !is_starved(&out) {
+            // A second of eight.
+            assert_lost_of(&out, 8);
+        }
+        place.assert_empty();
+    });
 }

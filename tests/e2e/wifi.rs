@@ -5,6 +5,7 @@ use crate::harness::{PATIENCE, Place, Robot, patient, probe, skipped, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use rohrpost::macro_support::{append, from_bytes};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -160,32 +161,35 @@ impl Wifi {
 
 #[test]
 fn by_a_bad_wifi_what_comes_is_fresh_and_an_outage_costs_a_gap_and_nothing_else() {
-    let Some(wifi) = Wifi::launched() else { return };
-    wait("blobs are replaced", || (wifi.replaced() > 0).then_some(()));
-    wifi.check_fresh();
-    wifi.check_commands(0);
-    let shown = wifi.place.say_at(&wifi.config, "base", &["net"]).out;
-    let replaced = |line: &str| line.starts_with("TCP router") && line.split_whitespace().any(|word| word == "screen");
-    assert!(shown.contains("replaced") && shown.lines().any(replaced), "{shown}");
+    judged(Watched::Ordinary, || {
+        let Some(wifi) = Wifi::launched() else { return };
+        wait("blobs are replaced", || (wifi.replaced() > 0).then_some(()));
+        wifi.check_fresh();
+        wifi.check_commands(0);
+        let shown = wifi.place.say_at(&wifi.config, "base", &["net"]).out;
+        let replaced =
+            |line: &str| line.starts_with("TCP router") && line.split_whitespace().any(|word| word == "screen");
+        assert!(shown.contains("replaced") && shown.lines().any(replaced), "{shown}");
 
-    let modules = || [("base", "probe.0"), ("far", "screen.0")].map(|(node, module)| wifi.robot(node).pid(module));
-    let (before, outages) = (modules(), wait("net tells", || wifi.net("far")["beyond"]["outages"].as_u64()));
-    wifi.lab.cut("far").unwrap();
-    wait("far is away", || (wifi.net("far")["beyond"]["state"] == "away").then_some(()));
-    wifi.lab.mend("far").unwrap();
-    wait("far takes part again, and says that it was away", || {
-        let beyond = wifi.net("far")["beyond"].clone();
-        (beyond["state"] == "up" && beyond["outages"].as_u64() > Some(outages)).then_some(())
+        let modules = || [("base", "probe.0"), ("far", "screen.0")].map(|(node, module)| wifi.robot(node).pid(module));
+        let (before, outages) = (modules(), wait("net tells", || wifi.net("far")["beyond"]["outages"].as_u64()));
+        wifi.lab.cut("far").unwrap();
+        wait("far is away", || (wifi.net("far")["beyond"]["state"] == "away").then_some(()));
+        wifi.lab.mend("far").unwrap();
+        wait("far takes part again, and says that it was away", || {
+            let beyond = wifi.net("far")["beyond"].clone();
+            (beyond["state"] == "up" && beyond["outages"].as_u64() > Some(outages)).then_some(())
+        });
+        wifi.check_fresh();
+        wifi.check_commands(10);
+        assert_eq!(modules(), before, "nothing was started again");
+        let numbers: Vec<u64> = wifi.blobs().iter().map(|(number, _)| *number).collect();
+        assert!(numbers.is_sorted_by(|one, next| one < next), "none twice, and none behind a newer one: {numbers:?}");
+        let longest = numbers.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap();
+        // Three seconds and more until it is noticed that nobody is there.
+        assert!(longest > 40 * 3, "{longest} blobs are the gap of the outage");
+        let counted = wifi.place.counted();
+        assert_eq!((counted.len(), counted.iter().collect::<HashSet<_>>().len()), (20, 20), "each command ran once");
+        wifi.stop();
     });
-    wifi.check_fresh();
-    wifi.check_commands(10);
-    assert_eq!(modules(), before, "nothing was started again");
-    let numbers: Vec<u64> = wifi.blobs().iter().map(|(number, _)| *number).collect();
-    assert!(numbers.is_sorted_by(|one, next| one < next), "none twice, and none behind a newer one: {numbers:?}");
-    let longest = numbers.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap();
-    // Three seconds and more until it is noticed that nobody is there.
-    assert!(longest > 40 * 3, "{longest} blobs are the gap of the outage");
-    let counted = wifi.place.counted();
-    assert_eq!((counted.len(), counted.iter().collect::<HashSet<_>>().len()), (20, 20), "each command ran once");
-    wifi.stop();
 }

@@ -15,6 +15,7 @@
 use super::load::{Load, on_one_processor};
 use super::robot::{Mark, Robot};
 use super::viewer::{Viewer, free_port};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::time::{Duration, Instant};
 
 /// The robot's latencies with a viewer that misbehaves, by those in peace; in as many rounds as somebody asked for.
@@ -211,42 +212,44 @@ fn measure(test: &mut Test, when: &str, marks: &[(Mark, &str); 2], freeze: bool)
 
 #[test]
 fn a_viewer_that_misbehaves_does_not_slow_the_robot() {
-    let mut test = Test::new(|_| String::new());
-    test.robot.mark(&Mark::Begun(1));
-    test.windows();
-    assert_eq!(test.counts().drawn, 0, "there is no viewer yet");
-    test.restart();
-    test.returned(&Mark::Begun(2), "Begun");
+    judged(Watched::Ordinary, || {
+        let mut test = Test::new(|_| String::new());
+        test.robot.mark(&Mark::Begun(1));
+        test.windows();
+        assert_eq!(test.counts().drawn, 0, "there is no viewer yet");
+        test.restart();
+        test.returned(&Mark::Begun(2), "Begun");
 
-    test.viewer().freeze();
-    test.windows_over(LONG_FREEZE);
-    test.viewer().go_on();
-    test.returned(&Mark::Frozen(1), "Frozen");
-    let stuck = test.counts();
-    assert!(stuck.stuck >= 1 && stuck.rebuilt >= 1, "{stuck:?}");
+        test.viewer().freeze();
+        test.windows_over(LONG_FREEZE);
+        test.viewer().go_on();
+        test.returned(&Mark::Frozen(1), "Frozen");
+        let stuck = test.counts();
+        assert!(stuck.stuck >= 1 && stuck.rebuilt >= 1, "{stuck:?}");
 
-    let marks = [(Mark::Frozen(2), "Frozen"), (Mark::Killed(1), "Killed")];
-    let quiet = measure(&mut test, "usual", &marks, true);
-    test.robot.flood(true);
-    let marks = [(Mark::Frozen(3), "Frozen"), (Mark::Flooded(1), "Flooded")];
-    let flooded = measure(&mut test, "flood", &marks, false);
-    test.robot.flood(false);
+        let marks = [(Mark::Frozen(2), "Frozen"), (Mark::Killed(1), "Killed")];
+        let quiet = measure(&mut test, "usual", &marks, true);
+        test.robot.flood(true);
+        let marks = [(Mark::Frozen(3), "Frozen"), (Mark::Flooded(1), "Flooded")];
+        let flooded = measure(&mut test, "flood", &marks, false);
+        test.robot.flood(false);
 
-    test.robot.assert_well();
-    let counts = test.counts();
-    println!("{counts:?}; at most {} MiB", test.most_mib);
-    assert!(counts.replaced > 0, "{counts:?}");
-    assert!(test.most_mib <= MIB_MAX, "the bridge had {} MiB", test.most_mib);
-    let said = test.robot.said();
-    assert!(said.contains("stands still") && said.contains("has gone"), "it says what the viewer does:\n{said}");
-    assert!(threads_are_nice(&test.robot), "all threads are as nice as their class");
-    let most = if rounds_asked_for().is_some() { RATIO_MAX } else { RATIO_MAX_OF_FEW };
-    for (when, worst) in [("usual", quiet), ("flood", flooded)] {
-        assert!(
-            worst <= most,
-            "{when}: with a fault the robot's latencies are {worst:.2} times those in peace, not {most}"
-        );
-    }
+        test.robot.assert_well();
+        let counts = test.counts();
+        println!("{counts:?}; at most {} MiB", test.most_mib);
+        assert!(counts.replaced > 0, "{counts:?}");
+        assert!(test.most_mib <= MIB_MAX, "the bridge had {} MiB", test.most_mib);
+        let said = test.robot.said();
+        assert!(said.contains("stands still") && said.contains("has gone"), "it says what the viewer does:\n{said}");
+        assert!(threads_are_nice(&test.robot), "all threads are as nice as their class");
+        let most = if rounds_asked_for().is_some() { RATIO_MAX } else { RATIO_MAX_OF_FEW };
+        for (when, worst) in [("usual", quiet), ("flood", flooded)] {
+            assert!(
+                worst <= most,
+                "{when}: with a fault the robot's latencies are {worst:.2} times those in peace, not {most}"
+            );
+        }
+    });
 }
 
 /// The measurement can fail: a robot that waits for its viewer is found out.

@@ -14,6 +14,7 @@
 mod beyond;
 mod capture;
 mod namespace;
+pub mod stalls;
 
 pub use capture::{Capture, Crossing};
 pub use namespace::{Inside, become_able};

@@ -5,7 +5,6 @@
 pub(crate) mod hog;
 pub(crate) mod process;
 pub(crate) mod relay;
-pub(crate) mod stalls;
 pub(crate) mod talk;
 
 use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
@@ -330,7 +329,13 @@ impl Crossed {
 pub(crate) struct Capture {
     ends: Arc<AtomicBool>,
     seen: Arc<Mutex<Vec<Crossed>>>,
-    thread: JoinHandle<()>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Capture {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Capture {
@@ -346,7 +351,7 @@ impl Capture {
                 }
             }
         });
-        Self { ends, seen, thread }
+        Self { ends, seen, thread: Some(thread) }
     }
 
     /// What was seen so far.
@@ -355,9 +360,9 @@ impl Capture {
     }
 
     /// All that was seen.
-    pub(crate) fn end(self) -> Vec<Crossed> {
+    pub(crate) fn end(mut self) -> Vec<Crossed> {
         self.ends.store(true, Ordering::Relaxed);
-        self.thread.join().unwrap();
+        self.thread.take().unwrap().join().unwrap();
         std::mem::take(&mut *self.seen.lock().unwrap())
     }
 }

@@ -1,6 +1,5 @@
 //! Modules that speak from node to node, in numbers: what was lost, and what came in another order, is seen.
 
-use super::stalls::Stalls;
 use super::{NODES, PATIENCE, Segment, label};
 use rohrpost_mailbox::{Receiver, SendError, Sender};
 use std::time::{Duration, Instant};
@@ -54,8 +53,6 @@ pub(crate) struct Ears {
     heard: Vec<Vec<Vec<u16>>>,
     /// Whom each was greeted by since the last acquaintance began.
     greeted: Vec<Vec<bool>>,
-    /// Since they listened last for all that was said.
-    stalls: Stalls,
 }
 
 impl Ears {
@@ -64,13 +61,7 @@ impl Ears {
             receivers: segment.stations.iter().map(|station| station.receiver()).collect(),
             heard: vec![vec![Vec::new(); NODES.into()]; NODES.into()],
             greeted: vec![vec![false; NODES.into()]; NODES.into()],
-            stalls: Stalls::watched(),
         }
-    }
-
-    /// Whether this computer had too little time for slots since they listened last: then packages become too old, and are lost.
-    pub(crate) fn is_excused(&mut self) -> bool {
-        std::mem::replace(&mut self.stalls, Stalls::watched()).starved()
     }
 
     pub(crate) fn listen(&mut self) {
@@ -105,32 +96,22 @@ impl Ears {
             std::thread::sleep(PAUSE);
             self.listen();
         }
+        // Of what was said before nothing is under way any more.
+        self.heard.iter_mut().flatten().for_each(Vec::clear);
     }
 
-    /// Waits until all these numbers have come from each of the nodes to each other, which they do on a computer that has time for slots.
-    pub(crate) fn hear_all(&mut self, nodes: &[u8], numbers: &[u16]) {
-        match self.try_hear_all(nodes, numbers) {
-            Ok(()) => self.stalls = Stalls::watched(),
-            Err((from, to, heard)) => assert!(self.is_excused(), "{from} to {to}: {heard:?}"),
-        }
-    }
-
-    /// The same; the first that was not heard in full, by whom, and what was heard of it. That is known once a later number has come: between
+    /// Waits until all these numbers have come from each of the nodes to each other. That one does not come is known once a later number has: between
     /// two nodes nothing changes its order.
-    pub(crate) fn try_hear_all(&mut self, nodes: &[u8], numbers: &[u16]) -> Result<(), (u8, u8, Vec<u16>)> {
+    pub(crate) fn hear_all(&mut self, nodes: &[u8], numbers: &[u16]) {
         let began = Instant::now();
-        let mut heard_all = Ok(());
         for (from, to) in nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to))) {
-            while from != to && heard_all.is_ok() && self.heard[usize::from(to)][usize::from(from)] != numbers {
+            while from != to && self.heard[usize::from(to)][usize::from(from)] != numbers {
                 let heard = &self.heard[usize::from(to)][usize::from(from)];
-                if !numbers.starts_with(heard) || began.elapsed() > PATIENCE {
-                    heard_all = Err((from, to, heard.clone()));
-                }
+                assert!(numbers.starts_with(heard) && began.elapsed() < PATIENCE, "{from} to {to}: {heard:?}");
                 std::thread::sleep(Duration::from_millis(1));
                 self.listen();
             }
         }
         self.heard.iter_mut().flatten().for_each(Vec::clear);
-        heard_all
     }
 }

@@ -5,6 +5,7 @@ use crate::sealed::{Authority, Holds};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use rohrpost_mailbox::{Head, Priority, Type};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
 use rohrpost_routers::tcp::{LinkState, ServerSeal};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -278,10 +279,14 @@ fn others_are_served(authority: Option<&Authority>) {
 
 #[test]
 fn who_is_well_behaved_is_served_while_others_attack() {
-    others_are_served(None);
+    judged(Watched::Ordinary, || {
+        others_are_served(None);
+    });
 }
 
 #[test]
 fn who_has_a_certificate_is_served_while_those_without_attack() {
-    others_are_served(Some(&Authority::new()));
+    judged(Watched::Ordinary, || {
+        others_are_served(Some(&Authority::new()));
+    });
 }

@@ -7,6 +7,7 @@ use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost::mailbox::{Head, Type};
 use rohrpost_routers::frame::{FrameHead, Kind};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::net::UdpSocket;
 use std::time::Duration;
 
@@ -49,54 +50,59 @@ impl Second {
 
 #[test]
 fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() {
-    let Some(field) = Field::launched() else { return };
-    field.wait_counted("base", "probe.1", 1);
-    let mut sink = Sink::new(field.robot("base"), "base");
-    let mut first = Source::new(field.robot("arm"), "arm", "base", PLAIN);
-    let mut second = Second::new(&field);
-    let words = ["two routers send as node arm", "address is used twice"];
-    wait("base tells of two", || {
-        first.send();
-        second.send();
-        sink.take(Duration::from_millis(1));
-        (!field.lines("router.0", &words).is_empty()).then_some(())
-    });
-    field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
-    // What is delivered: of the first until the second is heard, from there on of the second alone.
-    wait("all of the second came", || {
-        sink.take(Duration::from_millis(1));
-        (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
-    });
-    let numbers = sink.numbers(PLAIN);
-    let turn = numbers.iter().position(|number| *number == SECOND).unwrap();
-    assert!(turn <= 2, "{turn} of the first came before");
-    assert!(
-        (SECOND..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
-        "all of the second, and nothing else"
-    );
-    // How many there were only their own router knows: on a busy computer it cannot send all of a burst.
-    wait("those of the first are counted", || (field.peer("base", "arm").refused > 0).then_some(()));
-    // The first notices that its peer hears another.
-    wait("arm is not heard", || {
-        second.send();
-        (field.peer("arm", "base").state == LinkState::Unheard).then_some(())
-    });
-    assert_eq!(field.fault("arm", "probe.0"), Fault::NodeDeaf { node: "base".into() });
+    judged(Watched::Ordinary, || {
+        let Some(field) = Field::launched() else { return };
+        field.wait_counted("base", "probe.1", 1);
+        let mut sink = Sink::new(field.robot("base"), "base");
+        let mut first = Source::new(field.robot("arm"), "arm", "base", PLAIN);
+        let mut second = Second::new(&field);
+        let words = ["two routers send as node arm", "address is used twice"];
+        wait("base tells of two", || {
+            first.send();
+            second.send();
+            sink.take(Duration::from_millis(1));
+            (!field.lines("router.0", &words).is_empty()).then_some(())
+        });
+        field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
+        // What is delivered: of the first until the second is heard, from there on of the second alone.
+        wait("all of the second came", || {
+            sink.take(Duration::from_millis(1));
+            (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
+        });
+        let numbers = sink.numbers(PLAIN);
+        let turn = numbers.iter().position(|number| *number == SECOND).unwrap();
+        assert!(turn <= 2, "{turn} of the first came before");
+        assert!(
+            (SECOND..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
+            "all of the second, and nothing else"
+        );
+        // How many there were only their own router knows: on a busy computer it cannot send all of a burst.
+        wait("those of the first are counted", || (field.peer("base", "arm").refused > 0).then_some(()));
+        // The first notices that its peer hears another.
+        wait("arm is not heard", || {
+            second.send();
+            (field.peer("arm", "base").state == LinkState::Unheard).then_some(())
+        });
+        assert_eq!(field.fault("arm", "probe.0"), Fault::NodeDeaf { node: "base".into() });
 
-    // The second ends: after a second of its silence the first is heard again.
-    sink.came.clear();
-    wait("the first is heard again", || {
-        first.send();
-        sink.take(Duration::from_millis(1));
-        (sink.numbers(PLAIN).iter().filter(|number| **number < SECOND).count() > 10).then_some(())
+        // The second ends: after a second of its silence the first is heard again.
+        sink.came.clear();
+        wait("the first is heard again", || {
+            first.send();
+            sink.take(Duration::from_millis(1));
+            (sink.numbers(PLAIN).iter().filter(|number| **number < SECOND).count() > 10).then_some(())
+        });
+        let numbers = sink.numbers(PLAIN);
+        let first_again = numbers.iter().position(|number| *number < SECOND).unwrap();
+        assert!(
+            numbers[first_again..].is_sorted_by(|one, next| one < next),
+            "in order, none twice, none of the second"
+        );
+        field.wait_counted("base", "probe.1", 2);
+        field.wait_counted("arm", "probe.0", 3);
+        wait("to the second, and back", || (field.peer("base", "arm").restarts == 2).then_some(()));
+        assert_eq!(field.lines("router.0", &words).len(), 1, "told once");
+        drop((first, sink));
+        field.stop();
     });
-    let numbers = sink.numbers(PLAIN);
-    let first_again = numbers.iter().position(|number| *number < SECOND).unwrap();
-    assert!(numbers[first_again..].is_sorted_by(|one, next| one < next), "in order, none twice, none of the second");
-    field.wait_counted("base", "probe.1", 2);
-    field.wait_counted("arm", "probe.0", 3);
-    wait("to the second, and back", || (field.peer("base", "arm").restarts == 2).then_some(()));
-    assert_eq!(field.lines("router.0", &words).len(), 1, "told once");
-    drop((first, sink));
-    field.stop();
 }
