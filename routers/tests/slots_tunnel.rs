@@ -266,17 +266,8 @@ fn copy_file(mut near: TcpStream, mut far: TcpStream) -> JoinHandle<bool> {
 }
 
 /// Somebody types until something is done, a few characters at a time, and waits until they are there; how often.
-fn typed(
-    mut near: TcpStream,
-    mut far: TcpStream,
-    mut is_done: impl FnMut() -> bool + Send + 'static,
-) -> JoinHandle<usize> {
-    let screen = std::thread::spawn(move || {
-        let mut bytes = [0; 64];
-        while let Ok(count @ 1..) = far.read(&mut bytes) {
-            far.write_all(&bytes[..count]).unwrap();
-        }
-    });
+fn typed(mut near: TcpStream, far: TcpStream, mut is_done: impl FnMut() -> bool + Send + 'static) -> JoinHandle<usize> {
+    let screen = std::thread::spawn(move || std::io::copy(&mut &far, &mut &far).unwrap());
     std::thread::spawn(move || {
         let mut times = 0;
         while !is_done() || times < TYPED_MIN {
