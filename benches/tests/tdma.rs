@@ -4,6 +4,7 @@
 
 mod support;
 
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
@@ -36,22 +37,24 @@ fn case_of(row: &Map<String, Value>) -> String {
 
 #[test]
 fn every_case_runs_and_every_line_is_complete() {
-    let (output, prefix) = run("tdma", &["--quick", "--json"]);
-    let rows = rows(&output);
-    for (case, who) in ROWS {
-        let own = || rows.iter().filter(|row| case_of(row) == case.split(',').next().unwrap());
-        // Where there are no namespaces, no real time or no command, a note says so. What failed is no excuse.
-        let is_skipped = own().any(|row| row["note"].as_str().is_some_and(|note| note.starts_with("skipped: ")));
-        let is_there = rows.iter().any(|row| row["case"] == case && row["who"] == who);
-        assert!(is_there || is_skipped, "{case} by {who}");
-        assert!(own().next().is_some(), "{case}");
-    }
-    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
-    assert_eq!(failed, None);
-    // Whatever was declared arrived.
-    let lost = rows.iter().filter(|row| row["case"] == "flows, lost");
-    lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
-    assert_eq!(left_behind(&prefix), [""; 0]);
+    judged(Watched::RealTime, || {
+        let (output, prefix) = run("tdma", &["--quick", "--json"]);
+        let rows = rows(&output);
+        for (case, who) in ROWS {
+            let own = || rows.iter().filter(|row| case_of(row) == case.split(',').next().unwrap());
+            // Where there are no namespaces, no real time or no command, a note says so. What failed is no excuse.
+            let is_skipped = own().any(|row| row["note"].as_str().is_some_and(|note| note.starts_with("skipped: ")));
+            let is_there = rows.iter().any(|row| row["case"] == case && row["who"] == who);
+            assert!(is_there || is_skipped, "{case} by {who}");
+            assert!(own().next().is_some(), "{case}");
+        }
+        let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
+        assert_eq!(failed, None);
+        // Whatever was declared arrived.
+        let lost = rows.iter().filter(|row| row["case"] == "flows, lost");
+        lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
+        assert_eq!(left_behind(&prefix), [""; 0]);
+    });
 }
 
 #[test]

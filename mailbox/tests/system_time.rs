@@ -140,7 +140,8 @@ fn a_reader_finds_a_whole_record_however_its_writer_dies() {
     let clock = SystemClock::open(&ground.node());
     let end = Instant::now() + Duration::from_secs(3);
     let (mut epoch, mut kills, mut readings) = (0, 0, 0u64);
-    while Instant::now() < end {
+    // On a busy computer it takes longer to kill so many.
+    while Instant::now() < end || kills <= 10 || readings <= 1000 {
         let writer = ground.start("write");
         assert_eq!(writer.hear(), "writing");
         for _ in 0..(writer.id() % 7 + 1) * 2_000 {
@@ -157,5 +158,4 @@ fn a_reader_finds_a_whole_record_however_its_writer_dies() {
         kills += 1;
         assert!(clock.record().is_some(), "a dead writer stops nobody");
     }
-    assert!(kills > 10 && readings > 1000, "{kills} kills, {readings} readings");
 }

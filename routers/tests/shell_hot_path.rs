@@ -8,6 +8,7 @@ mod common;
 
 use common::{PATIENCE, Pair, Side, label, module, turns};
 use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::security::Port;
 use rohrpost_routers::stats::Stats;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -65,13 +66,15 @@ fn round(sender: &mut Sender, receiver: &mut Receiver, large: &[u8]) {
 /// All ways of sending in one test, one after the other: all threads of the process are counted.
 #[test]
 fn no_package_takes_from_the_heap() {
-    as_packages_come(&Pair::new());
-    let mut sealed = Pair::new();
-    sealed.sides.iter_mut().for_each(Side::seal);
-    as_packages_come(&sealed);
-    assert!(sealed.sides[0].shell.as_ref().unwrap().rejections(Port::Packages).is_some());
-    drop(sealed);
-    in_time_slots();
+    judged(Watched::Ordinary, || {
+        as_packages_come(&Pair::new());
+        let mut sealed = Pair::new();
+        sealed.sides.iter_mut().for_each(Side::seal);
+        as_packages_come(&sealed);
+        assert!(sealed.sides[0].shell.as_ref().unwrap().rejections(Port::Packages).is_some());
+        drop(sealed);
+        in_time_slots();
+    });
 }
 
 fn mailboxes(pair: &Pair) -> (Sender, Receiver) {

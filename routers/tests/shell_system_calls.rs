@@ -15,6 +15,7 @@ use nix::sys::signal::{Signal, raise};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 use rohrpost_mailbox::Shape;
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 
@@ -121,31 +122,33 @@ fn call_name(number: libc::c_long, arguments: [u64; 6]) -> String {
 
 #[test]
 fn a_package_costs_one_call_to_send_one_to_receive_and_those_to_sleep_and_wake() {
-    let mut child = Command::new(std::env::current_exe().unwrap());
-    child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, "1");
-    let child = child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-    let calls = trace();
-    drop(child);
-    let of = |thread: &str, call: &str| calls.get(&(thread.to_owned(), call.to_owned())).copied().unwrap_or(0);
-    // Each node now and then says that it is still there, and looks at what time has brought about.
-    let spare = PACKAGES / 2;
-    let both = |call: &str, thread: &str, least: u64| {
-        let times = of(thread, call);
-        assert!((least..=PACKAGES + spare).contains(&times), "{thread}, {call}: {times} times in {calls:?}");
-    };
-    both("send", "departures", PACKAGES);
-    both("sleep", "departures", 1);
-    both("receive", "arrivals", PACKAGES);
-    // None, if the module was never quick enough to sleep before its package came.
-    both("wake", "arrivals", 0);
-    both("pause", "departures", 0);
-    both("pause", "arrivals", 0);
-    for ((thread, call), times) in &calls {
-        let known = match thread.as_str() {
-            "departures" => ["send", "sleep", "pause", "clock"].contains(&call.as_str()),
-            "arrivals" => ["receive", "wake", "pause", "clock"].contains(&call.as_str()),
-            _ => true,
+    judged(Watched::Ordinary, || {
+        let mut child = Command::new(std::env::current_exe().unwrap());
+        child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, "1");
+        let child = child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+        let calls = trace();
+        drop(child);
+        let of = |thread: &str, call: &str| calls.get(&(thread.to_owned(), call.to_owned())).copied().unwrap_or(0);
+        // Each node now and then says that it is still there, and looks at what time has brought about.
+        let spare = PACKAGES / 2;
+        let both = |call: &str, thread: &str, least: u64| {
+            let times = of(thread, call);
+            assert!((least..=PACKAGES + spare).contains(&times), "{thread}, {call}: {times} times in {calls:?}");
         };
-        assert!(known, "{thread}: {call}, {times} times");
-    }
+        both("send", "departures", PACKAGES);
+        both("sleep", "departures", 1);
+        both("receive", "arrivals", PACKAGES);
+        // None, if the module was never quick enough to sleep before its package came.
+        both("wake", "arrivals", 0);
+        both("pause", "departures", 0);
+        both("pause", "arrivals", 0);
+        for ((thread, call), times) in &calls {
+            let known = match thread.as_str() {
+                "departures" => ["send", "sleep", "pause", "clock"].contains(&call.as_str()),
+                "arrivals" => ["receive", "wake", "pause", "clock"].contains(&call.as_str()),
+                _ => true,
+            };
+            assert!(known, "{thread}: {call}, {times} times");
+        }
+    });
 }

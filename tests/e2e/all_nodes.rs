@@ -1,6 +1,6 @@
 //! `launch --all`: all nodes of a configuration on this computer, in network namespaces.
 
-use crate::harness::{NETWORK, OUTPUT, Place, lacks_namespaces, patient, probe, runs, skipped, wait};
+use crate::harness::{NETWORK, OUTPUT, Place, lacks_namespaces, probe, runs, skipped, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use std::collections::BTreeSet;
@@ -60,8 +60,8 @@ fn nodes_start_talk_and_are_stopped() {
     let mut launch = all(&place, &config, &[]);
     wait_until_both_run(&mut launch);
     assert!(launch.out().starts_with("security = \"none\": packages between nodes are neither sealed nor signed"));
-    assert_eq!(place.say_at(&config, "base", &patient(&["call", "probe.1", "count", "1"])).ok(), "1\n");
-    assert_eq!(place.say_at(&config, "arm", &patient(&["call", "probe.0", "count", "2"])).ok(), "1\n");
+    assert_eq!(place.say_at(&config, "base", &["call", "probe.1", "count", "1"]).ok(), "1\n");
+    assert_eq!(place.say_at(&config, "arm", &["call", "probe.0", "count", "2"]).ok(), "1\n");
     assert_eq!(devices(), before, "the lab's devices are in the lab");
     let processes = below(launch.pid());
     assert_eq!(processes.len(), 6, "two launches, two routers, two probes");
@@ -139,7 +139,7 @@ fn calls_are_counted_once_over_a_bad_network() {
     wait_until_both_run(&mut launch);
     let mut expected = Vec::new();
     for number in 1..=12 {
-        let said = place.say_at(&config, "base", &patient(&["call", "probe.1", "count", &number.to_string()]));
+        let said = place.say_at(&config, "base", &["call", "probe.1", "count", &number.to_string()]);
         // One that fails says so, and may have been run; none is run twice.
         if said.code == Some(0) {
             expected.push(number);

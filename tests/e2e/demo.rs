@@ -18,24 +18,26 @@ fn number(text: &str, words: &str) -> u64 {
 
 #[test]
 fn the_simulated_robot_maps_and_says_what_came_of_it() {
-    let place = Place::new();
-    let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
-    wait("it has mapped", || {
-        demo.assert_runs();
-        let said = place.say(&["call", "mapper.0", "counts", "--json"]);
-        let counts: serde_json::Value = serde_json::from_str(&said.out).ok()?;
-        let enough = |what: &str, least: u64| counts[what].as_u64() > Some(least);
-        (enough("mapped", 5) && enough("free", 1000) && enough("occupied", 50)).then_some(())
+    judged(Watched::Ordinary, || {
+        let place = Place::new();
+        let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
+        wait("it has mapped", || {
+            demo.assert_runs();
+            let said = place.say(&["call", "mapper.0", "counts", "--json"]);
+            let counts: serde_json::Value = serde_json::from_str(&said.out).ok()?;
+            let enough = |what: &str, least: u64| counts[what].as_u64() > Some(least);
+            (enough("mapped", 5) && enough("free", 1000) && enough("occupied", 50)).then_some(())
+        });
+        let said = demo.stop();
+        for class in ["pilot", "mapper", "output", "tool"] {
+            assert!(said.lines().any(|line| line.starts_with(class)), "no class {class}:\n{said}");
+        }
+        assert!(number(&said, " packages received, ") > 50, "{said}");
+        assert_eq!(number(&said, " lost\n"), 0, "{said}");
+        assert!(number(&said, " scans mapped (") > 5, "{said}");
+        assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+        place.assert_empty();
     });
-    let said = demo.stop();
-    for class in ["pilot", "mapper", "output", "tool"] {
-        assert!(said.lines().any(|line| line.starts_with(class)), "no class {class}:\n{said}");
-    }
-    assert!(number(&said, " packages received, ") > 50, "{said}");
-    assert_eq!(number(&said, " lost\n"), 0, "{said}");
-    assert!(number(&said, " scans mapped (") > 5, "{said}");
-    assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
-    place.assert_empty();
 }
 
 /// The same robot over three nodes, on a network that loses, delays and reorders.
@@ -83,8 +85,14 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
         assert_eq!(rows.len(), 11, "all of config/demo-tdma.toml: {flows}");
         for row in rows {
             let columns: Vec<_> = row.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
-            let [flow, _, packages, bound, _, slowest, _, within, ..] = columns[..] else { panic!("{row}") };
+            let [flow, _, packages, bound, kept, slowest, _, within, _, beyond_of_kept, ..] = columns[..] else {
+                panic!("{row}")
+            };
             assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
+            assert_eq!(
+                beyond_of_kept, "0",
+                "whoever's slots were kept is in time: {kept} of at most {bound}:\n{flows}"
+            );
             assert!(flow != "laser.0 → pilot.0" || ["10.00 ms", "900.00 ms"].contains(&within), "{row}");
         }
         place.assert_empty();

@@ -48,11 +48,14 @@ pub(crate) fn wait<T>(what: impl Debug, mut look: impl FnMut() -> Option<T>) -> 
     }
 }
 
-/// A call of a person who waits until a busy computer has the time to answer, longer than the second that is usual.
-pub(crate) fn patient<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+/// What a person asks for who waits until a busy computer has the time to answer, longer than the second that is usual; unless that is said.
+fn patient<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+    const PATIENT: [&str; 2] = ["--timeout", "20"];
+    let is_said = arguments.iter().any(|word| word.starts_with("--timeout"));
     match arguments {
-        ["call", rest @ ..] => [&["call", "--timeout", "20"], rest].concat(),
-        other => other.to_vec(),
+        ["call" | "ping" | "status", ..] if !is_said => [&arguments[..1], &PATIENT, &arguments[1..]].concat(),
+        ["param", _, ..] if !is_said => [&arguments[..2], &PATIENT, &arguments[2..]].concat(),
+        _ => arguments.to_vec(),
     }
 }
 
@@ -171,8 +174,13 @@ impl Place {
         command
     }
 
-    /// Runs a command to its end.
+    /// Runs a command to its end, patiently.
     pub(crate) fn say(&self, arguments: &[&str]) -> Said {
+        self.say_at_once(&patient(arguments))
+    }
+
+    /// Runs it as it is.
+    pub(crate) fn say_at_once(&self, arguments: &[&str]) -> Said {
         Running::start(self.command(arguments)).said()
     }
 

@@ -1,7 +1,7 @@
 //! Two nodes of one system on this computer, each with its router, at addresses of the loopback: what goes from one to the other, and
 //! what is told when it does not.
 
-use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, patient, probe, signal, wait};
+use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use nix::sys::signal::Signal;
@@ -10,6 +10,7 @@ use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::mailbox::{Head, monotonic_ns};
 use rohrpost::{CallError, Fault};
 use rohrpost_routers::frame::{FrameHead, Kind};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -85,7 +86,7 @@ impl Lan {
 
     /// A command of a person at `base`.
     fn say(&self, arguments: &[&str]) -> crate::process::Said {
-        self.place.say_at(&self.config, "base", &patient(arguments))
+        self.place.say_at(&self.config, "base", arguments)
     }
 
     /// What counting at `arm` brings, called from `base`.
@@ -262,36 +263,38 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
 
 #[test]
 fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
-    let mut lan = Lan::launched();
-    let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
-    let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
-    assert_eq!(told.as_array().unwrap().len(), 1, "of the node that was asked for");
-    let config = lan.config.to_str().unwrap().to_owned();
-    let all = |lan: &Lan, more: &[&str]| lan.place.say(&[&["net", "--config", &config], more].concat());
-    let told = wait("all hear each other, and have one time", || {
-        let told: serde_json::Value = serde_json::from_str(&all(&lan, &["--json"]).out).unwrap();
-        let alive = (0..2).all(|node| state(&told, node) == "alive");
-        let slave = (0..2).any(|node| told[node]["clock"]["role"] == "slave");
-        // They say that they are there.
-        let sends = told[0]["rates"][0]["sent_bytes_s"].as_f64() > Some(0.0);
-        (alive && slave && sends).then_some(told)
+    judged(Watched::Ordinary, || {
+        let mut lan = Lan::launched();
+        let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
+        let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
+        assert_eq!(told.as_array().unwrap().len(), 1, "of the node that was asked for");
+        let config = lan.config.to_str().unwrap().to_owned();
+        let all = |lan: &Lan, more: &[&str]| lan.place.say(&[&["net", "--config", &config], more].concat());
+        let told = wait("all hear each other, and have one time", || {
+            let told: serde_json::Value = serde_json::from_str(&all(&lan, &["--json"]).out).unwrap();
+            let alive = (0..2).all(|node| state(&told, node) == "alive");
+            let slave = (0..2).any(|node| told[node]["clock"]["role"] == "slave");
+            // They say that they are there.
+            let sends = told[0]["rates"][0]["sent_bytes_s"].as_f64() > Some(0.0);
+            (alive && slave && sends).then_some(told)
+        });
+        assert_eq!((&told[0]["node"], &told[1]["links"]["peers"][0]["node"]), (&"base".into(), &"base".into()));
+        let text = all(&lan, &[]).ok();
+        for words in ["base", "arm", "alive", "slave of", "there and back"] {
+            assert!(text.contains(words), "no `{words}` in:\n{text}");
+        }
+        // A command to a mailbox that nobody has is lost at its node, and that is told.
+        assert_eq!(lan.say(&["stop", "probe.1"]).code, Some(0));
+        wait("it is refused", || (lan.fault() == Some(Fault::NoMailbox)).then_some(()));
+        wait("the loss is told", || all(&lan, &[]).out.contains("no-mailbox").then_some(()));
+        let (mut launch, robot) = lan.nodes.pop().unwrap();
+        drop(robot);
+        launch.stop();
+        let silent = wait("arm is silent", || Some(all(&lan, &[])).filter(|said| said.out.contains("silent")));
+        assert_eq!(silent.code, Some(1), "{silent:?}");
+        assert!(silent.out.contains("node arm: "), "{silent:?}");
+        lan.stop();
     });
-    assert_eq!((&told[0]["node"], &told[1]["links"]["peers"][0]["node"]), (&"base".into(), &"base".into()));
-    let text = all(&lan, &[]).ok();
-    for words in ["base", "arm", "alive", "slave of", "there and back"] {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
-    }
-    // A command to a mailbox that nobody has is lost at its node, and that is told.
-    assert_eq!(lan.say(&["stop", "probe.1"]).code, Some(0));
-    wait("it is refused", || (lan.fault() == Some(Fault::NoMailbox)).then_some(()));
-    wait("the loss is told", || all(&lan, &[]).out.contains("no-mailbox").then_some(()));
-    let (mut launch, robot) = lan.nodes.pop().unwrap();
-    drop(robot);
-    launch.stop();
-    let silent = wait("arm is silent", || Some(all(&lan, &[])).filter(|said| said.out.contains("silent")));
-    assert_eq!(silent.code, Some(1), "{silent:?}");
-    assert!(silent.out.contains("node arm: "), "{silent:?}");
-    lan.stop();
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south` (system 2) reaches it.
 //! Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
 
-use crate::harness::{NETWORK, Place, Robot, patient, probe, skipped, wait};
+use crate::harness::{NETWORK, Place, Robot, probe, skipped, wait};
 use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
 use rohrpost::CallError;
@@ -124,7 +124,7 @@ impl Systems {
 
     /// A command of a person at a node.
     pub(crate) fn says(&self, node: &str, arguments: &[&str]) -> Said {
-        self.place.say_at(&self.config(node), node, &patient(arguments))
+        self.place.say_at(&self.config(node), node, arguments)
     }
 
     /// A program that is no node, at `south`'s computer, in a system of its own.

@@ -1,7 +1,7 @@
 //! A laptop of a robot, `far`, by a bad Wi-Fi: the robot publishes more than the line carries, and the laptop follows that in a mailbox in which
 //! only the newest counts.
 
-use crate::harness::{PATIENCE, Place, Robot, patient, probe, skipped, wait};
+use crate::harness::{PATIENCE, Place, Robot, probe, skipped, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use rohrpost::macro_support::{append, from_bytes};
@@ -147,7 +147,7 @@ impl Wifi {
             assert!(counted.is_ok(), "{number}: {counted:?}");
         }
         tool.close();
-        assert_eq!(self.place.say_at(&self.config, "base", &patient(&["call", "screen.0", "status"])).code, Some(0));
+        assert_eq!(self.place.say_at(&self.config, "base", &["call", "screen.0", "status"]).code, Some(0));
     }
 
     fn stop(mut self) {

@@ -1,6 +1,7 @@
 //! Drawings of whole demos, in files.
 
 use super::programs::{bridge, entities_of, ok, rerun, rows, rrd, search_path, timed_rows, times_ns};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
@@ -110,62 +111,67 @@ fn the_simulated_robot_is_drawn() {
 /// Each node draws what its router tells of its slots, and of the flows that leave it.
 #[test]
 fn time_slots_and_flows_are_drawn() {
-    let drawing = Drawing::where_possible(&["--nodes", "3", "--tdma", "--seconds", "10"]);
-    let Some(drawing) = drawing else { return };
-    for entity in ["slots", "guards", "nodes", "marks", "times"] {
-        drawing.has(&format!("/slots/plan/{entity}"), 1..=1);
-    }
-    // Told twice a second.
-    for node in ["base", "brain", "desk"] {
-        drawing.has(&format!("/slots/sent/{node}"), 1..=40);
-        drawing.has(&format!("/slots/off/{node}"), 2..=41);
-    }
-    for flow in [r"base\ 0", r"brain\ 0"] {
-        drawing.has(&format!("/slots/flows/{flow}/slowest"), 2..=41);
-        drawing.has(&format!(r"/slots/flows/{flow}/at\ worst"), 2..=41);
-    }
+    judged(Watched::Ordinary, || {
+        let drawing = Drawing::where_possible(&["--nodes", "3", "--tdma", "--seconds", "10"]);
+        let Some(drawing) = drawing else { return };
+        for entity in ["slots", "guards", "nodes", "marks", "times"] {
+            drawing.has(&format!("/slots/plan/{entity}"), 1..=1);
+        }
+        // Told twice a second.
+        for node in ["base", "brain", "desk"] {
+            drawing.has(&format!("/slots/sent/{node}"), 1..=40);
+            drawing.has(&format!("/slots/off/{node}"), 2..=41);
+        }
+        for flow in [r"base\ 0", r"brain\ 0"] {
+            drawing.has(&format!("/slots/flows/{flow}/slowest"), 2..=41);
+            drawing.has(&format!(r"/slots/flows/{flow}/at\ worst"), 2..=41);
+        }
+    });
 }
 
 /// The GUI is not on the robot's LAN, and the TCP router, by which alone it is reached, is killed in the middle: that costs a gap, which is seen,
 /// and nothing else.
 #[test]
 fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
-    let drawing = Drawing::where_possible(&["--nodes", "3", "--gui", "tcp", "--secure", "--seconds", "16"]);
-    let Some(drawing) = drawing else { return };
-    let said = &drawing.said;
-    assert!(said.contains("The TCP router died") && said.contains("killed on purpose); there again"), "{said}");
-    assert!(said.contains("the accounts balance"), "{said}");
-    // When packages could not come, as the drawing itself tells.
-    let lane = timed_rows(&drawing.file(), r"/modules/TCP\ router\,\ from\ desk");
-    let states: Vec<bool> = lane.iter().map(|(_, state)| state.contains("on")).collect();
-    assert!(states.chunks(2).all(|pair| pair[0] && pair.get(1) != Some(&true)) && states.len() >= 3, "{lane:?}");
-    let (began_ns, ended_ns) = (lane[1].0, lane.last().unwrap().0);
-    assert!(began_ns < ended_ns && *states.last().unwrap(), "{lane:?}");
-    // Of seven seconds at least on each side, ten a second; a busy computer draws fewer.
-    for entity in ["/world/scan/laser.0", "/world/robot/mapper.0", "/world/robot/odometry.0"] {
-        let times = times_ns(&drawing.file(), entity);
-        let (before, after) = (times.partition_point(|ns| *ns < began_ns), times.partition_point(|ns| *ns <= ended_ns));
-        let within = after - before;
-        assert!(
-            before > 15 && times.len() - after > 15,
-            "{entity}: {before} rows before, {within} within, {}",
-            times.len()
-        );
-    }
-    // What is of its moment is gone when the gap begins.
-    let cleared = times_ns(&drawing.file(), "/world/scan");
-    assert!(cleared.first().is_some_and(|ns| *ns <= ended_ns) && cleared.is_sorted(), "{cleared:?}, {lane:?}");
-    assert!(!said.contains("out-of-order"), "{said}");
-    for entity in ["/world/map/mapper.0", "/packages/gui", r"/network/packages/base\ \u{2192}\ brain", "/output"] {
-        assert!(drawing.count(entity) > 0, "{entity}: {:#?}", drawing.rows);
-    }
-    let late = times_ns(&drawing.file(), r"/network/packages/base\ \u{2192}\ brain");
-    assert!(late.last() > Some(&ended_ns), "links are told of again");
-    drawing.has("/modules/pilot.0", 1..=8);
-    let robot = drawing.said.split("\ngui ").nth(2).and_then(|row| row.lines().next()).unwrap();
-    let counts: Vec<u64> = robot.split_whitespace().map_while(|word| word.parse().ok()).collect();
-    let [meant, _left, _replaced, came, ..] = counts[..] else { panic!("{robot}") };
-    assert!(meant > 200 && came * 5 > meant * 4, "of some thousand a gap's are missing: {robot}");
+    judged(Watched::Ordinary, || {
+        let drawing = Drawing::where_possible(&["--nodes", "3", "--gui", "tcp", "--secure", "--seconds", "16"]);
+        let Some(drawing) = drawing else { return };
+        let said = &drawing.said;
+        assert!(said.contains("The TCP router died") && said.contains("killed on purpose); there again"), "{said}");
+        assert!(said.contains("the accounts balance"), "{said}");
+        // When packages could not come, as the drawing itself tells.
+        let lane = timed_rows(&drawing.file(), r"/modules/TCP\ router\,\ from\ desk");
+        let states: Vec<bool> = lane.iter().map(|(_, state)| state.contains("on")).collect();
+        assert!(states.chunks(2).all(|pair| pair[0] && pair.get(1) != Some(&true)) && states.len() >= 3, "{lane:?}");
+        let (began_ns, ended_ns) = (lane[1].0, lane.last().unwrap().0);
+        assert!(began_ns < ended_ns && *states.last().unwrap(), "{lane:?}");
+        // Of seven seconds at least on each side, ten a second; a busy computer draws fewer.
+        for entity in ["/world/scan/laser.0", "/world/robot/mapper.0", "/world/robot/odometry.0"] {
+            let times = times_ns(&drawing.file(), entity);
+            let (before, after) =
+                (times.partition_point(|ns| *ns < began_ns), times.partition_point(|ns| *ns <= ended_ns));
+            let within = after - before;
+            assert!(
+                before > 15 && times.len() - after > 15,
+                "{entity}: {before} rows before, {within} within, {}",
+                times.len()
+            );
+        }
+        // What is of its moment is gone when the gap begins.
+        let cleared = times_ns(&drawing.file(), "/world/scan");
+        assert!(cleared.first().is_some_and(|ns| *ns <= ended_ns) && cleared.is_sorted(), "{cleared:?}, {lane:?}");
+        assert!(!said.contains("out-of-order"), "{said}");
+        for entity in ["/world/map/mapper.0", "/packages/gui", r"/network/packages/base\ \u{2192}\ brain", "/output"] {
+            assert!(drawing.count(entity) > 0, "{entity}: {:#?}", drawing.rows);
+        }
+        let late = times_ns(&drawing.file(), r"/network/packages/base\ \u{2192}\ brain");
+        assert!(late.last() > Some(&ended_ns), "links are told of again");
+        drawing.has("/modules/pilot.0", 1..=8);
+        let robot = drawing.said.split("\ngui ").nth(2).and_then(|row| row.lines().next()).unwrap();
+        let counts: Vec<u64> = robot.split_whitespace().map_while(|word| word.parse().ok()).collect();
+        let [meant, _left, _replaced, came, ..] = counts[..] else { panic!("{robot}") };
+        assert!(meant > 200 && came * 5 > meant * 4, "of some thousand a gap's are missing: {robot}");
+    });
 }
 
 #[test]

@@ -255,13 +255,15 @@ fn a_viewer_that_misbehaves_does_not_slow_the_robot() {
 /// The measurement can fail: a robot that waits for its viewer is found out.
 #[test]
 fn a_robot_that_waits_for_its_viewer_is_found_out() {
-    let mut test = Test::new(|port| format!("ask-viewer = {port}"));
-    test.restart();
-    let before = quiet(&[test.windows(), test.windows()].concat());
-    test.viewer().freeze();
-    let with = quiet(&[test.windows(), test.windows()].concat());
-    test.viewer().go_on();
-    assert!(with > 3.0 * before, "{with} ns with a frozen viewer, {before} ns before");
+    judged(Watched::Ordinary, || {
+        let mut test = Test::new(|port| format!("ask-viewer = {port}"));
+        test.restart();
+        let before = quiet(&[test.windows(), test.windows()].concat());
+        test.viewer().freeze();
+        let with = quiet(&[test.windows(), test.windows()].concat());
+        test.viewer().go_on();
+        assert!(with > 3.0 * before, "{with} ns with a frozen viewer, {before} ns before");
+    });
 }
 
 /// Rerun makes threads of its own; they inherit what the bridge has. Class 40 has nice 8; the thread that waits for signals is

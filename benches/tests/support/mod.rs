@@ -35,7 +35,7 @@ pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
 }
 
 /// Its lines of contenders that failed.
-pub(crate) fn failures(output: &Output) -> Vec<String> {
+fn failures(output: &Output) -> Vec<String> {
     let text = String::from_utf8_lossy(&output.stdout);
     text.lines().filter(|line| line.contains(FAILED)).map(str::to_owned).collect()
 }

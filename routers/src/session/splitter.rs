@@ -1,6 +1,6 @@
 //! Cuts a stream of bytes into frames, wherever it is split. Memory grows with what came, never with what a head promises.
 
-use super::frame::{BadFrame, FrameHead, HEAD_BYTES};
+use super::frame::{BadFrame, FrameHead, HEAD_BYTES, is_tls};
 use crate::broken::broken;
 
 /// One direction of one connection.
@@ -52,6 +52,11 @@ impl Splitter {
     /// When the frame began that is not whole yet, ns.
     pub(super) fn waits_since(&self) -> Option<u64> {
         (!self.partial.is_empty() && !self.is_done).then_some(self.began_ns)
+    }
+
+    /// Whether what came last, less than a head, began as TLS does: what its other end says before it closes is that short.
+    pub(super) fn hears_tls(&self) -> bool {
+        !self.is_done && is_tls(&self.partial)
     }
 
     /// Bytes of memory.

@@ -43,14 +43,15 @@ pub struct Conflict {
 pub const ENTRIES_MAX: usize = 64 * 1024;
 
 impl Table {
-    /// A client hosts these names and no others; all of them or, if it may not, what it hosted before.
+    /// A client hosts these names and no others; all of them or, if it may not, what it hosted before. `may_host`: ranges in which they have to lie,
+    /// besides that they are of its system.
     ///
     /// # Errors
     /// [`Conflict`]
     pub fn register(
         &mut self,
         client: ClientIndex,
-        system: u8,
+        (system, may_host): (u8, Option<&[Range]>),
         ranges: impl Iterator<Item = Range>,
     ) -> Result<(), Conflict> {
         let own = |entry: &Entry| entry.client == client;
@@ -60,7 +61,8 @@ impl Table {
         let objects = |objection, range, holder| Err(Conflict { objection, range, holder });
         for Entry { range, .. } in entries.iter().filter(|entry| own(entry)) {
             let is_one = range.first.system() == system && range.last.system() == system && range.first <= range.last;
-            if !is_one {
+            let may = may_host.is_none_or(|may_host| may_host.iter().any(|may| may.holds(range)));
+            if !(is_one && may) {
                 return objects(Objection::NotOwn, *range, None);
             }
             if entries.len() > ENTRIES_MAX {
@@ -174,9 +176,9 @@ mod tests {
     fn the_narrowest_range_counts() {
         let mut table = Table::default();
         let [brain, arm, far] = [0, 1, 2].map(ClientIndex);
-        table.register(brain, 1, [range([1, 0, 0, 0], [1, 255, 255, 255])].into_iter()).unwrap();
-        table.register(arm, 1, [range([1, 200, 0, 0], [1, 200, 0, 255])].into_iter()).unwrap();
-        table.register(far, 2, [range([2, 200, 0, 0], [2, 200, 0, 255])].into_iter()).unwrap();
+        table.register(brain, (1, None), [range([1, 0, 0, 0], [1, 255, 255, 255])].into_iter()).unwrap();
+        table.register(arm, (1, None), [range([1, 200, 0, 0], [1, 200, 0, 255])].into_iter()).unwrap();
+        table.register(far, (2, None), [range([2, 200, 0, 0], [2, 200, 0, 255])].into_iter()).unwrap();
         for (name, client, why) in [
             (Name::new(1, 200, 0, 0), Some(arm), "the first of the narrower one"),
             (Name::new(1, 200, 0, 255), Some(arm), "its last"),
@@ -200,8 +202,8 @@ mod tests {
         let mut table = Table::default();
         let (one, other) = (ClientIndex(0), ClientIndex(1));
         let held = range([1, 10, 0, 0], [1, 20, 0, 0]);
-        table.register(one, 1, [held].into_iter()).unwrap();
-        table.register(other, 1, [range([1, 30, 0, 0], [1, 30, 0, 9])].into_iter()).unwrap();
+        table.register(one, (1, None), [held].into_iter()).unwrap();
+        table.register(other, (1, None), [range([1, 30, 0, 0], [1, 30, 0, 9])].into_iter()).unwrap();
         for (range, objection, holder) in [
             (held, Objection::Taken, Some(one)),
             (range([1, 9, 0, 0], [1, 10, 0, 0]), Objection::Crosses, Some(one)),
@@ -211,12 +213,12 @@ mod tests {
             (range([1, 41, 0, 0], [1, 40, 0, 0]), Objection::NotOwn, None),
         ] {
             let conflict = Conflict { objection, range, holder };
-            assert_eq!(table.register(other, 1, [range].into_iter()), Err(conflict), "{range}");
+            assert_eq!(table.register(other, (1, None), [range].into_iter()), Err(conflict), "{range}");
             assert_eq!(table.client_of(Name::new(1, 30, 0, 5)), Some(other), "as it was");
         }
-        table.register(other, 1, [range([1, 11, 0, 0], [1, 11, 0, 9])].into_iter()).unwrap();
+        table.register(other, (1, None), [range([1, 11, 0, 0], [1, 11, 0, 9])].into_iter()).unwrap();
         assert_eq!(table.client_of(Name::new(1, 30, 0, 5)), None, "a registration says all");
-        table.register(one, 1, [held].into_iter()).unwrap();
+        table.register(one, (1, None), [held].into_iter()).unwrap();
     }
 
     proptest! {
@@ -230,7 +232,7 @@ mod tests {
                 let mut all: Vec<Range> = own.map(|entry| entry.range).collect();
                 all.push(wanted);
                 let before = table.entries.len();
-                if table.register(client, 1, all.into_iter()).is_err() {
+                if table.register(client, (1, None), all.into_iter()).is_err() {
                     prop_assert_eq!(table.entries.len(), before);
                 }
             }

@@ -28,6 +28,8 @@ pub const PREFIX: &str = "Rohrpost installation ";
 pub const AUTHORITY: &str = "ca";
 /// Plain and sealed bytes that a connection keeps until the socket takes them, at most.
 const KEPT_BYTES: usize = 32 * 1024;
+/// So often a socket is read from at a time if nothing in it was to be handed on; once, that is some KiB.
+const READS_MAX: usize = 16;
 
 /// Who shows a certificate.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -280,7 +282,7 @@ impl Sealed {
 
     /// Opens what the socket has.
     pub(super) fn read(&mut self, into: &mut [u8], socket: &mut (impl io::Read + io::Write)) -> io::Result<usize> {
-        loop {
+        for _ in 0..READS_MAX {
             match io::Read::read(&mut self.0.reader(), into) {
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 done => return done,
@@ -294,6 +296,8 @@ impl Sealed {
             opened.map_err(|error| io::Error::other(words(&error)))?;
             flushed?;
         }
+        // What is in the socket still has another turn: records may be empty, without end.
+        io::Read::read(&mut self.0.reader(), into)
     }
 
     /// Who the other end is, by its certificate, as soon as that was shown and holds.
@@ -328,7 +332,12 @@ fn words(error: &Error) -> String {
         Error::NoCertificatesPresented => format!("it shows no certificate; {NEW}"),
         Error::PeerIncompatible(_) => "it speaks an older TLS than 1.3; run a newer version there".into(),
         Error::AlertReceived(alert) => match alert {
-            AlertDescription::CertificateExpired => format!("it refuses this end's certificate as expired; {NEW}"),
+            // It says the same of one that does not hold yet.
+            AlertDescription::CertificateExpired => {
+                format!(
+                    "it refuses this end's certificate as expired, or not valid yet; is the date right at both ends? If so, {NEW}"
+                )
+            }
             AlertDescription::UnknownCA | AlertDescription::DecryptError => {
                 format!("it refuses this end's certificate as foreign: {FOREIGN}")
             }

@@ -3,11 +3,13 @@
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type, local, monotonic_ns};
 use rohrpost_routers::access::Access;
 use rohrpost_routers::session::client::ClientSettings;
+use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::session::server::ServerSettings;
 use rohrpost_routers::shell::{Faults, Undelivered};
 use rohrpost_routers::tcp::{
     ClientParts, ClientSeal, ClientShell, LinkState, ServerError, ServerParts, ServerSeal, ServerShell,
 };
+use std::collections::BTreeMap;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -61,17 +63,35 @@ pub(crate) fn start_sealed(
     life: u64,
     seal: Option<ServerSeal>,
 ) -> Result<ServerShell, ServerError> {
+    start_for(address, node, life, seal, None)
+}
+
+/// Whose own system is 1, if it is said what the nodes of that host.
+pub(crate) fn start_for(
+    address: SocketAddr,
+    node: &Arc<Node>,
+    life: u64,
+    seal: Option<ServerSeal>,
+    names: Option<BTreeMap<String, Arc<[Range]>>>,
+) -> Result<ServerShell, ServerError> {
     let settings = ServerSettings {
         name: "the TCP router".into(),
         common: COMMON,
-        system: None,
+        system: names.is_some().then_some((1, 1)),
         life,
         clients_max: 16,
         greetings_max: 16,
         quota_bytes: 256 << 10,
         levels: [0; 256],
     };
-    ServerShell::start(ServerParts { address, settings, faults: Arc::new(Words), seal, node })
+    ServerShell::start(ServerParts {
+        address,
+        settings,
+        faults: Arc::new(Words),
+        seal,
+        names: names.unwrap_or_default(),
+        node,
+    })
 }
 
 /// A system of one node, with a module that hears and speaks.

@@ -1,8 +1,11 @@
 //! Sealed sessions: who has the right certificate takes part, and each other end learns why it does not.
 
-use crate::ground::{System, address, node, start_sealed, wait};
+use crate::ground::{System, address, module, node, start_for, start_sealed, wait};
 use rcgen::{CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, date_time_ymd};
+use rohrpost_mailbox::Name;
+use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::tcp::{AUTHORITY, ClientSeal, Holder, LinkState, SealError, ServerSeal};
+use std::collections::BTreeMap;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -124,6 +127,25 @@ fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
         wait(&format!("the server says {said}"), || server.members().refusal.contains(said).then_some(()));
     }
     assert!(server.members().members.iter().all(|member| !member.is_member));
+}
+
+#[test]
+fn a_certificate_of_the_own_system_hosts_what_its_file_gives_that_node_and_no_more() {
+    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
+    let range = |name: Name| Range::module(name);
+    let others = [range(Name::new(1, 101, 0, 0))];
+    let with = |ranges: Vec<Range>| Some(BTreeMap::from([("base".to_owned(), ranges.into())]));
+    let seal = || Some(ServerSeal::load(authority.path()).unwrap());
+    let server = start_for(address, &own, 1, seal(), with(others.to_vec())).unwrap();
+    let one = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
+    let two = System::sealed(2, "two", address, Some(authority.seal(2, Holds::Now)));
+    wait("why", || one.client.link().why.contains("or of its node").then_some(()));
+    // Of another system it knows nothing.
+    two.wait_up();
+    assert!(one.client.link().state != LinkState::Up);
+    drop(server);
+    let _server = start_for(address, &own, 2, seal(), with(vec![range(module(1)), others[0]])).unwrap();
+    one.wait_up();
 }
 
 #[test]

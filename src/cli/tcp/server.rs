@@ -5,6 +5,7 @@ use crate::cli::router::faults::Encoded;
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondHost, BeyondHosts, Tcp, TcpInterface};
 use rohrpost::mailbox::{monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError, Name};
+use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::session::server::ServerSettings;
 use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
 use std::net::SocketAddr;
@@ -37,10 +38,15 @@ impl Module for ServerModule {
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
         };
+        let names_of = |node: &rohrpost::config::Node| {
+            let ranges = installation.names_on(&node.name).into_iter().map(|(first, last)| Range { first, last });
+            (node.name.clone(), ranges.collect())
+        };
+        let names = installation.nodes.iter().map(names_of).collect();
         let address = tcp.address;
         let faults = Arc::new(Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
-        let shell = ServerShell::start(ServerParts { address, settings, faults, seal, node: &node })?;
+        let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node })?;
         context.set_period(PERIOD);
         Ok(Self { shell, address, began_ns: monotonic_ns() })
     }

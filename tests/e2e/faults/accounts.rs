@@ -4,6 +4,7 @@ use super::calls::{Calls, assert_once};
 use super::flow::{PLAIN, Sink, Source, balance};
 use super::{Field, TRANSIT_MAX};
 use crate::harness::wait;
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::time::Duration;
 
 const IMPAIR: &str = "loss=5%,delay=2ms,reorder=5%,duplicate=1%,seed=7";
@@ -17,44 +18,46 @@ const CALL: Duration = Duration::from_millis(900);
 
 #[test]
 fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
-    let Some(mut field) = Field::new(2, "") else { return };
-    field.launch(&["base", "arm"], &[("ROHRPOST_IMPAIR", IMPAIR)]);
-    let mut sink = Sink::new(field.robot("arm"), "arm");
-    let mut source = Source::new(field.robot("base"), "base", "arm", PLAIN);
-    // A younger server cannot tell whether one before it has run what is repeated, and says that the outcome is unknown.
-    let (probe, old) = (field.robot("base").name("probe.1"), (CALL + TRANSIT_MAX).as_millis() as u64);
-    wait("probe.1 is old enough", || {
-        let mut tool = field.robot("base").tool(CALL);
-        let status = tool.status(probe);
-        tool.close();
-        status.ok().filter(|status| status.uptime_ms > old)
-    });
-    let mut calls = Calls::new(&field, "base", "probe.1", CALL);
-    let mut last = 0;
-    while source.sent < PACKAGES {
-        let is_room = calls.look() < CALLS;
-        if source.send() && source.sent.is_multiple_of(CALL_EVERY) && is_room {
-            last += 1;
-            calls.begin(last);
+    judged(Watched::Ordinary, || {
+        let Some(mut field) = Field::new(2, "") else { return };
+        field.launch(&["base", "arm"], &[("ROHRPOST_IMPAIR", IMPAIR)]);
+        let mut sink = Sink::new(field.robot("arm"), "arm");
+        let mut source = Source::new(field.robot("base"), "base", "arm", PLAIN);
+        // A younger server cannot tell whether one before it has run what is repeated, and says that the outcome is unknown.
+        let (probe, old) = (field.robot("base").name("probe.1"), (CALL + TRANSIT_MAX).as_millis() as u64);
+        wait("probe.1 is old enough", || {
+            let mut tool = field.robot("base").tool(CALL);
+            let status = tool.status(probe);
+            tool.close();
+            status.ok().filter(|status| status.uptime_ms > old)
+        });
+        let mut calls = Calls::new(&field, "base", "probe.1", CALL);
+        let mut last = 0;
+        while source.sent < PACKAGES {
+            let is_room = calls.look() < CALLS;
+            if source.send() && source.sent.is_multiple_of(CALL_EVERY) && is_room {
+                last += 1;
+                calls.begin(last);
+            }
+            sink.take(Duration::from_micros(500));
         }
-        sink.take(Duration::from_micros(500));
-    }
-    calls.settle();
-    let accounts = balance(&field, &source, &mut sink, PLAIN);
+        calls.settle();
+        let accounts = balance(&field, &source, &mut sink, PLAIN);
 
-    let numbers = sink.numbers(PLAIN);
-    assert!(numbers.is_sorted_by(|one, next| one < next), "in order, none twice");
-    // Of a twentieth that the network lost, every one is known; and what else is missing there never carried a package.
-    assert!((PACKAGES / 40..PACKAGES / 10).contains(&accounts.wire), "{accounts:?}");
-    let peer = field.peer("arm", "base");
-    assert!(accounts.datagrams_lost - accounts.wire <= accounts.datagrams_other, "{accounts:?}");
-    assert!(peer.copies > 0 && peer.overtaken > 0, "{peer:?}");
-    let late = accounts.arm.lost.iter().find(|loss| loss.cause == "late").map_or(0, |loss| loss.packages);
-    assert!(late > 0, "what was overtaken is not delivered: {accounts:?}");
+        let numbers = sink.numbers(PLAIN);
+        assert!(numbers.is_sorted_by(|one, next| one < next), "in order, none twice");
+        // Of a twentieth that the network lost, every one is known; and what else is missing there never carried a package.
+        assert!((PACKAGES / 40..PACKAGES / 10).contains(&accounts.wire), "{accounts:?}");
+        let peer = field.peer("arm", "base");
+        assert!(accounts.datagrams_lost - accounts.wire <= accounts.datagrams_other, "{accounts:?}");
+        assert!(peer.copies > 0 && peer.overtaken > 0, "{peer:?}");
+        let late = accounts.arm.lost.iter().find(|loss| loss.cause == "late").map_or(0, |loss| loss.packages);
+        assert!(late > 0, "what was overtaken is not delivered: {accounts:?}");
 
-    // Each has three tries: of a tenth that is lost on the way there or back, hardly any is lost three times.
-    assert!(last >= 20 && calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);
-    assert_once(&field, "probe.1", &calls.close());
-    drop((source, sink));
-    field.stop();
+        // Each has three tries: of a tenth that is lost on the way there or back, hardly any is lost three times.
+        assert!(last >= 20 && calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);
+        assert_once(&field, "probe.1", &calls.close());
+        drop((source, sink));
+        field.stop();
+    });
 }

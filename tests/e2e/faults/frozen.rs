@@ -6,6 +6,7 @@ use crate::harness::{PATIENCE, halt, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::time::{Duration, Instant};
 
 /// Longer than any package may be under way.
@@ -42,26 +43,32 @@ fn freeze_arm(field: &Field, pids: &[u32], old: std::ops::Range<u32>, after: u32
 
 #[test]
 fn what_grew_old_while_a_router_or_a_node_was_frozen_is_never_run() {
-    let Some(field) = Field::launched() else { return };
-    field.wait_counted("base", "probe.1", 1);
-    freeze_arm(&field, &[field.router("arm")], 10..20, 2);
+    judged(Watched::Ordinary, || {
+        let Some(field) = Field::launched() else { return };
+        field.wait_counted("base", "probe.1", 1);
+        freeze_arm(&field, &[field.router("arm")], 10..20, 2);
 
-    let arm = field.robot("arm");
-    let all = [field.launcher("arm").pid(), field.router("arm"), arm.pid("probe.1")];
-    freeze_arm(&field, &all, 20..30, 3);
+        let arm = field.robot("arm");
+        let all = [field.launcher("arm").pid(), field.router("arm"), arm.pid("probe.1")];
+        freeze_arm(&field, &all, 20..30, 3);
 
-    // The router of the callers' own node: their commands wait in its mailbox.
-    let router = field.router("base");
-    halt(router);
-    grow_old(&field, "base", "probe.1", 30..40);
-    field.wait_for_state("arm", "base", LinkState::Silent);
-    signal(router, Signal::SIGCONT);
-    field.wait_counted("base", "probe.1", 4);
-    field.wait_counted("arm", "probe.0", 5);
-    assert_eq!(field.lines("router.0", &["node arm", "is silent"]).len(), 2, "a router that stood still blames nobody");
+        // The router of the callers' own node: their commands wait in its mailbox.
+        let router = field.router("base");
+        halt(router);
+        grow_old(&field, "base", "probe.1", 30..40);
+        field.wait_for_state("arm", "base", LinkState::Silent);
+        signal(router, Signal::SIGCONT);
+        field.wait_counted("base", "probe.1", 4);
+        field.wait_counted("arm", "probe.0", 5);
+        assert_eq!(
+            field.lines("router.0", &["node arm", "is silent"]).len(),
+            2,
+            "a router that stood still blames nobody"
+        );
 
-    let counted = field.counted("probe.1");
-    assert!((1..5).all(|number| counted.contains(&number)), "{counted:?}");
-    assert!(counted.iter().all(|number| *number < 5), "what was old was run: {counted:?}");
-    field.stop();
+        let counted = field.counted("probe.1");
+        assert!((1..5).all(|number| counted.contains(&number)), "{counted:?}");
+        assert!(counted.iter().all(|number| *number < 5), "what was old was run: {counted:?}");
+        field.stop();
+    });
 }

@@ -5,6 +5,7 @@ use crate::harness::{halt, runs, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, RouterInterface};
 use rohrpost::mailbox::{SystemClock, SystemTime, monotonic_ns};
+use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -94,38 +95,40 @@ fn agreed(field: &Field, nodes: &[&str]) -> (String, u64) {
 
 #[test]
 fn when_the_master_dies_the_next_takes_over_and_no_node_s_time_goes_back_or_leaves_its_bound() {
-    let Some(mut field) = Field::new(3, "") else { return };
-    field.launch(&NODES, &[]);
-    let (first, term) = agreed(&field, &NODES);
-    let reader = Reader::new(&field);
-    reader.go_on();
-    let epoch = field.said(&first, RouterInterface::CLOCK).epoch;
+    judged(Watched::Ordinary, || {
+        let Some(mut field) = Field::new(3, "") else { return };
+        field.launch(&NODES, &[]);
+        let (first, term) = agreed(&field, &NODES);
+        let reader = Reader::new(&field);
+        reader.go_on();
+        let epoch = field.said(&first, RouterInterface::CLOCK).epoch;
 
-    // It is not started again for now.
-    let (launch, router) = (field.launcher(&first).pid(), field.router(&first));
-    halt(launch);
-    signal(router, Signal::SIGKILL);
-    let killed = Instant::now();
-    wait(format!("{router} is gone"), || (!runs(router)).then_some(()));
-    let others: Vec<&str> = NODES.into_iter().filter(|node| *node != first).collect();
-    let (second, next_term) = agreed(&field, &others);
-    assert!(killed.elapsed() < TAKEN_OVER_WITHIN, "after {:?}", killed.elapsed());
-    assert_eq!(second, others[0], "the next in order");
-    assert!(next_term > term, "{next_term} follows {term}");
-    field.wait_counted(others[1], &format!("probe.{}", NODES.iter().position(|node| *node == second).unwrap()), 1);
-    reader.go_on();
+        // It is not started again for now.
+        let (launch, router) = (field.launcher(&first).pid(), field.router(&first));
+        halt(launch);
+        signal(router, Signal::SIGKILL);
+        let killed = Instant::now();
+        wait(format!("{router} is gone"), || (!runs(router)).then_some(()));
+        let others: Vec<&str> = NODES.into_iter().filter(|node| *node != first).collect();
+        let (second, next_term) = agreed(&field, &others);
+        assert!(killed.elapsed() < TAKEN_OVER_WITHIN, "after {:?}", killed.elapsed());
+        assert_eq!(second, others[0], "the next in order");
+        assert!(next_term > term, "{next_term} follows {term}");
+        field.wait_counted(others[1], &format!("probe.{}", NODES.iter().position(|node| *node == second).unwrap()), 1);
+        reader.go_on();
 
-    // It comes back, and finds a master.
-    signal(launch, Signal::SIGCONT);
-    field.robot(&first).wait_restarted(&router_of(&first), router);
-    assert_eq!(agreed(&field, &NODES), (second.clone(), next_term), "no change of masters without need");
-    for other in &others {
-        field.wait_for_state(&first, other, LinkState::Alive);
-    }
-    reader.go_on();
-    for node in NODES {
-        assert_eq!(field.said(node, RouterInterface::CLOCK).epoch, epoch, "{node}: no step of time");
-    }
-    reader.end();
-    field.stop();
+        // It comes back, and finds a master.
+        signal(launch, Signal::SIGCONT);
+        field.robot(&first).wait_restarted(&router_of(&first), router);
+        assert_eq!(agreed(&field, &NODES), (second.clone(), next_term), "no change of masters without need");
+        for other in &others {
+            field.wait_for_state(&first, other, LinkState::Alive);
+        }
+        reader.go_on();
+        for node in NODES {
+            assert_eq!(field.said(node, RouterInterface::CLOCK).epoch, epoch, "{node}: no step of time");
+        }
+        reader.end();
+        field.stop();
+    });
 }

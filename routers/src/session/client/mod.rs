@@ -264,6 +264,11 @@ impl Client {
         self.outgoing.bytes() + self.splitter.bytes()
     }
 
+    /// Whether what the server said last is TLS.
+    pub fn hears_tls(&self) -> bool {
+        self.splitter.hears_tls()
+    }
+
     /// The connection is made.
     pub fn connected(&mut self, now_ns: u64) {
         self.attempt += 1;

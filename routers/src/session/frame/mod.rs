@@ -78,6 +78,9 @@ pub enum BadFrame {
     /// The stream does not begin as one of ours.
     #[error("no session of Rohrpost; is this the port of its TCP router?")]
     Foreign,
+    /// TLS (RFC 8446, 5.1), where nothing is sealed.
+    #[error("it speaks TLS; write the same `security` in [tcp] at both ends")]
+    Tls,
     /// Another version of the format.
     #[error("session format {theirs}, ours is {VERSION}; run the same version of Rohrpost at both ends", theirs = .0)]
     Version(u8),
@@ -106,6 +109,9 @@ impl FrameHead {
     /// # Errors
     /// [`BadFrame`]; also if more would follow than `length_max`.
     pub fn parse(bytes: &[u8; HEAD_BYTES], length_max: usize) -> Result<Self, BadFrame> {
+        if is_tls(bytes) {
+            return Err(BadFrame::Tls);
+        }
         let mut fields = Fields::new(bytes);
         let (length, kind, hops, rest) = (fields.word()?, fields.byte()?, fields.byte()?, fields.rest());
         // First the kind: what is no session mostly begins with text, which makes an odd length.
@@ -119,6 +125,13 @@ impl FrameHead {
         }
     }
 }
+
+/// Whether bytes begin as a record of TLS does: its type, and a version. As a head they would be of a frame that is too long.
+pub(super) const fn is_tls(bytes: &[u8]) -> bool {
+    matches!(bytes, [20..=23, 3, 1..=4, ..])
+}
+
+const _: () = assert!(LENGTH_MAX < 0x01_03_14, "no head begins as a record of TLS");
 
 /// A frame, read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

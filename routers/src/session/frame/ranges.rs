@@ -105,7 +105,7 @@ pub enum Objection {
     Taken = 1,
     /// It has names in common with another range, and neither lies in the other.
     Crosses = 2,
-    /// No names of the client's system, or the first behind the last.
+    /// Not of the client's system, or the first behind the last, or not of its node, if the server knows what that hosts.
     NotOwn = 3,
     /// The server has no room for more ranges.
     TooMany = 4,
@@ -157,7 +157,10 @@ impl std::fmt::Display for Verdict<'_> {
             Some(Objection::Crosses) => {
                 write!(f, "{range} crosses what {holder} hosts; ranges lie in each other or have no name in common")
             }
-            Some(Objection::NotOwn) => write!(f, "{range} is no range of names of this client's system"),
+            Some(Objection::NotOwn) => write!(
+                f,
+                "{range} is no range of names of this client's system, or of its node, if the file of the TCP router has that"
+            ),
             Some(Objection::TooMany) => write!(f, "the TCP router has no room for more ranges; register wider ones"),
         }
     }

@@ -8,7 +8,7 @@ use crate::session::frame::{Carried, HOPS_MAX, Message, Refusal, TimeAnswer, VER
 use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Outgoing, Parcel, is_stale};
 use crate::session::{ClientIndex, answer_to, in_system, without_hurry};
-use rohrpost_mailbox::{ALL_SYSTEMS, ERROR_UNKNOWN_NS, Head, Name, TimeRecord};
+use rohrpost_mailbox::{ALL_SYSTEMS, ERROR_UNKNOWN_NS, Head, TimeRecord};
 
 impl Server {
     /// Hands a package of a client on.
@@ -18,7 +18,7 @@ impl Server {
         let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
         let hops = if broken!(KeepsHops) { carried.hops } else { carried.hops.saturating_add(1) };
         let carried = Carried { head, published_ns, hops, ..*carried };
-        let hosts = self.table.client_of(head.from) == Some(from) || head.from == Name::NONE;
+        let hosts = self.table.client_of(head.from) == Some(from);
         let is_own = hosts || self.is_to_host(from, head.from);
         let objection = if !is_own && !broken!(TakesForeignNames) {
             Some(Cause::Foreign)

@@ -1,9 +1,10 @@
 //! One connection, as the server knows it.
 
 use super::registering::Registrations;
-use crate::session::frame::{Hello, Reason, Verdict};
+use crate::session::frame::{Hello, Range, Reason, Verdict};
 use crate::session::outgoing::Outgoing;
 use crate::session::splitter::Splitter;
+use std::sync::Arc;
 
 /// How far a connection has come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -64,6 +65,8 @@ pub(super) struct Member {
     pub(super) system: u8,
     /// The system that it has proven to be of; none: it need not.
     pub(super) certified: Option<u8>,
+    /// It may host names in these alone; none: any of its system.
+    pub(super) may_host: Option<Arc<[Range]>>,
     pub(super) system_digest: u64,
     pub(super) reaches_own: bool,
     pub(super) life: u64,
@@ -94,6 +97,7 @@ impl Member {
             name: peer.to_owned(),
             system: 0,
             certified: None,
+            may_host: None,
             system_digest: 0,
             reaches_own: false,
             life: 0,

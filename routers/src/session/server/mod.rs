@@ -16,13 +16,14 @@ pub use member::State;
 
 use super::ClientIndex;
 use super::counts::Counts;
-use super::frame::{Reason, Verdict};
+use super::frame::{Range, Reason, Verdict};
 use super::table::Table;
 use super::{Answers, LOOK_EVERY_NS};
 use member::{Member, RoundTrip};
 use registering::Registering;
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// What the server knows before the first client.
 #[derive(Clone, Debug)]
@@ -231,11 +232,13 @@ impl Server {
         Some(ClientIndex(index as u16))
     }
 
-    /// A client has proven, before its hello, of which system it is, and what people call it: it may say no other in its hello.
-    pub fn certify(&mut self, client: ClientIndex, system: u8, name: &str) {
+    /// A client has proven, before its hello, of which system it is, and what people call it: it may say no other in its hello. If it is known which names
+    /// it hosts it may register no others.
+    pub fn certify(&mut self, client: ClientIndex, system: u8, name: &str, may_host: Option<Arc<[Range]>>) {
         if let Some(member) = self.member_mut(client) {
             name.clone_into(&mut member.name);
             member.certified = Some(system);
+            member.may_host = may_host;
         }
     }
 

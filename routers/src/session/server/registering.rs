@@ -120,15 +120,14 @@ impl Server {
         ranges: impl ExactSizeIterator<Item = Range>,
         host: &mut impl Host,
     ) {
-        let Some(system) = self.member(client).filter(|member| member.is_member()).map(|member| member.system) else {
-            return;
-        };
+        let Some(member) = self.member(client).filter(|member| member.is_member()) else { return };
+        let (system, may_host) = (member.system, member.may_host.clone());
         let count = ranges.len();
         self.registering.left = self.registering.left.saturating_sub(self.work_of(count));
         let nothing = Range { first: Name::NONE, last: Name::NONE };
         let mut verdict = Verdict { number, objection: None, range: nothing, holder: "" };
         let mut holder = String::new();
-        let conflict = self.table.register(client, system, ranges).err();
+        let conflict = self.table.register(client, (system, may_host.as_deref()), ranges).err();
         if let Some(conflict) = &conflict {
             verdict = Verdict { objection: Some(conflict.objection), range: conflict.range, ..verdict };
             let held_by = conflict.holder.and_then(|holder| self.member(holder));

@@ -301,13 +301,15 @@ fn what_waits_is_bounded_and_the_least_important_gives_way() {
 fn names_of_others_are_sent_by_nobody() {
     let mut ground = Ground::clients(2);
     let mut bytes = Vec::new();
-    let head = Head { to: module(1), from: module(1), ..Head::default() };
-    Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
+    for from in [module(1), Name::NONE] {
+        let head = Head { to: module(1), from, ..Head::default() };
+        Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
+    }
     let place = ground.ends[0].1.unwrap();
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
     ground.settle();
     assert_eq!(ground.delivered(1), []);
-    assert_eq!(ground.server.counts().lost_for(Cause::Foreign), 1);
+    assert_eq!(ground.server.counts().lost_for(Cause::Foreign), 2);
 }
 
 #[test]

@@ -16,8 +16,9 @@ use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::access::Access;
 use crate::impair;
+
 use crate::session::client::{Client, ClientSettings, Output, Package};
-use crate::session::frame::Range;
+use crate::session::frame::{BadFrame, Range};
 use crate::session::in_system;
 use crate::shell::Faults;
 use crate::shell::transit;
@@ -261,7 +262,7 @@ impl Work {
                 self.connection = Some(Connection { stream, watch, is_begun: true, awaits_room: true });
             }
             Err(error) => {
-                self.voice.unreached(&error.to_string());
+                self.voice.unreached(&error.to_string(), false);
                 self.client.closed(now_ns, &mut self.voice);
             }
         }
@@ -342,10 +343,12 @@ impl Work {
 
     fn broke(&mut self, error: Option<&io::Error>) {
         self.forget();
-        let was_up = self.client.is_up();
+        let (was_up, was_made) = (self.client.is_up(), self.client.is_connected());
         self.client.closed(monotonic_ns(), &mut self.voice);
         if !was_up {
-            self.voice.unreached(&error.map_or_else(|| "it closed the connection".into(), ToString::to_string));
+            let closed =
+                || if self.client.hears_tls() { BadFrame::Tls.to_string() } else { "it closed the connection".into() };
+            self.voice.unreached(&error.map_or_else(closed, ToString::to_string), was_made);
         }
     }
 

@@ -29,14 +29,16 @@ impl Voice {
         Self { server, ways, desk, access, why: String::new(), by_server: false, outage: Outage::default() }
     }
 
-    /// Says once why the server is not there.
-    pub(super) fn unreached(&mut self, why: &str) {
-        let why = format!(
-            "the TCP router at {} is not reached: {why}; does it run, and is it reached from here?",
-            self.server
-        );
+    /// Says once why the server is not there. `was_made`: the connection was.
+    pub(super) fn unreached(&mut self, why: &str, was_made: bool) {
+        let server = self.server;
+        let why = if was_made {
+            format!("takes no part at the TCP router at {server}: {why}")
+        } else {
+            format!("the TCP router at {server} is not reached: {why}; does it run, and is it reached from here?")
+        };
         // What it said itself is better than that its connection then ended.
-        if !self.by_server && self.why != why {
+        if !(self.by_server && was_made) && self.why != why {
             self.says(why, false);
         }
     }

@@ -10,12 +10,14 @@ use super::seal::{Holder, ServerSeal};
 use super::seen::{Class, HOSTS_MAX, MEMBERS_MAX, Member, Members, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
 use crate::session::ClientIndex;
+use crate::session::frame::Range;
 use crate::session::server::{Output, Server, ServerSettings, View};
 use crate::shell::Faults;
 use door::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
 use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
+use std::collections::BTreeMap;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
@@ -64,6 +66,8 @@ pub struct ServerParts<'a> {
     pub faults: Arc<dyn Faults>,
     /// Its certificates; none: nothing is sealed, and nobody shows who he is.
     pub seal: Option<ServerSeal>,
+    /// What each node of its own system hosts, by its configuration: no certificate lets one register more. Of other systems it knows nothing.
+    pub names: BTreeMap<String, Arc<[Range]>>,
     /// The node whose system time it tells.
     pub node: &'a Arc<Node>,
 }
@@ -87,7 +91,8 @@ impl ServerShell {
     /// # Errors
     /// [`ServerError`]
     pub fn start(parts: ServerParts<'_>) -> Result<Self, ServerError> {
-        let ServerParts { address, settings, faults, seal, node } = parts;
+        let ServerParts { address, settings, faults, seal, names, node } = parts;
+        let own = settings.system.map(|(system, _)| system);
         let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
         raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.greetings_max) + DESCRIPTORS_BESIDE);
         let listener = listen(address)?;
@@ -106,6 +111,8 @@ impl ServerShell {
             server: Server::new(settings),
             host: Voice::new(desk),
             seal,
+            own,
+            names,
             parting: Vec::new(),
             listener,
             accept_ns: None,
@@ -156,6 +163,8 @@ struct Work {
     server: Server,
     host: Voice,
     seal: Option<ServerSeal>,
+    own: Option<u8>,
+    names: BTreeMap<String, Arc<[Range]>>,
     /// Connections without a seal that holds, until the other end has read why, or this time has come, ns.
     parting: Vec<(u64, Stream)>,
     listener: TcpListener,
@@ -248,7 +257,9 @@ impl Work {
         let Some(connection) = connection(&mut self.connections, client) else { return false };
         if connection.stream.is_sealed() {
             let Some(Holder::Node { node, system }) = connection.stream.holder() else { return false };
-            self.server.certify(client, system, &format!("node {node} of system {system}"));
+            let may_host = || self.names.get(&node).cloned().unwrap_or_default();
+            let may_host = (self.own == Some(system)).then(may_host);
+            self.server.certify(client, system, &format!("node {node} of system {system}"), may_host);
         }
         connection.is_known = true;
         true
