@@ -99,6 +99,16 @@ pub enum KeysError {
     NotRotating(NonZeroU8),
 }
 
+/// Whether nobody but its owner may read a file. It is that which was opened, since the name may lead elsewhere by now.
+///
+/// # Errors
+/// [`KeysError::Open`], and [`KeysError::Read`] if that cannot be known.
+pub fn check_secret(path: &Path, file: &File) -> Result<(), KeysError> {
+    let metadata = file.metadata().map_err(|error| KeysError::Read(path.to_owned(), error))?;
+    let mode = metadata.permissions().mode() & 0o7777;
+    if mode & OTHERS == 0 { Ok(()) } else { Err(KeysError::Open(path.to_owned(), mode)) }
+}
+
 impl Keys {
     /// Where they lie in a folder.
     pub fn file(folder: &Path) -> PathBuf {
@@ -141,11 +151,7 @@ impl Keys {
     pub fn load(path: &Path) -> Result<Self, KeysError> {
         let failed = |error| KeysError::Read(path.to_owned(), error);
         let file = File::open(path).map_err(failed)?;
-        // Of what was opened: the name may lead elsewhere by now.
-        let mode = file.metadata().map_err(failed)?.permissions().mode() & 0o7777;
-        if mode & OTHERS != 0 {
-            return Err(KeysError::Open(path.to_owned(), mode));
-        }
+        check_secret(path, &file)?;
         let mut text = String::new();
         file.take(FILE_BYTES_MAX).read_to_string(&mut text).map_err(failed)?;
         Self::parse(&text).map_err(|(line, why)| KeysError::Wrong { path: path.to_owned(), line, why })

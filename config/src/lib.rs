@@ -69,7 +69,7 @@ pub use explain::explain;
 pub use flow::Flow;
 pub use gui::{Gui, Show};
 pub use installation::Installation;
-pub use keys::{KEY_BYTES, Key, Keys, KeysError};
+pub use keys::{KEY_BYTES, Key, Keys, KeysError, check_secret};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
 pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
 pub use network::{LEVEL_NOT_REAL_TIME, NODES_MAX, Network, Route, Security, TRANSIT};

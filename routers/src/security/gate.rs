@@ -87,12 +87,7 @@ impl Gate {
             self.reject(now_ns, came, why, why.into(), inbound, deliver);
             return None;
         }
-        match self.opening.open(datagram) {
-            // Right, but brought by someone else: that says nothing of the node whose address it has.
-            Ok(Opened::Frame(head, _) | Opened::Hello(head, _)) if !inbound.is_address_of(head.from, came.source) => {
-                let why = Rejection::Address;
-                self.reject(now_ns, came, why, why.into(), inbound, deliver);
-            }
+        match self.opening.open_from(datagram, |from| inbound.is_address_of(from, came.source)) {
             Ok(Opened::Frame(head, text)) => {
                 inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
             }

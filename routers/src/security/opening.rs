@@ -51,7 +51,7 @@ pub enum Rejection {
     /// Its seal is not right: made with another key, or altered.
     #[error("its seal is not right: another key with this id, or someone altered it; all nodes need the same key file")]
     Forged,
-    /// Its seal is right, and it comes from another address than its node has.
+    /// It comes from another address than the node has that it says it is from.
     #[error("it comes from another address than its node has in our configuration")]
     Address,
     /// Of another wire format: nothing more can be told of it.
@@ -130,6 +130,18 @@ impl Opening {
     /// # Errors
     /// [`NotOpened`]; nothing has changed, and no key was derived.
     pub fn open<'a>(&mut self, datagram: &'a mut [u8]) -> Result<Opened<'a>, NotOpened> {
+        self.open_from(datagram, |_| true)
+    }
+
+    /// The same, if it comes from where the node is that it says it is from: what others bring costs no opening, and does not use up what comes from there.
+    ///
+    /// # Errors
+    /// [`NotOpened`]; nothing has changed, and no key was derived.
+    pub fn open_from<'a>(
+        &mut self,
+        datagram: &'a mut [u8],
+        is_there: impl Fn(NodeIndex) -> bool,
+    ) -> Result<Opened<'a>, NotOpened> {
         let (head, key_id) = FrameHead::read(datagram)?;
         let all = &self.all;
         if key_id == 0 {
@@ -138,6 +150,9 @@ impl Opening {
         let key = all.keys.place(key_id).ok_or(Rejection::OtherKey)?;
         if !self.is_ours(&head) {
             return Err(Rejection::NotOurs.into());
+        }
+        if !is_there(head.from) {
+            return Err(Rejection::Address.into());
         }
         if head.kind == Kind::Hello {
             return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));

@@ -6,6 +6,7 @@
 //!  base.system-1.rohrpost       node `base` of system 1: it may host names of that system, and of no other
 //! ```
 
+use rohrpost_config::{KeysError, check_secret};
 use rustls::client::{Resumption, WebPkiServerVerifier};
 use rustls::crypto::ring;
 use rustls::pki_types::pem::PemObject;
@@ -14,6 +15,7 @@ use rustls::server::{NoServerSessionStorage, WebPkiClientVerifier};
 use rustls::{
     AlertDescription, CertificateError, ClientConfig, Connection, Error, RootCertStore, ServerConfig, version,
 };
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,8 +30,6 @@ pub const PREFIX: &str = "Rohrpost installation ";
 pub const AUTHORITY: &str = "ca";
 /// Plain and sealed bytes that a connection keeps until the socket takes them, at most.
 const KEPT_BYTES: usize = 32 * 1024;
-/// So often a socket is read from at a time if nothing in it was to be handed on; once, that is some KiB.
-const READS_MAX: usize = 16;
 
 /// Who shows a certificate.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -74,6 +74,9 @@ pub enum SealError {
     /// A file is not there, or holds something else.
     #[error("{0}: {1}; `rohrpost keys new` with the configuration makes it")]
     File(PathBuf, String),
+    /// Others than its owner may read the key.
+    #[error(transparent)]
+    Open(#[from] KeysError),
     /// They do not belong together.
     #[error(
         "the certificates in {0} do not fit together: {1}; `rohrpost keys rotate` with the configuration makes new ones"
@@ -170,8 +173,10 @@ impl Files {
         let mut roots = RootCertStore::empty();
         let trusted = roots.add(certificate(&authority)?);
         trusted.map_err(|error| SealError::File(authority.clone(), error.to_string()))?;
+        let file = File::open(&key).map_err(|error| SealError::File(key.clone(), error.to_string()))?;
+        check_secret(&key, &file)?;
         let secret =
-            PrivateKeyDer::from_pem_file(&key).map_err(|error| SealError::File(key.clone(), error.to_string()))?;
+            PrivateKeyDer::from_pem_reader(file).map_err(|error| SealError::File(key.clone(), error.to_string()))?;
         Ok(Self { folder: folder.into(), roots: Arc::new(roots), chain: vec![certificate(&own)?], key: secret })
     }
 }
@@ -280,9 +285,9 @@ impl Sealed {
         if taken == 0 { Err(io::ErrorKind::WouldBlock.into()) } else { Ok(taken) }
     }
 
-    /// Opens what the socket has.
+    /// Opens what the socket has. Of records that carry nothing TLS bears but a few, so that this ends.
     pub(super) fn read(&mut self, into: &mut [u8], socket: &mut (impl io::Read + io::Write)) -> io::Result<usize> {
-        for _ in 0..READS_MAX {
+        loop {
             match io::Read::read(&mut self.0.reader(), into) {
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 done => return done,
@@ -296,8 +301,6 @@ impl Sealed {
             opened.map_err(|error| io::Error::other(words(&error)))?;
             flushed?;
         }
-        // What is in the socket still has another turn: records may be empty, without end.
-        io::Read::read(&mut self.0.reader(), into)
     }
 
     /// Who the other end is, by its certificate, as soon as that was shown and holds.
@@ -354,18 +357,4 @@ fn words(error: &Error) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_certificate_says_whose_it_is() {
-        let base = Holder::Node { node: "base".into(), system: 7 };
-        assert_eq!(base.dns_name(), "base.system-7.rohrpost");
-        assert_eq!(Holder::of(&base.dns_name()), Some(base));
-        for name in
-            ["tcp-router.rohrpost", "base.system-7.example", "base.system-x.rohrpost", "base.system-256.rohrpost", ""]
-        {
-            assert_eq!(Holder::of(name), None, "{name}");
-        }
-    }
-}
+mod tests;

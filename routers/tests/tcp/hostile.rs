@@ -7,8 +7,8 @@ use proptest::test_runner::{RngAlgorithm, TestRng};
 use rohrpost_mailbox::{Head, Priority, Type};
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
-use rohrpost_routers::tcp::{LinkState, ServerSeal};
-use std::io::{BufRead, BufReader, Read, Write};
+use rohrpost_routers::tcp::{ClientSeal, LinkState, Moved, ServerSeal, Stream};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -52,6 +52,8 @@ fn in_a_process_of_its_own() {
 pub(crate) struct Target {
     child: Child,
     pub(crate) address: SocketAddr,
+    /// Of one whose handshakes are whole, and whose certificate another authority has signed.
+    stranger: Option<ClientSeal>,
     /// Connections, their bytes, and how many were refused, at most so far.
     most: Arc<Mutex<[u64; 3]>>,
 }
@@ -73,7 +75,7 @@ impl Target {
                 kept.lock().unwrap().iter_mut().zip(numbers).for_each(|(most, number)| *most = number.max(*most));
             }
         });
-        Self { child, address, most }
+        Self { child, address, stranger: authority.map(|authority| authority.forged(9)), most }
     }
 
     fn connect(&self) -> Option<TcpStream> {
@@ -169,6 +171,11 @@ fn attack(target: &Target, chance: &mut Chance, number: u64) -> Option<TcpStream
         2 => write(&hello(1000 + number)) && write(&[7, 0, 1, 0, 6, 0, 0, 0, 1, 2, 3]),
         // A hello that never ends.
         3 => write(&hello(7)[..chance.below(40)]),
+        // A handshake that costs the server all it can.
+        4 if let Some(stranger) = target.stranger.as_ref().filter(|_| chance.below(2) == 0) => {
+            shake_hands(target.address, stranger);
+            false
+        }
         // A handshake of TLS that never ends.
         4 => write(&[0x16, 3, 1, 2, 0, 1, 0, 1, 0xfc, 3, 3]),
         // All that a client may say, cut and damaged.
@@ -189,6 +196,21 @@ fn attack(target: &Target, chance: &mut Chance, number: u64) -> Option<TcpStream
         _ => true,
     };
     stays.then_some(stream)
+}
+
+/// Until the server has looked at the certificate, and refused it.
+fn shake_hands(address: SocketAddr, seal: &ClientSeal) {
+    let Ok(mut stream) = Stream::connect(address, Some(seal.begin().unwrap())) else { return };
+    for _ in 0..100 {
+        let is_over = match stream.connected() {
+            Ok(()) => stream.flush().is_err() || matches!(stream.read(&mut [0; 64]), Moved::Over(_)),
+            Err(error) => error.kind() != ErrorKind::NotConnected,
+        };
+        if is_over {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Bytes one at a time, in as many connections as it may have, until it ends.

@@ -6,6 +6,8 @@ use rohrpost_mailbox::Name;
 use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::tcp::{AUTHORITY, ClientSeal, Holder, LinkState, SealError, ServerSeal};
 use std::collections::BTreeMap;
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -57,6 +59,7 @@ impl Authority {
         let file = |end: &str| self.path().join(format!("{}.{end}", holder.file_name()));
         std::fs::write(file("pem"), certificate.pem()).unwrap();
         std::fs::write(file("key"), key.serialize_pem()).unwrap();
+        std::fs::set_permissions(file("key"), Permissions::from_mode(0o600)).unwrap();
     }
 
     /// What a node of a system begins its connections with.
@@ -64,6 +67,14 @@ impl Authority {
         let holder = holder(system);
         self.issue(&holder, holds);
         ClientSeal::load(self.path(), &holder).unwrap()
+    }
+
+    /// Of one who believes in this authority, but whose own certificate is of another.
+    pub(crate) fn forged(&self, system: u8) -> ClientSeal {
+        let foreign = Self::new();
+        foreign.issue(&holder(system), Holds::Now);
+        std::fs::copy(self.path().join("ca.pem"), foreign.path().join("ca.pem")).unwrap();
+        ClientSeal::load(foreign.path(), &holder(system)).unwrap()
     }
 }
 
@@ -91,7 +102,7 @@ fn who_has_a_certificate_takes_part_under_the_name_in_it() {
 
 #[test]
 fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
-    let (authority, foreign, address, (_folder, own)) = (Authority::new(), Authority::new(), address(), node());
+    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
     let server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
     let other_system = {
         authority.issue(&holder(7), Holds::Now);
@@ -101,25 +112,19 @@ fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
         authority.issue_as(&holder(8), "base.example", Holds::Now);
         ClientSeal::load(authority.path(), &holder(8)).unwrap()
     };
-    // It believes in the server's authority, but its own certificate is of another.
-    let forged = {
-        foreign.issue(&holder(9), Holds::Now);
-        std::fs::copy(authority.path().join("ca.pem"), foreign.path().join("ca.pem")).unwrap();
-        ClientSeal::load(foreign.path(), &holder(9)).unwrap()
-    };
     // What the client says, and what the server says.
     for (seal, words, said, what) in [
         (Some(authority.seal(3, Holds::UntilLongAgo)), "expired", "has expired", "an expired one"),
         (
             Some(authority.seal(3, Holds::NotYet)),
-            "refuses this end's certificate",
+            "as expired, or not valid yet; is the date right at both ends?",
             "not valid yet",
             "one of the future",
         ),
-        (Some(forged), "foreign", "is foreign", "one of another authority"),
+        (Some(authority.forged(9)), "foreign", "is foreign", "one of another authority"),
         (Some(other_system), "certificate is of system 7", "certificate is of system 7", "one of another system"),
         (Some(nobody), "does not fit: it names no node", "certificate: it names no node", "one that names no node"),
-        (None, "TCP router", "does not speak TLS", "none, and no TLS"),
+        (None, "it speaks TLS; write the same `security`", "does not speak TLS", "none, and no TLS"),
     ] {
         let client = System::sealed(3, "three", address, seal);
         let link = wait(what, || Some(client.client.link()).filter(|link| link.why.contains(words)));
@@ -127,6 +132,15 @@ fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
         wait(&format!("the server says {said}"), || server.members().refusal.contains(said).then_some(()));
     }
     assert!(server.members().members.iter().all(|member| !member.is_member));
+}
+
+#[test]
+fn who_seals_at_a_tcp_router_that_does_not_is_told_so_at_both_ends() {
+    let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
+    let server = start_sealed(address, &own, 1, None).unwrap();
+    let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
+    wait("the client says it", || client.client.link().why.contains("does not speak TLS").then_some(()));
+    wait("the server says it", || server.members().refusal.contains("it speaks TLS; write the same").then_some(()));
 }
 
 #[test]
@@ -160,6 +174,16 @@ fn a_server_of_another_installation_is_not_believed() {
     let _server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
     let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
     wait("why", || client.client.link().why.contains("not that of a TCP router").then_some(()));
+}
+
+#[test]
+fn a_key_that_others_may_read_is_refused() {
+    let authority = Authority::new();
+    drop(authority.seal(4, Holds::Now));
+    let key = authority.path().join("base.system-4.key");
+    std::fs::set_permissions(&key, Permissions::from_mode(0o640)).unwrap();
+    let error = ClientSeal::load(authority.path(), &holder(4)).unwrap_err().to_string();
+    assert!(error.contains("mode 640") && error.contains(&format!("chmod 600 {}", key.display())), "{error}");
 }
 
 #[test]

@@ -7,11 +7,11 @@ use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose,
     date_time_ymd,
 };
-use rohrpost::config::Installation;
+use rohrpost::config::{Installation, KeysError, check_secret};
 use rohrpost::mailbox::realtime_ns;
 use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
 pub(super) use shown::show;
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -40,6 +40,9 @@ pub(in crate::cli) enum CertificateError {
     /// A file.
     #[error("{0}: {1}")]
     File(PathBuf, io::Error),
+    /// Others than its owner may read a key.
+    #[error(transparent)]
+    Open(#[from] KeysError),
     /// The certificate of the authority.
     #[error(transparent)]
     Authority(#[from] SealError),
@@ -147,8 +150,12 @@ struct Signing {
 fn signing(folder: &Path, installation: &Installation) -> Result<Signing, CertificateError> {
     let [certificate, secret] = files(folder, AUTHORITY);
     let file = || installation.shown.clone();
-    let key = match fs::read_to_string(&secret) {
-        Ok(text) => Some(KeyPair::from_pem(&text).map_err(|error| CertificateError::Unfit(secret.clone(), error))?),
+    let key = match File::open(&secret) {
+        Ok(file) => {
+            check_secret(&secret, &file)?;
+            let text = io::read_to_string(file).map_err(|error| CertificateError::File(secret.clone(), error))?;
+            Some(KeyPair::from_pem(&text).map_err(|error| CertificateError::Unfit(secret.clone(), error))?)
+        }
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         Err(error) => return Err(CertificateError::File(secret, error)),
     };

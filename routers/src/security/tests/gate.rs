@@ -170,3 +170,24 @@ fn what_is_longer_than_any_of_ours_is_not_opened() {
     let rejected = |why| b.all.rejections(Port::Packages).of(Some(0), why);
     assert_eq!((rejected(Rejection::NotOurs), rejected(Rejection::Forged)), (1, 1));
 }
+
+/// Whoever hears what is said, and is quicker.
+#[test]
+fn what_is_brought_from_a_wrong_address_is_not_used_up_by_that() {
+    let (mut a, mut b) = (Router::new(0), Router::new(1));
+    acquaint_at(START, &mut a, &mut b);
+    let mut sealing = Sealing::new(&a.all, Port::Packages);
+    let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
+    let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
+    let kind = Kind::Alive;
+    let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence: 0 };
+    sealing.seal(&head, &mut datagram).unwrap();
+    let received = |b: &Router| b.end.stats.peer(0).received.datagrams.get();
+    let before = received(&b);
+    b.take(START, 2, &datagram);
+    assert_eq!((b.all.rejections(Port::Packages).of(Some(2), Rejection::Address), received(&b)), (1, before));
+    b.take(START, 0, &datagram);
+    assert_eq!(received(&b), before + 1);
+    b.take(START, 0, &datagram);
+    assert_eq!((b.all.rejections(Port::Packages).of(Some(0), Rejection::Replay), received(&b)), (1, before + 1));
+}

@@ -74,7 +74,7 @@ impl Seals {
         let opened = if overhears && self.opening.is_strange(datagram) {
             self.opening.overhear(datagram).map(|(head, text)| Heard::Overheard(head, text))
         } else {
-            match self.opening.open(datagram) {
+            match self.opening.open_from(datagram, |from| node == Some(from)) {
                 Ok(Opened::Frame(head, text)) => Ok(Heard::Proven(head, text)),
                 // A hello is for the other port: the one that opens says so.
                 Ok(Opened::Hello(..)) => Err(Rejection::NotOurs.into()),

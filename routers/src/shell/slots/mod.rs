@@ -332,9 +332,11 @@ impl Slots {
         let (now_ns, asks) = (self.works.now_ns(), permit.carries == Carries::Hello);
         let overheard = if asks { self.works.clock.overheard(now_ns) } else { None };
         let first = overheard.map(|(from, _)| from);
-        let fits = |bytes| permit.fits(now_ns, bytes);
+        // What was looked through before takes its time.
+        let works = &self.works;
+        let fits = |bytes| permit.fits(works.now_ns(), bytes);
         if let Some(bytes) = self.line.answer(monotonic_ns(), first, fits) {
-            permit.takes(now_ns, bytes);
+            permit.takes(self.works.now_ns(), bytes);
             if asks {
                 self.works.clock.asked_overheard(now_ns);
             }
