@@ -411,9 +411,9 @@ pub(crate) fn judge(crossed: &[Crossed], time: &TimeRecord) -> Judged {
     judged
 }
 
-/// Of the frames, so many in a thousand may be outside of their sender's slots: the thread looks at the clock before each, and may lose
+/// Of the frames, one and so many in a thousand may be outside of their sender's slots: the thread looks at the clock before each, and may lose
 /// its processor between that and the system call. TDMA.md found 0.03 % to 0.5 % of wake-ups that late on a computer that works.
-const OUTSIDE_PER_THOUSAND: usize = 10;
+const OUTSIDE_PER_THOUSAND: usize = 3;
 
 fn tell(what: &str, judged: &Judged) {
     let at = |per_thousand: usize| {
@@ -438,5 +438,11 @@ pub(crate) fn assert_kept(what: &str, crossed: &[Crossed], time: &TimeRecord) {
     let judged = judge(crossed, time);
     tell(what, &judged);
     assert!(judged.frames > 100, "{judged:?}");
-    assert!(judged.outside.len() * 1000 <= judged.frames * OUTSIDE_PER_THOUSAND, "{what}: {judged:?}");
+    assert_inside(what, &judged);
+}
+
+/// All but a few were where they belong.
+pub(crate) fn assert_inside(what: &str, judged: &Judged) {
+    let most = 1 + judged.frames * OUTSIDE_PER_THOUSAND / 1000;
+    assert!(judged.outside.len() <= most, "{what}: {judged:?}");
 }
