@@ -5,6 +5,7 @@
 //! clocks that differ by less than the guard never have two nodes on the wire at once.
 
 mod judge;
+mod room;
 
 pub(crate) use judge::judge;
 

@@ -22,9 +22,8 @@ pub(crate) fn remedy(installation: &Installation, tdma: &Tdma, flow: usize) -> S
         format!("lengthen {whose} by {by}: `length = \"{length}\"`")
     });
     let oftener = || {
-        let (slot, period) = search.oftener()?;
-        let whose = search.whose(slot);
-        Some(format!("let {whose} come oftener: `period = {period}` and `phase = {}`", slot.phase % period))
+        let (slot, oftener) = search.oftener()?;
+        Some(format!("let {} come oftener: {}", search.whose(slot), oftener.period_text(slot)))
     };
     let another = || {
         let slot = search.another()?;
@@ -102,36 +101,29 @@ impl<'a> Search<'a> {
         self.tdma.slots.iter().enumerate().filter(move |(_, slot)| Some(slot.node) == node)
     }
 
-    fn with(&self, index: usize, slot: TimeSlot) -> Tdma {
-        let mut tdma = self.tdma.clone();
-        tdma.slots[index] = slot;
-        tdma
-    }
-
     /// The slot that has to grow least, and its length then.
     fn longer(&self) -> Option<(&'a TimeSlot, Duration)> {
         let tries = self.own().filter_map(|(index, slot)| {
             let free = self.tdma.free_behind(slot).saturating_sub(slot.length);
             let steps = (free.as_nanos() / STEP.as_nanos()) as u32;
             let length = |steps: u32| slot.length + STEP * steps;
-            let suffices = |steps| self.keeps(&self.with(index, TimeSlot { length: length(steps), ..*slot }));
+            let suffices = |steps| self.keeps(&self.tdma.with(index, TimeSlot { length: length(steps), ..*slot }));
             least(steps, suffices).map(|steps| (slot, length(steps)))
         });
         tries.min_by_key(|(slot, length)| *length - slot.length)
     }
 
-    /// The slot that has to come oftener, and its longest period then.
-    fn oftener(&self) -> Option<(&'a TimeSlot, u32)> {
+    /// The slot that has to come oftener, and how it is then, with its longest period.
+    fn oftener(&self) -> Option<(&'a TimeSlot, TimeSlot)> {
         let tries = self.own().flat_map(|(index, slot)| {
             let shorter = (1..slot.period).rev().filter(|period| slot.period.is_multiple_of(*period));
-            shorter.map(move |period| (index, slot, period))
+            shorter.map(move |period| (index, slot, slot.with_period(period)))
         });
-        let mut right = tries.filter(|(index, slot, period)| {
-            let oftener = TimeSlot { period: *period, phase: slot.phase % period, ..**slot };
-            let tdma = self.with(*index, oftener);
+        let mut right = tries.filter(|(index, _, oftener)| {
+            let tdma = self.tdma.with(*index, *oftener);
             tdma.collisions().is_empty() && self.keeps(&tdma)
         });
-        right.next().map(|(_, slot, period)| (slot, period))
+        right.next().map(|(_, slot, oftener)| (slot, oftener))
     }
 
     /// A slot where there is none yet.

@@ -1,0 +1,85 @@
+//! Whether every flow keeps its deadline with a table, and what waits has room.
+
+use super::{Judge, round_up};
+use crate::bounds::{self, Unbounded};
+use crate::flow::Flow;
+use crate::units::{duration_decimal, size_text};
+use crate::wire::KEPT_IN_BYTES;
+
+impl Judge<'_> {
+    /// No flow publishes so quickly that a package could not even be sure of a slot that begins when the next one comes.
+    pub(super) fn periods_of_flows(&self) {
+        let node = |name| self.installation.node_of(name);
+        let is_too_quick = |flow: &Flow| flow.period < bounds::TAKEN_BEFORE && node(flow.from) != node(flow.to);
+        let flows = self.installation.flows.iter().enumerate();
+        for (index, flow) in flows.filter(|(_, flow)| is_too_quick(flow)) {
+            let right = bounds::slower(self.installation, self.tdma, index, is_too_quick).map_or_else(
+                || "a longer `period`".into(),
+                |period| format!("`period = \"{}\"`", duration_decimal(period)),
+            );
+            let text = |name| self.installation.classes.format(name);
+            let message = format!(
+                "[[flow]] from `{}` to `{}`: `period` {} is less than the {} that a package must be there before its slot, and a cycle is {}; put \
+                 what comes meanwhile into one package, and write {right}",
+                text(flow.from),
+                text(flow.to),
+                duration_decimal(flow.period),
+                duration_decimal(bounds::TAKEN_BEFORE),
+                duration_decimal(self.tdma.cycle)
+            );
+            self.reader.report(flow.line, message);
+        }
+    }
+
+    /// Each flow keeps its deadline.
+    pub(super) fn flows(&self) {
+        for bound in bounds::bounds(self.installation) {
+            let flow = &self.installation.flows[bound.flow];
+            let deadline = duration_decimal(flow.deadline);
+            let why = match bound.latency {
+                Ok(bound) if bound.latency <= flow.deadline => continue,
+                Ok(bound) => format!(
+                    "a package may take {}, and must be there within {deadline}",
+                    duration_decimal(round_up(bound.latency))
+                ),
+                Err(why) => format!("nothing says that a package is there within {deadline}: {why}"),
+            };
+            let right = match bound.latency {
+                Err(Unbounded::NotRealTime) => {
+                    "give the module that sends or subscribes a class from `bulk-below` of [network] up".into()
+                }
+                _ => bounds::remedy(self.installation, self.tdma, bound.flow),
+            };
+            let text = |name| self.installation.classes.format(name);
+            let what = format!("[[flow]] from `{}` to `{}`", text(flow.from), text(flow.to));
+            self.reader.report(flow.line, format!("{what}: {why}; {right}"));
+        }
+    }
+
+    /// Of each flow one package may wait: it is there before the next. All those of a module have room, since what gives way has no bound.
+    pub(super) fn quotas(&self) {
+        let quota = self.installation.network.map_or(usize::MAX, |network| network.quota_bytes) as u64;
+        let flows = bounds::bounds(self.installation).into_iter().map(|bound| &self.installation.flows[bound.flow]);
+        let flows: Vec<_> = flows.collect();
+        for module in &self.installation.modules {
+            let own = || flows.iter().filter(|flow| module.names().any(|name| name == flow.from));
+            let bytes: u64 = own().map(|flow| kept_bytes(flow.size)).sum();
+            if let Some(flow) = own().next().filter(|_| bytes > quota) {
+                let message = format!(
+                    "[[flow]]s of `{}`: {} of them may wait at once, and its router keeps {} of a sender; write `quota = \"{}\"` in \
+                     [network]",
+                    self.installation.classes.format(module.name),
+                    size_text(bytes.next_multiple_of(1 << 10)),
+                    size_text(quota),
+                    size_text(bytes.next_power_of_two())
+                );
+                self.reader.report(flow.line, message);
+            }
+        }
+    }
+}
+
+/// What a router takes of a quota for a body.
+fn kept_bytes(body_bytes: u32) -> u64 {
+    u64::from(body_bytes).next_multiple_of(KEPT_IN_BYTES).max(KEPT_IN_BYTES)
+}
