@@ -1,7 +1,7 @@
 //! What crosses a TCP router, between systems and to each node of a LAN, and what it costs when the TCP router is killed. Who takes no part:
 //! `beyond_strangers`.
 
-use crate::harness::{probe, signal, wait};
+use crate::harness::{halt, probe, signal, wait};
 use crate::systems::{OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
 use nix::sys::signal::Signal;
 use rohrpost_routers::lab::stalls::{Watched, judged};
@@ -195,5 +195,12 @@ fn a_package_to_all_systems_comes_once_to_each_whatever_the_path() {
         }
         assert_eq!(times(number), 2, "once in each system, from {node}: {:?}", systems.place.record());
     }
+    // On the LAN it goes by the LAN, also while the TCP router is away.
+    halt(systems.robot("north").pid("tcp.255"));
+    let mut tool = systems.robot("north").tool(Duration::from_secs(1));
+    systems.robot("north").begin(&mut tool, "255.probe.1.0", crate::probe::COUNT, &(400_u32,));
+    wait("arm counts", || (times(400) == 1).then_some(()));
+    tool.close();
+    signal(systems.robot("north").pid("tcp.255"), Signal::SIGCONT);
     systems.stop();
 }

@@ -138,6 +138,7 @@ impl System {
             name: tcp,
             server,
             settings,
+            others: Vec::new(),
             hosts: vec![own],
             beyond,
             faults,

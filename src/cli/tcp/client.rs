@@ -32,10 +32,11 @@ impl Module for ClientModule {
         let holder = Holder::Node { node: node_name.clone(), system: installation.system.id };
         let seal = certificates(installation, tcp).map(|folder| ClientSeal::load(&folder, &holder)).transpose()?;
         let digest = installation.digest();
+        let is_beyond = installation.node(&node_name).is_some_and(|node| node.reach == Reach::Tcp);
         let settings = ClientSettings {
             name: short(&format!("node {node_name} of {}", installation.system.name)),
             system: installation.system.id,
-            reaches_own: false,
+            reaches_own: !is_beyond,
             common: digest.common,
             system_digest: digest.system,
             life: realtime_ns().max(1),
@@ -43,7 +44,8 @@ impl Module for ClientModule {
             levels: levels(tcp),
         };
         let server = tcp.address;
-        let is_beyond = installation.node(&node_name).is_some_and(|node| node.reach == Reach::Tcp);
+        let others = installation.nodes.iter().filter(|other| !is_beyond && other.name != node_name);
+        let others = others.flat_map(|other| installation.names_on(&other.name)).collect();
         // Of nodes on the LAN the network there is made worse.
         let impair = if is_beyond { impairment()? } else { None };
         if let Some(impair) = impair {
@@ -56,6 +58,7 @@ impl Module for ClientModule {
             server,
             settings,
             hosts: installation.names_on(&node_name),
+            others,
             beyond: installation.names_beyond(&node_name),
             faults: Arc::new(Encoded::of(installation)),
             access: Access::new(&installation.access),

@@ -73,6 +73,8 @@ pub struct ClientParts<'a> {
     pub settings: ClientSettings,
     /// The names that its node hosts.
     pub hosts: Vec<(Name, Name)>,
+    /// The names that other nodes of its system host, if it brings packages for all systems there itself.
+    pub others: Vec<(Name, Name)>,
     /// The names for which packages go to the server if neither the node nor its LAN has them.
     pub beyond: Vec<(Name, Name)>,
     /// How commands are answered that cannot be carried.
@@ -109,8 +111,8 @@ impl ClientShell {
     /// # Errors
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
-        let ClientParts { node, name, server, settings, hosts, beyond, faults, access, seal, keeps_time, impair } =
-            parts;
+        let ClientParts { node, name, server, settings, hosts, others, .. } = parts;
+        let ClientParts { beyond, faults, access, seal, keeps_time, impair, .. } = parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
@@ -119,11 +121,11 @@ impl ClientShell {
         let time = keeps_time.then(|| Time::new(node)).transpose()?;
         let bad_line = impair.map(|impair| BadLine::begin(server, impair)).transpose().map_err(ClientError::BadLine)?;
         let (shared, system) = (Arc::new(Shared::default()), settings.system);
-        let ranges = hosts.into_iter().map(|(first, last)| Range { first, last }).collect();
+        let range = |(first, last)| Range { first, last };
         let work = Work {
             shared: shared.clone(),
             server: bad_line.as_ref().map_or(server, BadLine::near),
-            client: Client::new(settings, ranges, monotonic_ns()),
+            client: Client::new(settings, hosts.into_iter().map(range).collect(), monotonic_ns()),
             voice: Voice::new(
                 server,
                 Ways::new(&participant, Reach::Here),
@@ -131,6 +133,8 @@ impl ClientShell {
                 access,
             ),
             system,
+            others: others.into_iter().map(range).collect(),
+            ways_to_others: Ways::new(&participant, Reach::Everywhere),
             seal,
             time,
             mailbox,
@@ -181,6 +185,8 @@ struct Work {
     voice: Voice,
     /// First byte of the names of its node.
     system: u8,
+    others: Box<[Range]>,
+    ways_to_others: Ways,
     seal: Option<ClientSeal>,
     /// Of the node, if the server tells it.
     time: Option<Time>,
@@ -237,9 +243,12 @@ impl Work {
             let Some(waiting) = self.mailbox.try_receive() else { return false };
             let (head, published_ns, body) = (*waiting.head(), waiting.published_ns(), waiting.body());
             if head.to.system() == ALL_SYSTEMS {
-                // Its own system is one of them. What is not on this node another client brings there.
+                // Its own system is one of them: there it goes as any package does, by the LAN, or if need be by the server. Where this node
+                // does not know who hosts it, another client brings it.
                 let to = in_system(head.to, self.system);
-                let own = self.voice.ways.send(&Head { to, ..head }, body);
+                let is_others = self.others.iter().any(|range| range.has(to));
+                let ways = if is_others { &mut self.ways_to_others } else { &mut self.voice.ways };
+                let own = ways.send(&Head { to, ..head }, body);
                 self.client.reached_itself(to, head.priority, own.map_err(Into::into));
             }
             self.client.send(monotonic_ns(), &Package { head, body, published_ns, hops: 0 }, &mut self.voice);
