@@ -21,7 +21,8 @@ pub const LATE: Duration = Duration::from_micros(50);
 pub const GATE: Duration = Duration::from_micros(100);
 
 const CYCLE: Duration = Duration::from_millis(5);
-/// Below it a Linux computer wakes up too late too often; above it a package waits for longer than it may.
+/// Below it a Linux computer wakes up too late too often; above it a package waits for longer than it may. What is above half a second, in which nodes take each
+/// other for silent, is told with what else is wrong with the table.
 const CYCLES: RangeInclusive<Duration> = Duration::from_millis(1)..=Duration::from_secs(1);
 const SYNCHRONISATION: Duration = Duration::from_micros(500);
 const GUARD: Duration = Duration::from_micros(150);
@@ -212,7 +213,7 @@ fn read_cycle(item: &Item<'_>) -> Option<Duration> {
     if CYCLES.contains(&cycle) {
         return Some(cycle);
     }
-    item.report("`cycle` is from \"1 ms\" to \"1 s\"; write for example `cycle = \"5 ms\"`");
+    item.report("`cycle` is from \"1 ms\" to \"500 ms\"; write for example `cycle = \"5 ms\"`");
     None
 }
 

@@ -188,8 +188,12 @@ impl Opening {
     /// derived, which costs about as much as to open a datagram.
     ///
     /// # Errors
-    /// [`NotOpened`]
-    pub fn overhear<'a>(&mut self, datagram: &'a mut [u8]) -> Result<(FrameHead, &'a [u8]), NotOpened> {
+    /// [`NotOpened`]; also if it does not come from where the node is that it says it is from.
+    pub fn overhear_from<'a>(
+        &mut self,
+        datagram: &'a mut [u8],
+        is_there: impl Fn(NodeIndex) -> bool,
+    ) -> Result<(FrameHead, &'a [u8]), NotOpened> {
         let (head, key_id) = FrameHead::read(datagram)?;
         if key_id == 0 {
             return Err(Rejection::Unsealed.into());
@@ -197,6 +201,9 @@ impl Opening {
         let key = self.all.keys.place(key_id).ok_or(Rejection::OtherKey)?;
         if !self.is_ours(&head) {
             return Err(Rejection::NotOurs.into());
+        }
+        if !is_there(head.from) {
+            return Err(Rejection::Address.into());
         }
         self.all.doubt(head.from);
         let all = &self.all;

@@ -158,7 +158,12 @@ fn a_certificate_of_the_own_system_hosts_what_its_file_gives_that_node_and_no_mo
     two.wait_up();
     assert!(one.client.link().state != LinkState::Up);
     drop(server);
-    let _server = start_for(address, &own, 2, seal(), with(vec![range(module(1)), others[0]])).unwrap();
+    // That it went away is told, and when it is there again what it says.
+    wait("away", || one.client.link().why.contains("is not reached").then_some(()));
+    let server = start_for(address, &own, 2, seal(), with(others.to_vec())).unwrap();
+    wait("why again", || one.client.link().why.contains("or of its node").then_some(()));
+    drop(server);
+    let _server = start_for(address, &own, 3, seal(), with(vec![range(module(1)), others[0]])).unwrap();
     one.wait_up();
 }
 

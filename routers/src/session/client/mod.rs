@@ -219,7 +219,7 @@ impl Client {
         self.state == State::Member && self.registration == Registration::Holds
     }
 
-    /// What went to the server, and what did not.
+    /// What went to the server, and what did not; and of packages for all systems, what went to their own.
     pub fn out(&self) -> &Counts {
         &self.out
     }
@@ -295,6 +295,10 @@ impl Client {
             self.down_ns = now_ns;
             self.told = None;
             host.event(Event::Down);
+        }
+        if matches!(self.state, State::Connecting { .. }) {
+            // What the server said was before it went away.
+            self.told = None;
         }
         if self.joined_ns.take().is_some_and(|joined_ns| now_ns.saturating_sub(joined_ns) > LASTING_NS) {
             self.backoff.lasted();

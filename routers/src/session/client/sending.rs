@@ -28,7 +28,7 @@ impl Client {
         });
     }
 
-    /// A package for all systems came to this node without the server, or was lost here. That nobody has its mailbox open is a loss only
+    /// A package for all systems came to its own system without the server, or was lost here. That nobody has its mailbox open is a loss only
     /// where this client hosts the name: the server counts on it then, and says nothing.
     pub fn reached_itself(&mut self, to: Name, priority: Priority, delivered: Result<(), NotDelivered>) {
         let hosts = self.ranges.iter().any(|range| range.has(to));

@@ -58,12 +58,13 @@ impl Registrations {
 }
 
 impl Server {
-    /// Whether a name is to be a client's: its registration waits for its turn, and nobody else hosts the name.
+    /// Whether a name is to be a client's: its registration waits for its turn, it may host the name, and nobody else does.
     pub(super) fn is_to_host(&self, client: ClientIndex, name: Name) -> bool {
         let waiting = |member: &Member| {
             let waiting = member.registrations.waiting.as_ref();
             let has = |waiting: &Waiting| waiting.ranges.iter().any(|range| range.has(name));
-            name.system() == member.system && waiting.is_some_and(has)
+            let may = member.may_host.as_deref().is_none_or(|may| may.iter().any(|range| range.has(name)));
+            may && name.system() == member.system && waiting.is_some_and(has)
         };
         self.member(client).is_some_and(waiting) && self.table.client_of(name).is_none()
     }

@@ -77,15 +77,16 @@ fn clients_that_register_much_take_turns_and_each_has_its_own() {
 }
 
 /// A registration that waits, with one of these names, and a package of that name right behind it.
-fn send_behind_a_registration(from: Name, more: &[Range]) -> Ground {
+fn send_behind_a_registration(from: Name, more: &[Range], may_host: Option<Vec<Range>>) -> Ground {
     let mut ground = Ground::clients(2);
+    let place = ground.ends[0].1.unwrap();
+    ground.server.certify(place, system_of(0), "client 0", may_host.map(Into::into));
     // The first of these is looked at, so the second waits.
     register(&mut ground, 0, 7, &super::plan::ranges(0));
     let ranges: Vec<Range> = super::plan::ranges(0).into_iter().chain(more.iter().copied()).collect();
     register(&mut ground, 0, 8, &ranges);
     let (head, mut bytes) = (Head { to: module(1), from, ..Head::default() }, Vec::new());
     Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
-    let place = ground.ends[0].1.unwrap();
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
     assert_eq!(ground.server.table().client_of(from).filter(|client| *client == place), None, "it waits");
     ground.settle();
@@ -95,14 +96,16 @@ fn send_behind_a_registration(from: Name, more: &[Range]) -> Ground {
 #[test]
 fn a_package_behind_a_registration_that_waits_for_its_turn_is_not_lost() {
     let (new, foreign) = (Name::new(1, 90, 0, 0), Name::new(2, 90, 0, 0));
-    let ground = send_behind_a_registration(new, &[Range::module(new)]);
+    let own = || [super::plan::ranges(0), vec![Range::module(new)]].concat();
+    let ground = send_behind_a_registration(new, &[Range::module(new)], Some(own()));
     assert_eq!((ground.ends[1].2.delivered.len(), ground.server.counts().lost_for(Cause::Foreign)), (1, 0));
-    for (from, ranges, why) in [
-        (new, vec![], "it does not ask for the name"),
-        (module(1), vec![Range::module(module(1))], "another hosts it"),
-        (foreign, vec![Range::module(foreign)], "of another system"),
+    for (from, ranges, may_host, why) in [
+        (new, vec![], None, "it does not ask for the name"),
+        (module(1), vec![Range::module(module(1))], None, "another hosts it"),
+        (foreign, vec![Range::module(foreign)], None, "of another system"),
+        (new, vec![Range::module(new)], Some(super::plan::ranges(0)), "not of its node"),
     ] {
-        let ground = send_behind_a_registration(from, &ranges);
+        let ground = send_behind_a_registration(from, &ranges, may_host);
         let counts = (ground.ends[1].2.delivered.len(), ground.server.counts().lost_for(Cause::Foreign));
         assert_eq!(counts, (0, 1), "{why}");
     }

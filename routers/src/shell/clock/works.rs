@@ -71,10 +71,11 @@ impl Seals {
         overhears: bool,
         datagram: &'a mut [u8],
     ) -> Option<Heard<'a>> {
+        let is_there = |from| node == Some(from);
         let opened = if overhears && self.opening.is_strange(datagram) {
-            self.opening.overhear(datagram).map(|(head, text)| Heard::Overheard(head, text))
+            self.opening.overhear_from(datagram, is_there).map(|(head, text)| Heard::Overheard(head, text))
         } else {
-            match self.opening.open_from(datagram, |from| node == Some(from)) {
+            match self.opening.open_from(datagram, is_there) {
                 Ok(Opened::Frame(head, text)) => Ok(Heard::Proven(head, text)),
                 // A hello is for the other port: the one that opens says so.
                 Ok(Opened::Hello(..)) => Err(Rejection::NotOurs.into()),
