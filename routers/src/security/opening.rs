@@ -188,7 +188,15 @@ impl Opening {
     /// derived, which costs about as much as to open a datagram.
     ///
     /// # Errors
-    /// [`NotOpened`]; also if it does not come from where the node is that it says it is from.
+    /// [`NotOpened`]
+    pub fn overhear<'a>(&mut self, datagram: &'a mut [u8]) -> Result<(FrameHead, &'a [u8]), NotOpened> {
+        self.overhear_from(datagram, |_| true)
+    }
+
+    /// The same, if it comes from where the node is that it says it is from.
+    ///
+    /// # Errors
+    /// [`NotOpened`]
     pub fn overhear_from<'a>(
         &mut self,
         datagram: &'a mut [u8],
