@@ -127,19 +127,23 @@ fn acquaint_at(now_ns: u64, a: &mut Router, b: &mut Router) {
     assert_eq!(b.take(now_ns, own, &last_word), None);
 }
 
+/// Of node 0, that it is still there.
+fn sealed_alive(sealing: &mut Sealing, sequence: u64) -> Vec<u8> {
+    let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
+    let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
+    let kind = Kind::Alive;
+    let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence };
+    sealing.seal(&head, &mut datagram).unwrap();
+    datagram
+}
+
 #[test]
 fn what_is_lost_before_the_first_that_comes_is_counted() {
     let (mut a, mut b) = (Router::new(0), Router::new(1));
     acquaint_at(START, &mut a, &mut b);
     let mut sealing = Sealing::new(&a.all, Port::Packages);
-    let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
-    let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
-    for sequence in 0..100 {
-        let kind = Kind::Alive;
-        let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence };
-        datagram[HEAD_BYTES..][..told.len()].copy_from_slice(&told);
-        sealing.seal(&head, &mut datagram).unwrap();
-    }
+    let mut datagram = Vec::new();
+    (0..100).for_each(|sequence| datagram = sealed_alive(&mut sealing, sequence));
     b.take(START, 0, &datagram);
     for tick in 1..=4 {
         b.end.inbound.poll(START + tick * TICK_EVERY_NS, &mut [0; 100], &mut b.end.log);
@@ -176,12 +180,7 @@ fn what_is_longer_than_any_of_ours_is_not_opened() {
 fn what_is_brought_from_a_wrong_address_is_not_used_up_by_that() {
     let (mut a, mut b) = (Router::new(0), Router::new(1));
     acquaint_at(START, &mut a, &mut b);
-    let mut sealing = Sealing::new(&a.all, Port::Packages);
-    let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
-    let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
-    let kind = Kind::Alive;
-    let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence: 0 };
-    sealing.seal(&head, &mut datagram).unwrap();
+    let datagram = sealed_alive(&mut Sealing::new(&a.all, Port::Packages), 0);
     let received = |b: &Router| b.end.stats.peer(0).received.datagrams.get();
     let before = received(&b);
     b.take(START, 2, &datagram);

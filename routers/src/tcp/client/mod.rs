@@ -243,8 +243,8 @@ impl Work {
             let Some(waiting) = self.mailbox.try_receive() else { return false };
             let (head, published_ns, body) = (*waiting.head(), waiting.published_ns(), waiting.body());
             if head.to.system() == ALL_SYSTEMS {
-                // Its own system is one of them: there it goes as any package does, by the LAN, or if need be by the server. Where this node
-                // does not know who hosts it, another client brings it.
+                // Its own system is one of them: there it goes as any package does, by the LAN, or if need be by the server. A node that only the
+                // server reaches knows of no others: the server brings it to them.
                 let to = in_system(head.to, self.system);
                 let is_others = self.others.iter().any(|range| range.has(to));
                 let ways = if is_others { &mut self.ways_to_others } else { &mut self.voice.ways };
