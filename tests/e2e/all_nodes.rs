@@ -187,7 +187,9 @@ fn a_user_without_rights_launches_all_nodes() {
     let config = place.config_of("test", &format!("{NODES}{NETWORK}"), &[&format!("{OUTPUT}node = \"arm\"\n")]);
     let launch = place.command(&["launch", config.to_str().unwrap(), "--all"]);
     let program = place.path("rohrpost");
-    std::fs::copy(launch.get_program(), &program).unwrap();
+    // Copied by a process of its own: what this one has open for writing, a child that another test forks at the moment holds as well
+    // until it runs its program, and until then the copy cannot be run ("text file busy").
+    assert!(Command::new("cp").arg(launch.get_program()).arg(&program).status().unwrap().success());
     for path in [place.memory(), config.parent().unwrap()] {
         chown(path, Some(NOBODY), Some(NOBODY)).unwrap();
     }
