@@ -54,6 +54,17 @@ impl Drop for Held {
     }
 }
 
+/// An open file, no lock of which outlives this; given back by name as those of [`Held`] are.
+pub(crate) struct AllHeld(pub(crate) File);
+
+impl Drop for AllHeld {
+    fn drop(&mut self) {
+        // From the first byte to wherever the last one is.
+        let all = libc::flock { l_len: 0, ..region(libc::F_UNLCK, 0) };
+        let _ = fcntl(&self.0, FcntlArg::F_OFD_SETLK(&all));
+    }
+}
+
 /// Gives one byte back.
 pub(crate) fn unlock(file: &File, byte: u64) -> io::Result<()> {
     fcntl(file, FcntlArg::F_OFD_SETLK(&region(libc::F_UNLCK, byte)))?;

@@ -19,7 +19,7 @@ use crate::doorbell;
 use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{MAGIC, VERSION};
-use crate::lock::{self, Held};
+use crate::lock::{self, AllHeld, Held};
 use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::step::step;
@@ -339,16 +339,16 @@ impl Node {
 
     /// Takes the launch's place and every participant's; none when somebody has one of them. So nobody can join or launch
     /// until the result is dropped.
-    pub(crate) fn keep_all_out(&self) -> Result<Option<File>, NodeError> {
+    pub(crate) fn keep_all_out(&self) -> Result<Option<AllHeld>, NodeError> {
         let failed = |error| NodeError::of(&self.path, error);
-        let file = open_shared(&self.path.join("node"), false).map_err(failed)?;
+        let held = AllHeld(open_shared(&self.path.join("node"), false).map_err(failed)?);
         // The launch's first: on a node that runs nothing else is taken, not even for a moment in which somebody wants to join.
         for byte in std::iter::once(LAUNCH_BYTE).chain(0..PARTICIPANTS_MAX as u64) {
-            if !lock::try_lock(&file, byte).map_err(failed)? {
+            if !lock::try_lock(&held.0, byte).map_err(failed)? {
                 return Ok(None);
             }
         }
-        Ok(Some(file))
+        Ok(Some(held))
     }
 }
 

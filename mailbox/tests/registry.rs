@@ -345,7 +345,7 @@ fn removing_and_joining_at_once_leave_no_ghosts() {
         joined += 1;
         // Once joined, nobody takes the node away.
         let mut receiver = me.receiver(MAILBOX, Shape::default()).unwrap();
-        let mut sender = ground.sender();
+        let mut sender = me.sender(MAILBOX).unwrap();
         sender.send(&label(LOW, 1), &[]).unwrap();
         assert!(receiver.try_receive().is_some());
     }

@@ -36,7 +36,7 @@ fn without_a_page_the_wall_clock_is_taken() {
     assert_eq!(now.epoch, 0);
     assert!((before..=after).contains(&now.ns));
     let second_ago = clock.at(monotonic_ns() - 1_000_000_000);
-    assert!(second_ago.ns < before - 900_000_000);
+    assert!(second_ago.ns < realtime_ns() - 900_000_000);
 }
 
 #[test]

@@ -68,7 +68,8 @@ fn only_what_is_more_important_ends_a_wait_for_it() {
             }
         }
     });
-    assert!(wait_above(&mut receiver, LOW, Duration::from_millis(5), || false) >= Duration::from_millis(4));
+    // What it did not sleep a busy computer may have taken from it.
+    assert!(wait_above(&mut receiver, LOW, Duration::from_millis(200), || false) >= Duration::from_millis(100));
     assert_eq!(wait_above(&mut receiver, LOW, PATIENCE, || true), Duration::ZERO, "something else is to be done");
 }
 

@@ -271,7 +271,7 @@ fn a_poller_naps_on_while_nobody_rings() {
     // Longer than it trusts the pipe.
     let (began, timeout) = (Instant::now(), Duration::from_millis(350));
     let slept = watches.wait_any(&mut [&mut receiver], timeout, || false);
-    assert!(began.elapsed() >= timeout && slept >= timeout - Duration::from_millis(10), "{slept:?}");
+    assert!(began.elapsed() >= timeout && slept >= timeout - Duration::from_millis(100), "{slept:?}");
 }
 
 #[test]

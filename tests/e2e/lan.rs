@@ -11,6 +11,7 @@ use rohrpost::mailbox::{Head, monotonic_ns};
 use rohrpost::{CallError, Fault};
 use rohrpost_routers::frame::{FrameHead, Kind};
 use rohrpost_routers::lab::stalls::{Watched, judged};
+use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -118,17 +119,19 @@ impl Lan {
 
 #[test]
 fn calls_and_data_cross_from_node_to_node_as_if_there_were_one() {
-    let lan = Lan::launched();
-    assert_eq!(lan.say(&["call", "probe.1", "count", "1"]).ok(), "1\n");
-    assert_eq!(lan.say(&["call", "probe.1", "count", "2"]).ok(), "2\n", "by another tool");
-    assert_eq!(lan.say(&["call", "probe.0", "count", "3"]).ok(), "1\n", "its own node's");
-    let data = lan.say(&["echo", "probe.1", "beat", "--count", "3"]).ok();
-    assert_eq!(data.lines().count(), 3, "{data}");
-    // Larger than a datagram, there and back.
-    let word = "x".repeat(900);
-    let told = lan.say(&["call", "probe.1", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
-    assert!(told.contains(&word), "{told}");
-    lan.stop();
+    judged(Watched::Ordinary, || {
+        let lan = Lan::launched();
+        assert_eq!(lan.say(&["call", "probe.1", "count", "1"]).ok(), "1\n");
+        assert_eq!(lan.say(&["call", "probe.1", "count", "2"]).ok(), "2\n", "by another tool");
+        assert_eq!(lan.say(&["call", "probe.0", "count", "3"]).ok(), "1\n", "its own node's");
+        let data = lan.say(&["echo", "probe.1", "beat", "--count", "3"]).ok();
+        assert_eq!(data.lines().count(), 3, "{data}");
+        // Larger than a datagram, there and back.
+        let word = "x".repeat(900);
+        let told = lan.say(&["call", "probe.1", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
+        assert!(told.contains(&word), "{told}");
+        lan.stop();
+    });
 }
 
 #[test]
@@ -174,7 +177,8 @@ fn a_full_mailbox_on_another_node_is_told() {
             (answer.is_some() || lan.arm().waiting("probe.1") > before).then_some(answer)
         });
         tool.link.forget(call);
-        answer
+        // Who has no time for a second is taken for silent.
+        answer.filter(|answer| !matches!(answer, Err(CallError::Fault(_, Fault::NodeSilent { .. }))))
     });
     assert!(matches!(full, Err(CallError::Fault(_, Fault::MailboxFull))), "{full:?}");
     tool.close();
@@ -185,21 +189,28 @@ fn a_full_mailbox_on_another_node_is_told() {
 #[test]
 fn routers_may_be_killed_at_any_time_and_nothing_runs_twice() {
     let lan = Lan::launched();
-    let mut numbers = 0..;
+    let (mut numbers, mut answered) = (0.., Vec::new());
     for (robot, router) in [(lan.base(), "router.0"), (lan.arm(), "router.1"), (lan.base(), "router.0")] {
         let pid = robot.pid(router);
         signal(pid, Signal::SIGKILL);
         // Through the transit mailbox, in which it waits for the next router; or refused, when launch was quicker.
-        for number in numbers.by_ref().take(3) {
-            wait("a call comes through", || lan.count(number).ok());
+        // A call that timed out may have been run all the same: the next one is another.
+        for _ in 0..3 {
+            let number = wait("a call comes through", || {
+                let number = numbers.next()?;
+                lan.count(number).ok().map(|_| number)
+            });
+            answered.push(number);
         }
         robot.wait_restarted(router, pid);
     }
     let counted = lan.place.counted();
-    let mut once = counted.clone();
-    once.dedup();
-    assert_eq!(counted, once, "none ran twice");
-    assert!((0..9).all(|number| counted.contains(&number)), "{counted:?}");
+    let once: BTreeSet<_> = counted.iter().collect();
+    assert_eq!(counted.len(), once.len(), "none ran twice: {counted:?}");
+    assert!(
+        answered.len() == 9 && answered.iter().all(|number| counted.contains(number)),
+        "{answered:?} of {counted:?}"
+    );
     lan.stop();
 }
 

@@ -104,7 +104,7 @@ fn a_command_that_must_not_run_twice_is_not_handed_to_the_module_again() {
 #[test]
 fn stale_packages_are_dropped_after_a_restart_and_counted() {
     let place = Place::new();
-    let keys = "restart = { policy = \"always\", backoff = \"1500 ms\" }\n[module.mailbox.commands]\nmax-age = \"1 s\"";
+    let keys = "restart = { policy = \"always\", backoff = \"4 s\" }\n[module.mailbox.commands]\nmax-age = \"3 s\"";
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);
     let mut tool = robot.tool(PATIENCE);
     let pid = robot.pid("probe.0");

@@ -1,6 +1,6 @@
 //! The tools that measure, against a source that keeps its own record; and that looking changes nothing.
 
-use crate::harness::{PATIENCE, Place, Robot, probe, wait};
+use crate::harness::{PATIENCE, Place, Robot, patient, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use rohrpost::common::{SUBSCRIBE, Subscribe};
@@ -90,13 +90,22 @@ fn figures_agree_with_a_known_source() {
             (!lines(tool).is_empty()).then_some(())
         });
     }
-    place.say(&["call", "probe.0", "on"]).ok();
     let mut taken = Vec::new();
+    // What came is taken meanwhile: the mailbox has room for less than a second of it.
+    let order = |data: &mut Receiver, taken: &mut Vec<Taken>, word| {
+        let mut said = Running::start(place.command(&patient(&["call", "probe.0", word])));
+        let done = wait("it is done", || {
+            take_slowly(data, taken);
+            said.ended()
+        });
+        assert!(done.success(), "{}", said.err());
+    };
+    order(tool.data().unwrap(), &mut taken, "on");
     wait("500 values", || {
         take_slowly(tool.data().unwrap(), &mut taken);
         (taken.len() >= 500).then_some(())
     });
-    place.say(&["call", "probe.0", "off"]).ok();
+    order(tool.data().unwrap(), &mut taken, "off");
     let source = published(&place);
     wait("all values", || {
         take_slowly(tool.data().unwrap(), &mut taken);

@@ -40,13 +40,15 @@ fn a_flood_of_one_module_hides_no_error() {
     wait("another's error", || texts(&lines(&place, "probe.1")).contains(&"help").then_some(()));
     flood.said().ok();
     call(&place, &["probe.0", "say", "error", "my own"]);
+    let said = |all: &[Value]| texts(all).iter().filter(|text| text.starts_with("flood ")).count() as u64;
+    // What was suppressed is told when nothing came for a while, which on a busy computer may be in the middle, too.
     let all = wait("its own error, and how much was suppressed", || {
         let all = lines(&place, "probe.0");
-        let whole = texts(&all).contains(&"my own") && sum(&all, "suppressed") > 0;
+        let whole = texts(&all).contains(&"my own") && said(&all) + sum(&all, "suppressed") >= 100_000;
         whole.then_some(all)
     });
     // Not one is missing from the account.
-    let said = texts(&all).iter().filter(|text| text.starts_with("flood ")).count() as u64;
+    let said = said(&all);
     assert!((200..2_000).contains(&said), "{said} of 100000 at 100 a second");
     assert_eq!((said + sum(&all, "suppressed"), sum(&all, "lost_before")), (100_000, 0));
     let told = all.iter().find(|line| line["suppressed"].as_u64() > Some(0)).unwrap();

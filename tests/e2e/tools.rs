@@ -1,6 +1,6 @@
 //! What a user types at a node that runs, and what is said to mistakes.
 
-use crate::harness::{OUTPUT, Place, probe, wait};
+use crate::harness::{OUTPUT, Place, patient, probe, wait};
 use crate::process::Running;
 use std::process::{Command, Stdio};
 
@@ -262,7 +262,7 @@ fn a_closed_pipe_ends_a_tool_quietly() {
     let mut all: Vec<Vec<&str>> = commands.iter().filter_map(|command| at_a_node(command)).collect();
     all.extend([vec!["log", "--follow"], vec!["version"], vec!["completions", "bash"], vec!["clean"]]);
     for arguments in all {
-        let mut command: Command = place.command(&arguments);
+        let mut command: Command = place.command(&patient(&arguments));
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
         drop(child.stdout.take());

@@ -38,7 +38,7 @@ fn echo_with_a_rate_shows_the_newest_that_often() {
     // Ten beats lie between two of ten a second; a busy computer makes it a few more or less.
     let values: Vec<u64> = shown.iter().map(|line| line["value"].as_u64().unwrap()).collect();
     let (first, last) = (values[0], values[5]);
-    assert!((20..=200).contains(&(last - first)), "{values:?}");
+    assert!((20.0..=f64::max(200.0, 150.0 * took)).contains(&((last - first) as f64)), "{values:?} in {took} s");
     assert!(values.is_sorted(), "{values:?}");
 }
 

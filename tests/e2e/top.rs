@@ -97,6 +97,9 @@ fn all_keys_move_the_mark_and_a_pause_stands_still() {
     terminal.keys("p");
     terminal.wait_screen("a pause", |screen| screen.contains("PAUSED"));
     let row = |screen: &str| screen.lines().find(|line| line.contains(" probe.0 ")).unwrap_or_default().to_owned();
+    // What it draws next is read after all that it drew before.
+    terminal.keys(home);
+    terminal.wait_screen("the mark at the start", |screen| screen.contains("> output.0 "));
     let before = terminal.screen();
     // Something happens that would be seen, if it looked.
     place.say(&["call", "probe.0", "off"]).ok();

@@ -96,16 +96,18 @@ impl Drawing {
 
 #[test]
 fn the_simulated_robot_is_drawn() {
-    let drawing = Drawing::of(&["--seconds", "6"]);
-    // Ten a second of scans and of poses, for six seconds less the start; a busy computer draws fewer.
-    drawing.has("/world/scan/laser.0", 15..=70);
-    drawing.has("/world/robot/mapper.0", 15..=75);
-    drawing.has("/world/robot/odometry.0", 15..=75);
-    drawing.has("/world/map/mapper.0", 4..=2000);
-    let modules = ["output.0", "motor.0", "mapper.0", "pilot.0", "gui.0"];
-    drawing.has_robot(&modules, &["pilot", "mapper", "gui"]);
-    drawing.has("/output", 1..=100);
-    assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
+    judged(Watched::Ordinary, || {
+        let drawing = Drawing::of(&["--seconds", "6"]);
+        // Ten a second of scans and of poses, for six seconds less the start; a busy computer draws fewer.
+        drawing.has("/world/scan/laser.0", 15..=70);
+        drawing.has("/world/robot/mapper.0", 15..=75);
+        drawing.has("/world/robot/odometry.0", 15..=75);
+        drawing.has("/world/map/mapper.0", 4..=2000);
+        let modules = ["output.0", "motor.0", "mapper.0", "pilot.0", "gui.0"];
+        drawing.has_robot(&modules, &["pilot", "mapper", "gui"]);
+        drawing.has("/output", 1..=100);
+        assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
+    });
 }
 
 /// Each node draws what its router tells of its slots, and of the flows that leave it.
@@ -176,15 +178,17 @@ fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
 
 #[test]
 fn a_log_is_drawn() {
-    let drawing = Drawing::of(&["--log", LOG, "--speed", "2"]);
-    assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
-    assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);
-    assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
-    // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that come together
-    // after the computer had no time, the newest alone are drawn.
-    drawing.has("/world/scan/laser.0", 5..=22);
-    drawing.has("/world/robot/mapper.0", 5..=24);
-    drawing.has("/world/map/mapper.0", 4..=2000);
-    drawing.has_robot(&["output.0", "mapper.0", "gui.0", "player.0"], &["mapper", "gui"]);
-    drawing.has("/output/player.0", 1..=3);
+    judged(Watched::Ordinary, || {
+        let drawing = Drawing::of(&["--log", LOG, "--speed", "2"]);
+        assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
+        assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);
+        assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
+        // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that come together
+        // after the computer had no time, the newest alone are drawn.
+        drawing.has("/world/scan/laser.0", 5..=22);
+        drawing.has("/world/robot/mapper.0", 5..=24);
+        drawing.has("/world/map/mapper.0", 4..=2000);
+        drawing.has_robot(&["output.0", "mapper.0", "gui.0", "player.0"], &["mapper", "gui"]);
+        drawing.has("/output/player.0", 1..=3);
+    });
 }

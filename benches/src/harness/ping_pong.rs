@@ -295,7 +295,8 @@ mod tests {
         }
 
         fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
-            let patience = Duration::from_millis(200);
+            // Longer than a busy computer halts a thread for; waited for in vain where a message is lost.
+            let patience = Duration::from_secs(1);
             let received = self.back.recv_timeout(patience).map_err(|error| Failure::of("receive", error))?;
             message.copy_from_slice(&received);
             Ok(())

@@ -121,15 +121,21 @@ fn check(all: &[Traced]) {
             "the kernel is asked for each look at the clock here (see .../clocksource0/current_clocksource); not counted",
         );
     }
+    let mut naps_more = 0;
     for (at, operation) in OPERATIONS.iter().enumerate() {
         let expected = CALLS.iter().find(|(name, _)| *name == operation.name).map_or(&[][..], |(_, calls)| *calls);
         let here: Vec<_> = all.iter().filter(|(operation, _)| *operation == at).collect();
         assert_eq!(here.len() as u64, operation.times, "{}", operation.name);
         for (time, (_, calls)) in here.into_iter().enumerate() {
-            let calls: Vec<&str> =
+            let mut calls: Vec<&str> =
                 calls.iter().map(String::as_str).filter(|call| !slow_clock || *call != CLOCK).collect();
+            // A nap in `poll` ends after a tenth of a second. For so long a busy computer may keep the answer back, now and then.
+            let before = calls.len();
+            calls.dedup_by(|next, call| next == call && *call == "poll");
+            naps_more += before - calls.len();
             assert_eq!(calls, expected, "{}, time {time}", operation.name);
         }
     }
+    assert!(naps_more <= 3, "{naps_more} naps more than one for each sleep");
     tell(format_args!("{} operations traced", all.len()));
 }

@@ -10,8 +10,9 @@ use rohrpost_routers::tcp::{
     ClientParts, ClientSeal, ClientShell, LinkState, ServerError, ServerParts, ServerSeal, ServerShell,
 };
 use std::collections::BTreeMap;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
 /// What takes longer does not come any more, however busy the computer is.
@@ -42,9 +43,12 @@ impl Faults for Words {
     }
 }
 
-/// A port that nobody had a moment ago.
+/// An address that nobody has: of this process and this call alone. Not a port that the kernel chose and has back: until it is used, it
+/// may be another's, or still open in a child that another test starts.
 pub(crate) fn address() -> SocketAddr {
-    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
+    static COUNT: AtomicU8 = AtomicU8::new(1);
+    let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+    ([127, (1 + pid / 250 % 250) as u8, (pid % 250) as u8, count], 7610).into()
 }
 
 pub(crate) fn node() -> (tempfile::TempDir, Arc<Node>) {
