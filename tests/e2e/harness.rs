@@ -311,6 +311,13 @@ impl Robot {
             let heard = self.node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
             (heard >= on).then_some(())
         });
+        // Who has answered holds the package for a moment longer; and a busy one may have been asked twice.
+        for module in self.installation.modules_on(&self.node_name) {
+            let name = self.installation.classes.format(module.name);
+            if name.starts_with("probe.") {
+                wait(format!("{name} is done"), || (self.waiting(&name) == 0).then_some(()));
+            }
+        }
     }
 
     /// Packages that wait in a module's command mailbox.
