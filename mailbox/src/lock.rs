@@ -70,3 +70,26 @@ pub(crate) fn unlock(file: &File, byte: u64) -> io::Result<()> {
     fcntl(file, FcntlArg::F_OFD_SETLK(&region(libc::F_UNLCK, byte)))?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A child that was forked meanwhile has a copy of the descriptor; it must not keep the locks.
+    #[test]
+    fn locks_are_given_back_although_a_copy_of_the_descriptor_is_open() {
+        let path = tempfile::NamedTempFile::new().unwrap();
+        let open = || File::options().read(true).write(true).open(path.path()).unwrap();
+        let other = open();
+        let held = Held::try_take(open(), 3).unwrap().unwrap();
+        let all = AllHeld(open());
+        assert!([0, 255].map(|byte| try_lock(&all.0, byte).unwrap()).iter().all(|is_taken| *is_taken));
+        let _copies = [held.file.try_clone().unwrap(), all.0.try_clone().unwrap()];
+        let locked = || [0, 3, 255].map(|byte| is_locked(&other, byte).unwrap());
+        assert_eq!(locked(), [true; 3]);
+        drop(held);
+        assert_eq!(locked(), [true, false, true]);
+        drop(all);
+        assert_eq!(locked(), [false; 3]);
+    }
+}
