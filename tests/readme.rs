@@ -42,6 +42,43 @@ fn the_book_has_all_its_pages() {
     assert_eq!(linked, pages, "left: what docs/src/SUMMARY.md links, right: what is in docs/src");
 }
 
+/// All Rust of the repository, below these folders.
+fn sources() -> String {
+    let mut folders: Vec<_> =
+        ["benches", "config", "gui-bridge", "mailbox", "modules", "routers", "src", "tests", "xtask"]
+            .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
+            .into();
+    let mut all = String::new();
+    while let Some(folder) = folders.pop() {
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                all += &fs::read_to_string(path).unwrap();
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn each_promise_of_security_names_tests_that_there_are() {
+    let page = text("docs/src/security.md");
+    let sources = sources();
+    let rows = page.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| ---"));
+    let words = rows.flat_map(|row| row.split('`').skip(1).step_by(2));
+    let is_test =
+        |word: &&str| word.matches('_').count() > 2 && word.chars().all(|c| c == '_' || c.is_ascii_lowercase());
+    let named: BTreeSet<&str> = words.filter(is_test).collect();
+    assert!(named.len() > 50, "the page's tables are read no more: {named:?}");
+    for test in named {
+        assert!(
+            sources.contains(&format!("fn {test}(")),
+            "docs/src/security.md names the test `{test}`, and there is none"
+        );
+    }
+}
+
 #[test]
 fn links_between_pages_lead_somewhere() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

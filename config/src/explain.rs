@@ -6,7 +6,7 @@ mod timeline;
 use crate::Full;
 use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
-use crate::module::{Module, Program, Restart, RestartPolicy, Start};
+use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start};
 use crate::network::{LEVEL_NOT_REAL_TIME, TRANSIT};
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
@@ -123,13 +123,20 @@ impl Page<'_> {
             None => format!("at most {} a second", size_text(network.rate_bytes_s)),
             Some(_) => "in its time slots only".into(),
         };
+        let ports = match &self.installation.tdma {
+            None => format!(
+                "{} (packages), {} (time) and {} (packages that are not real time)",
+                network.port,
+                network.time_port(),
+                network.rest_port()
+            ),
+            Some(_) => format!("{} (packages) and {} (time)", network.port, network.time_port()),
+        };
         self.entry(
             "network",
             &format!(
-                "UDP ports {} (packages) and {} (time); IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps {} \
+                "UDP ports {ports}; IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps {} \
                  of each sender waiting",
-                network.port,
-                network.time_port(),
                 network.mtu,
                 network.datagram_bytes_max,
                 sends,
@@ -334,6 +341,13 @@ fn starts(module: &Module) -> String {
     };
     let (ready, stop) = (duration_text(module.ready_within), duration_text(module.stop_within));
     let mut words = format!("{state}; must be ready within {ready}, has {stop} to stop");
+    // Those that are there by themselves have no such key.
+    if module.required && module.is_in_file() {
+        words.push_str("; without it the node does not start");
+    }
+    if module.busy_after != BUSY_AFTER {
+        let _ = write!(words, "; busy after {}", duration_text(module.busy_after));
+    }
     if !module.spin.is_zero() {
         let _ = write!(words, "; spins for {}", duration_text(module.spin));
     }

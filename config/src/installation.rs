@@ -125,6 +125,11 @@ impl Installation {
         self.module(name).map(|module| module.node.as_str()).or_else(|| Some(tools()?.name.as_str()))
     }
 
+    /// The name under which launch of a node speaks.
+    pub fn launch_of(&self, node: &Node) -> Name {
+        Name::new(self.system.id, self.classes.tool().0, node.launch_instance(), 0)
+    }
+
     /// From which level on a module sends lines at its start; said of a face, it is said of its module.
     pub fn output_level(&self, module: Name) -> Level {
         let names = |own: &Name| self.module(module).is_some_and(|module| module.names().any(|name| name == *own));
@@ -135,6 +140,11 @@ impl Installation {
     /// How the processes of a class are scheduled.
     pub fn scheduling(&self, class: Class) -> Scheduling {
         self.scheduling.of(class)
+    }
+
+    /// Classes from this id run in real time; 256 if none does.
+    pub fn real_time_from(&self) -> u16 {
+        self.scheduling.real_time_from
     }
 
     /// A path of the file as the process sees it: relative ones start from the file's folder.

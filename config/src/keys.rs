@@ -60,7 +60,7 @@ pub struct Keys {
 #[derive(Debug, thiserror::Error)]
 pub enum KeysError {
     /// The file itself.
-    #[error("{path}: keys cannot be read ({1}); make them with `rohrpost keys new {folder}`, and copy them to all nodes", path = .0.display(), folder = folder_of(.0))]
+    #[error("{path}: keys cannot be read ({1}); copy this folder from the first computer of the installation. On that one, and there alone, `rohrpost keys new {folder}` makes it", path = .0.display(), folder = folder_of(.0))]
     Read(PathBuf, io::Error),
     /// Others may read it.
     #[error("{path}: others than its owner may read these keys (mode {1:o}); run `chmod 600 {path}`, and if others could log in here, change the keys", path = .0.display())]
@@ -245,7 +245,10 @@ impl Keys {
         let mut keys = keys.into_iter();
         match keys.next() {
             Some(newest) => Ok(Self { newest, older: keys.next() }),
-            None => Err((lines().count().max(1), "no key in it; make one with `rohrpost keys new`".into())),
+            None => Err((
+                lines().count().max(1),
+                "no key in it; copy the file from the first computer of the installation".into(),
+            )),
         }
     }
 }

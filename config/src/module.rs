@@ -6,7 +6,7 @@ use crate::mailbox::{MailboxLines, Mailboxes, lines_at};
 use crate::network::TRANSIT;
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
-use crate::tcp::TCP_ROUTER;
+use crate::tcp::{TCP_CLIENT, TCP_ROUTER};
 use crate::units::duration_text;
 use rohrpost_mailbox::Name;
 use serde::Deserialize;
@@ -26,6 +26,9 @@ pub enum Program {
 
 /// Longest time that a module may look for packages awake before it sleeps: longer than that nobody is about to come.
 pub const SPIN_MAX: Duration = Duration::from_millis(1);
+
+/// See [`Module::busy_after`].
+pub(crate) const BUSY_AFTER: Duration = Duration::from_secs(1);
 
 /// Whether a module works after launch, or waits to be switched on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -85,6 +88,8 @@ pub struct Module {
     pub program: Program,
     /// Whether it is left out with a notice when its program does not exist.
     pub optional: bool,
+    /// Whether its node does not start without it. Without one that is not, the others run.
+    pub required: bool,
     /// Modules and faces it sends commands to; subscribing is a command too.
     pub calls: Vec<Name>,
     /// Those of [`calls`](Self::calls) that are of a less important class, and why they may be, in the file's words.
@@ -99,6 +104,8 @@ pub struct Module {
     pub ready_within: Duration,
     /// Time from being told to end until it is killed.
     pub stop_within: Duration,
+    /// A part of its code that runs for so long without coming back is told: it is busy.
+    pub busy_after: Duration,
     /// Time for which it looks for packages awake before it sleeps.
     pub spin: Duration,
     /// Its mailboxes.
@@ -129,6 +136,8 @@ impl Module {
             node: node.name.clone(),
             program: Program::Builtin(builtin.into()),
             optional: false,
+            // What goes beyond the LAN is no reason to keep a robot from starting: its certificates may be missing, or its link.
+            required: ![TCP_CLIENT, TCP_ROUTER].contains(&builtin),
             calls: Vec::new(),
             although: Vec::new(),
             settings: toml::Table::new(),
@@ -136,6 +145,7 @@ impl Module {
             restart,
             ready_within: Duration::from_secs(10),
             stop_within: Duration::from_secs(2),
+            busy_after: BUSY_AFTER,
             spin: Duration::ZERO,
             mailboxes: Mailboxes::default(),
             line: node.line,
@@ -181,12 +191,14 @@ impl Context<'_> {
         let node = self.node(&section);
         let program = program(&section);
         let optional = section.get("optional").and_then(|item| item.flag()).unwrap_or(false);
+        let required = required(&section, optional);
         let calls = section.get("calls").map(|item| Calls::read(&item, self.directory, &what)).unwrap_or_default();
         let settings = settings(&section).unwrap_or_default();
         let start = section.get("start").and_then(|item| item.choice(&[("on", Start::On), ("off", Start::Off)]));
         let restart = section.get("restart").map(|item| Restart::read(&item, &what)).unwrap_or_default();
         let ready_within = section.get("ready-within").and_then(|item| item.duration_above_zero("10 s"));
         let stop_within = section.get("stop-within").and_then(|item| item.duration_above_zero("2 s"));
+        let busy_after = section.get("busy-after").and_then(|item| item.duration_above_zero("1 s"));
         let spin = section.get("spin").and_then(|item| spin(&item)).unwrap_or_default();
         let boxes = section.section("mailbox", &format!("{what}, mailbox"));
         let (mailboxes, mailbox_lines) = Mailboxes::read(boxes, &what, section.line);
@@ -198,6 +210,7 @@ impl Context<'_> {
             node: node?,
             program: program?,
             optional,
+            required,
             calls: calls.names,
             although: calls.although,
             settings,
@@ -205,6 +218,7 @@ impl Context<'_> {
             restart,
             ready_within: ready_within.unwrap_or(Duration::from_secs(10)),
             stop_within: stop_within.unwrap_or(Duration::from_secs(2)),
+            busy_after: busy_after.unwrap_or(BUSY_AFTER),
             spin,
             mailboxes,
             line,
@@ -294,6 +308,18 @@ fn command(item: &Item<'_>) -> Option<Vec<String>> {
         item.report(format!("`program` is a list of texts, the program first; write `program = {example}`"));
     }
     words
+}
+
+fn required(section: &Section<'_>, optional: bool) -> bool {
+    let Some(item) = section.get("required") else { return false };
+    let required = item.flag().unwrap_or(false);
+    if required && optional {
+        item.report(
+            "`required` and `optional` are both true; a module without which the node does not start cannot be left out, \
+             drop one of them",
+        );
+    }
+    required
 }
 
 fn spin(item: &Item<'_>) -> Option<Duration> {

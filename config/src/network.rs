@@ -32,6 +32,8 @@ pub const TRANSIT: MailboxSpec = MailboxSpec {
     max_age: Some(Duration::from_secs(2)),
     claims: u8::MAX,
 };
+/// Where there are time slots, a router looks so often between two of them whether half of that mailbox is full; then it takes all.
+pub const TRANSIT_LOOK: Duration = Duration::from_micros(1500);
 
 /// Behind what is sealed.
 const TAG_BYTES: usize = 16;
@@ -80,7 +82,7 @@ impl Security {
 pub struct Network {
     /// Whether it is sealed.
     pub security: Security,
-    /// UDP port of packages; time has the next one.
+    /// UDP port of packages; time has the next one, and packages that are not real time the one behind that.
     pub port: u16,
     /// Largest IP packet that every link carries, in bytes.
     pub mtu: u16,
@@ -114,6 +116,11 @@ impl Network {
         self.port + 1
     }
 
+    /// UDP port of packages that are not real time, where there are no time slots.
+    pub fn rest_port(&self) -> u16 {
+        self.port + 2
+    }
+
     /// In which of a router's queues a package waits: 0 goes first, 30 is the last real-time level, [`LEVEL_NOT_REAL_TIME`] goes when all
     /// others are empty. The highest four bits of the priority count, as in RTnet (seed 002, 4.2); each of its 16 levels takes two of ours,
     /// so that there is room for what routers themselves have to say.
@@ -135,7 +142,7 @@ impl Network {
             );
         }
         let security = read_security(&section);
-        let port = section.get("port").and_then(|item| item.whole(1024..=65_534, PORT.into()));
+        let port = section.get("port").and_then(|item| item.whole(1024..=65_533, PORT.into()));
         let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
         let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
         let mtu = section.get("mtu").and_then(|item| item.whole(least..=*MTUS.end(), MTU)).unwrap_or(MTU) as usize;

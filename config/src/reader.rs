@@ -45,16 +45,68 @@ impl<'d> Reader<'d> {
     pub(crate) fn report_syntax(&self, error: &toml::de::Error) {
         let span = error.span().unwrap_or(0..0);
         let there = self.text.get(span.clone()).unwrap_or_default();
+        let line = self.line(span.clone());
+        let open = bracket_left_open(self.text).map(|(at, bracket)| (line_of(self.text, at), bracket));
+        // The parser reads on, and stumbles over what cannot stand inside.
+        if let Some((opened, bracket)) =
+            open.filter(|(opened, _)| *opened <= line && error.message() != "duplicate key")
+        {
+            let end = if bracket == '[' { ']' } else { '}' };
+            return self.report(
+                opened,
+                format!("this is no TOML: this `{bracket}` is never closed; write `{end}` behind its last value"),
+            );
+        }
         let message = match error.message() {
             "duplicate key" => format!("`{there}` is given twice; drop one of them"),
             message => format!("this is no TOML: {}", message.replace('\n', " ")),
         };
-        self.report(self.line(span), message);
+        self.report(line, message);
     }
 
     pub(crate) fn into_problems(self) -> Vec<Problem> {
         self.problems.into_inner()
     }
+}
+
+/// The first bracket that nothing closes, and where it is; strings and comments are passed over.
+fn bracket_left_open(text: &str) -> Option<(usize, char)> {
+    let mut open: Vec<(usize, char)> = Vec::new();
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next() {
+        let bytes = match c {
+            '#' => text[at..].find('\n').unwrap_or(text.len() - at),
+            '"' | '\'' => string_bytes(&text[at..], c),
+            _ => c.len_utf8(),
+        };
+        match c {
+            '[' | '{' => open.push((at, c)),
+            ']' | '}' => {
+                open.pop();
+            }
+            _ => {}
+        }
+        at += bytes;
+    }
+    open.first().copied()
+}
+
+/// Bytes of the string that the text begins with: to its end, or that of its line; of one in three quotes to the end of all.
+fn string_bytes(text: &str, quote: char) -> usize {
+    let long = [quote; 3].iter().collect::<String>();
+    let end = if text.starts_with(&long) { long } else { quote.to_string() };
+    let mut rest = text.char_indices().skip(end.len());
+    while let Some((at, c)) = rest.next() {
+        match c {
+            '\\' if quote == '"' => {
+                rest.next();
+            }
+            '\n' if end.len() == 1 => return at,
+            _ if text[at..].starts_with(&end) => return at + end.len(),
+            _ => {}
+        }
+    }
+    text.len()
 }
 
 /// Line of a byte of the text, counted from 1. A place past the end is the last line that says something.

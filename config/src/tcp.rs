@@ -35,8 +35,8 @@ const LAN_BITS_V4: u32 = 24;
 const LAN_BITS_V6: u32 = 64;
 /// Letters of a part of a domain name (RFC 1035).
 const LABEL_MAX: usize = 63;
-/// Above the clients of the nodes, of which there are at most 64.
-const SERVER_INSTANCE: u8 = u8::MAX;
+/// Instance of the TCP router: above the clients of the nodes, of which there are at most 64.
+pub const TCP_SERVER: u8 = u8::MAX;
 
 /// Where the TCP router is, and what it grants.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -257,7 +257,7 @@ pub(crate) fn modules(tcp: Option<&Tcp>, nodes: &[Node], classes: &ClassTable, s
         within: Duration::from_secs(1),
     };
     let server = nodes.iter().filter(|node| tcp.server.as_ref() == Some(&node.name));
-    let server = server.map(|node| Module::by_itself(name(SERVER_INSTANCE), node, TCP_ROUTER, restart));
+    let server = server.map(|node| Module::by_itself(name(TCP_SERVER), node, TCP_ROUTER, restart));
     let clients = nodes
         .iter()
         .take(NODES_MAX)
@@ -281,13 +281,13 @@ impl Installation {
     /// The TCP router, if it runs on a node of this system.
     pub fn tcp_router(&self) -> Option<Name> {
         let class = self.classes.id(TCP).filter(|_| self.tcp.as_ref().is_some_and(|tcp| tcp.server.is_some()))?;
-        Some(Name::new(self.system.id, class.0, SERVER_INSTANCE, local::COMMANDS))
+        Some(Name::new(self.system.id, class.0, TCP_SERVER, local::COMMANDS))
     }
 
     /// The TCP router, if another system runs it: its name in all systems, since no configuration says in which.
     pub fn tcp_router_elsewhere(&self) -> Option<Name> {
         let class = self.classes.id(TCP).filter(|_| self.tcp.as_ref().is_some_and(|tcp| tcp.server.is_none()))?;
-        Some(Name::new(ALL_SYSTEMS, class.0, SERVER_INSTANCE, local::COMMANDS))
+        Some(Name::new(ALL_SYSTEMS, class.0, TCP_SERVER, local::COMMANDS))
     }
 
     /// The names that a node hosts, each range with all mailboxes in it: its modules, their faces, and its tools. Sorted; none overlaps
@@ -301,6 +301,20 @@ impl Installation {
         ranges.sort_unstable();
         ranges.dedup();
         ranges
+    }
+
+    /// The names of a node that are registered at the TCP router: all that it hosts, but for the mailboxes by which its routers carry packages.
+    /// What a router has in common with all modules is among them: so others may ask it how it is, and its lines of output arrive.
+    pub fn names_registered(&self, node: &str) -> Vec<(Name, Name)> {
+        let carries = |first: Name| {
+            let module = self.modules_on(node).find(|module| module.names().any(|name| name == first));
+            module.is_some_and(|module| !module.is_in_file())
+        };
+        let common = |(first, last): (Name, Name)| match carries(first) {
+            true => (first, last.with_local(local::DATA)),
+            false => (first, last),
+        };
+        self.names_on(node).into_iter().map(common).collect()
     }
 
     /// The names for which packages go to the TCP router if neither this node nor its LAN has them: all but those that the node hosts itself.

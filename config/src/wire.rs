@@ -24,6 +24,8 @@ pub const HELLO_BYTES: usize = 32;
 pub const KEPT_IN_BYTES: u64 = 256;
 /// A clock that was not compared with another yet is off by one, at most, in so long.
 pub const RATE_MAX_PER: u32 = 4000;
+/// System time is bent by one, at most, in so long, and the clock by which it is measured runs meanwhile as far off as [`RATE_MAX_PER`] says.
+pub const BEND_MAX_PER: u32 = 1000;
 /// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
 pub const HAND_OVER: Duration = Duration::from_micros(20);
 

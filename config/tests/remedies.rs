@@ -59,7 +59,7 @@ const WRITTEN: &[(&str, Changes)] = &[
     ),
     ("cycle", &[(Line(26), "cycle = \"500 ms\"")]),
     ("deadline-far", &[(NewSlot, "node = \"base\""), (NewSlot, "offset = \"1 ms\""), (NewSlot, "length = \"410 us\"")]),
-    ("deadline-too-far", &[(Line(63), "deadline = \"400.4 ms\"")]),
+    ("deadline-too-far", &[(Line(63), "deadline = \"400.9 ms\"")]),
     ("deadline-later", &[(Line(70), "deadline = \"5.5 ms\"")]),
     ("deadline-longer-slot", &[(Line(33), "length = \"470 us\"")]),
     ("deadline-oftener", &[(Line(38), "period = 1"), (Line(38), "phase = 0")]),

@@ -1,7 +1,7 @@
 //! What a file with a TCP router means.
 
 use rohrpost_config::{Installation, Program, TCP_CLIENT, TCP_ROUTER};
-use rohrpost_mailbox::{ALL_SYSTEMS, Name, Priority};
+use rohrpost_mailbox::{ALL_SYSTEMS, Name, Priority, local};
 use std::path::Path;
 
 const TCP: &str = include_str!("tcp.toml");
@@ -69,6 +69,30 @@ fn a_node_hosts_its_own_names_and_all_others_are_beyond() {
         assert_eq!((has(&hosts, name), has(&beyond, name)), (is_own, !is_own), "{name}");
     }
     assert!(hosts.windows(2).chain(beyond.windows(2)).all(|pair| pair[0].1 < pair[1].0), "in order, and apart");
+}
+
+#[test]
+fn the_mailboxes_by_which_routers_carry_packages_are_never_registered() {
+    let field = parse(include_str!("beyond.toml"));
+    for (node, own, module) in
+        [("base", "router.0", "motor.0"), ("brain", "tcp.1", "pilot.0"), ("base", "tcp.255", "motor.0")]
+    {
+        let registered = field.names_registered(node);
+        let has = |module: &str, local| {
+            let name = field.classes.parse_name(module).unwrap().with_local(local);
+            registered.iter().any(|(first, last)| (*first..=*last).contains(&name))
+        };
+        for mailbox in 0..=u8::MAX {
+            assert_eq!(has(own, mailbox), mailbox <= local::DATA, "{own}.{mailbox}");
+            assert!(has(module, mailbox), "{module}.{mailbox}, which is a module's");
+        }
+        assert!(registered.windows(2).all(|pair| pair[0].1 < pair[1].0), "in order, and apart");
+    }
+    let own = field.names_on("base");
+    assert!(
+        own.iter().all(|(first, last)| (first.local(), last.local()) == (0, u8::MAX)),
+        "the node itself has them all"
+    );
 }
 
 #[test]

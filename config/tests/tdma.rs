@@ -131,22 +131,22 @@ fn bounds_are_what_the_book_derives() {
     assert_eq!((scan.flow, drive.flow, scan.level, drive.level), (0, 1, 14, 14), "both at the pilot's class, 140");
     let ns = |us: &[u64]| Duration::from_nanos(us.iter().sum());
 
-    // Published just after a slot took what it sends, 100 us before its beginning, the scan waits a cycle and these 100 us. Two frames of time,
+    // Published just after a slot took what it sends, 100 us before its beginning, the scan waits a cycle and these 100 us; bent by 0.125 % a cycle is 6.25 us longer. Two frames of time,
     // one "still there" and a refusal take 20 us each to hand over. Of its 2048 bytes 1404 go first, in a datagram of 1472, with heads 1538 B,
     // 123.04 us; then 644 in one of 712, 778 B, 62.24 us. The slot may have begun 50 us late. A switch passes the last one on.
     let bound = scan.latency.unwrap();
-    assert_eq!((bound.waits, bound.slots, bound.said), (ns(&[5_100_000]), 1, ns(&[80_000])));
+    assert_eq!((bound.waits, bound.slots, bound.said), (ns(&[5_106_250]), 1, ns(&[80_000])));
     assert_eq!((bound.datagrams, bound.own, bound.forward), (2, ns(&[123_040, 62_240]), ns(&[62_240])));
-    assert_eq!(bound.latency, ns(&[5_100_000, 50_000, 80_000, 123_040, 62_240, 62_240]));
+    assert_eq!(bound.latency, ns(&[5_106_250, 50_000, 80_000, 123_040, 62_240, 62_240]));
 
     // The command may catch the slot at 3 ms or, in each other cycle, that at 2 ms; just after the one at 3 ms of a cycle without the other it
     // waits longest. Others may follow it in its datagram, to 1538 B.
     let bound = drive.latency.unwrap();
     assert_eq!(
         (bound.waits, installation.tdma.as_ref().unwrap().slots[bound.slot].offset),
-        (ns(&[5_100_000]), Duration::from_millis(3))
+        (ns(&[5_106_250]), Duration::from_millis(3))
     );
-    assert_eq!(bound.latency, ns(&[5_100_000, 50_000, 80_000, 123_040, 123_040]));
+    assert_eq!(bound.latency, ns(&[5_106_250, 50_000, 80_000, 123_040, 123_040]));
 }
 
 #[test]
@@ -182,4 +182,31 @@ fn absurd_flows_are_judged_in_time() {
         }
     }
     assert_eq!(accepted, [("24 h", "24 h", "1 B"), ("24 h", "24 h", "65519 B")]);
+}
+
+/// What waits for a slot waits in the mailbox of the node's router, which has its size.
+#[test]
+fn no_more_flows_of_a_node_are_declared_than_its_router_has_room_for() {
+    let (head, _) = SLOTS.split_once("[[flow]]").unwrap();
+    let of = |count: u32| {
+        let subscriber = |n| {
+            format!(
+                "[[module]]\nname = \"pilot.{n}\"\nnode = \"brain\"\nprogram = \"./pilot\"\ncalls = [\"laser.0\"]\n"
+            )
+        };
+        let flow = |n| {
+            format!(
+                "[[flow]]\nfrom = \"laser.0\"\nto = \"pilot.{n}\"\nsize = \"8 B\"\nperiod = \"400 ms\"\ndeadline = \"400 ms\"\n"
+            )
+        };
+        let subscribers: String = (1..=count).map(subscriber).collect();
+        let flows: String = (1..=count).map(flow).collect();
+        Installation::parse(&format!("{head}{subscribers}{flows}"), Path::new("tdma.toml"))
+    };
+    assert_eq!(of(64).map_err(|errors| errors.to_string()).map(|file| file.flows.len()), Ok(64));
+    for count in [65, 150] {
+        let said = of(count).unwrap_err().to_string();
+        let of_them = format!("[[flow]]s from `base`: {count} of their packages may wait for its slots at once");
+        assert!(said.contains(&of_them) && said.contains("holds 64"), "{said}");
+    }
 }

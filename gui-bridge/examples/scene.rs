@@ -1,6 +1,7 @@
 //! Draws an invented robot for a minute of its time: `cargo run --profile bridge -p rohrpost-gui-bridge --example scene
 //! scene.rrd`, then `rerun scene.rrd` or `cargo xtask picture scene.rrd scene.png`.
 
+use rohrpost::survey::Standing;
 use rohrpost::types::{Cell, LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use rohrpost::value::Value;
 use rohrpost_gui_bridge::{Level, Scene, Sink};
@@ -234,20 +235,24 @@ fn happen(scene: &mut Scene, second: u64) {
     let modules = ["motor.0", "laser.0", "slam.0", "pilot.0", "output.0"];
     for (index, module) in modules.into_iter().enumerate() {
         match second.checked_sub(index as u64) {
-            Some(0) => scene.module_state(module, "starting", ""),
-            Some(2) => scene.module_state(module, "on", ""),
+            Some(0) => scene.module_state(module, Standing::Starting, ""),
+            Some(2) => scene.module_state(module, Standing::On, ""),
             _ => {}
         }
     }
     match second {
         3 => scene.output_line("laser.0", Level::Info, "361 beams, 0.75 turns, 5 Hz"),
         7 => scene.output_line("pilot.0", Level::Info, "goal (8.2, 3.4): 17.9 m to go"),
-        21 => scene.module_state("laser.0", "dead", "killed by signal 9; restart 1 of 5 in 1 s"),
-        22 => scene.module_state("laser.0", "starting", ""),
-        24 => scene.module_state("laser.0", "on", "back, adopted 3 packages"),
+        21 => scene.module_state(
+            "laser.0",
+            Standing::Restarting { attempt: 1, most: 5 },
+            "was killed by signal 9; starts again in 1s",
+        ),
+        22 => scene.module_state("laser.0", Standing::Starting, ""),
+        24 => scene.module_state("laser.0", Standing::On, "back, adopted 3 packages"),
         31 => scene.output_line("pilot.0", Level::Info, "goal reached, next (-6.7, -3.7)"),
-        35 => scene.module_state("output.0", "error", "disk full: dropping lines of level debug"),
-        41 => scene.module_state("output.0", "on", "72 lines were dropped"),
+        35 => scene.module_state("output.0", Standing::Error, "disk full: dropping lines of level debug"),
+        41 => scene.module_state("output.0", Standing::On, "72 lines were dropped"),
         48 => scene.output_line("slam.0", Level::Info, "loop closed: 0.31 m, 4.0° off"),
         55 => scene.output_line("motor.0", Level::Warning, "left wheel: 41 °C"),
         _ => {}

@@ -1,7 +1,7 @@
 //! The ways of nodes to the TCP router: what their clients tell, drawn beside the modules, so that an outage is seen as one.
 //!
 //! ```text
-//!   modules/TCP router, from NODE                a lane: on, or silent while packages cannot go there
+//!   modules/TCP router, from NODE                a lane: on, or unreachable while packages cannot go there
 //!   network/latency/TCP router, from NODE        half of the way there and back, µs
 //!   network/clock/NODE                           error bound of a node that has its time from there, µs
 //! ```
@@ -17,6 +17,7 @@ use crate::views::is;
 use rerun::Clear;
 use rohrpost::description::{DataItem, Description};
 use rohrpost::interfaces::{BeyondLink, BeyondState};
+use rohrpost::survey::Standing;
 use std::collections::HashMap;
 
 /// Entities above what is true at its moment only.
@@ -56,12 +57,12 @@ impl View for Beyond {
         let now = Drawn { outages: link.outages, is_up: link.state == BeyondState::Up };
         let Some(mut before) = self.drawn.insert(link.node, now) else {
             // What was before this drawing began is not in it.
-            scene.lane(&from, word(now.is_up));
+            scene.lane(&from, standing(now.is_up));
             return Ok(());
         };
         if let Some(outage) = link.outage.filter(|_| before.outages != now.outages) {
             scene.set_time(outage.began_ns);
-            scene.lane(&from, word(false));
+            scene.lane(&from, standing(false));
             if outage.began_ns > self.cleared_ns {
                 self.cleared_ns = outage.began_ns;
                 PRESENT.iter().for_each(|parts| scene.log_event(entity(parts), &Clear::recursive()));
@@ -75,7 +76,7 @@ impl View for Beyond {
                 let took_s = outage.duration(ended_ns).as_secs_f64();
                 scene.output_line(&from, Level::Warning, &format!("there again; it was away for {took_s:.3} s"));
             }
-            scene.lane(&from, word(true));
+            scene.lane(&from, standing(true));
         }
         Ok(())
     }
@@ -85,8 +86,8 @@ impl View for Beyond {
     }
 }
 
-fn word(is_up: bool) -> &'static str {
-    if is_up { "on" } else { "silent" }
+fn standing(is_up: bool) -> Standing {
+    if is_up { Standing::On } else { Standing::Unreachable }
 }
 
 #[cfg(test)]

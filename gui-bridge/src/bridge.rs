@@ -15,7 +15,7 @@ use rohrpost::config::{MailboxSpec, ROUTER};
 use rohrpost::interface::{Interface, Proxy};
 use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
 use rohrpost::mailbox::{Full, Latency, ModuleState, Node, Shape};
-use rohrpost::survey::Survey;
+use rohrpost::survey::{Standing, Survey};
 use rohrpost::{Context, Module, ModuleError, Name, Received};
 use serde::Deserialize;
 use std::marker::PhantomData;
@@ -262,12 +262,9 @@ fn earlier_lines(scene: &mut Scene, collector: Name, context: &Context) {
 fn states(scene: &mut Scene, survey: &Survey, context: &Context) {
     for module in &survey.modules {
         let name = context.installation().classes.format(module.name);
-        let state = match &module.process {
-            Some(process) => process.state.map_or("starting", ModuleState::name),
-            None if module.at_ns.is_none() => "silent",
-            None => "dead",
-        };
-        scene.module_state(&name, state, "");
+        let state = module.standing();
+        let why = if state == Standing::On { String::new() } else { module.last_error(context.installation()) };
+        scene.module_state(&name, state, &why);
     }
 }
 

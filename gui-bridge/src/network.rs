@@ -8,6 +8,7 @@
 //! ```
 
 use crate::blueprint::Tab;
+use crate::nodes::APART;
 use crate::palette;
 use crate::scene::{DrawError, Scene, entity};
 use crate::view::{Datum, View};
@@ -102,9 +103,10 @@ fn onward(drawn_ns: u64, told_ns: u64) -> u64 {
     if went_back { told_ns } else { told_ns.max(drawn_ns) }
 }
 
-/// None when the router began anew in between.
+/// None when the router began anew in between, or told both at nearly the same time.
 fn sent_per_s(before: &Links, now: &Links, peer: &PeerLink) -> Option<f64> {
-    let seconds = now.uptime_ms.checked_sub(before.uptime_ms).filter(|ms| *ms > 0)? as f64 / 1e3;
+    let apart_ms = APART.as_millis() as u64;
+    let seconds = now.uptime_ms.checked_sub(before.uptime_ms).filter(|ms| *ms >= apart_ms)? as f64 / 1e3;
     let known = before.peers.iter().find(|known| known.node == peer.node)?;
     Some(peer.sent.packages.checked_sub(known.sent.packages)? as f64 / seconds)
 }
@@ -289,6 +291,8 @@ mod tests {
     fn rates_are_by_the_routers_own_time_and_begin_anew_with_it() {
         let (before, now) = (links("base", "arm", 1000, 10), links("base", "arm", 1500, 60));
         assert_eq!(sent_per_s(&before, &now, &now.peers[0]), Some(100.0));
+        let soon = links("base", "arm", 1003, 60);
+        assert_eq!(sent_per_s(&before, &soon, &soon.peers[0]), None, "in 3 ms these would be thousands a second");
         let anew = links("base", "arm", 200, 4);
         assert_eq!(sent_per_s(&now, &anew, &anew.peers[0]), None);
         assert_eq!(words(&now.peers[0], 100.0), "100/s, 4 lost", "as the receiver says");

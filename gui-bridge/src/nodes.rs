@@ -19,6 +19,10 @@ pub(crate) struct Nodes {
     others: Vec<Other>,
 }
 
+/// Two looks are at least so far apart, or no rate is made of them: a few packages in a few milliseconds would be thousands a second, and
+/// flatten the rest of the curve.
+pub(crate) const APART: Duration = Duration::from_millis(250);
+
 /// Another node.
 struct Other {
     looks: Looks,
@@ -52,7 +56,11 @@ impl Looks {
     }
 
     fn take(&mut self, survey: Survey) {
-        self.earlier = self.now.replace(survey);
+        let is_apart = |now: &Survey| survey.at_ns.saturating_sub(now.at_ns) >= APART.as_nanos() as u64;
+        if self.now.as_ref().is_some_and(is_apart) {
+            self.earlier = self.now.take();
+        }
+        self.now = Some(survey);
     }
 }
 
@@ -132,5 +140,32 @@ impl Nodes {
             }
         }
         figures
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn look(at_ms: u64) -> Survey {
+        let (modules, mailboxes, classes, flows) = Default::default();
+        Survey { node: "main".into(), at_ns: at_ms * 1_000_000, modules, mailboxes, classes, flows }
+    }
+
+    #[test]
+    fn no_rate_is_made_of_looks_that_follow_each_other_at_once() {
+        let mut looks = Looks::of("main");
+        let apart_ms = APART.as_millis() as u64;
+        for (at_ms, between_ms, why) in [
+            (1000, None, "one look alone"),
+            (1003, None, "the second follows at once"),
+            (1003 + apart_ms, Some(apart_ms), "far enough"),
+            (1010 + apart_ms, Some(apart_ms + 7), "too close to the last, so from the one before it"),
+            (1510 + apart_ms, Some(500), "and on"),
+        ] {
+            looks.take(look(at_ms));
+            let both = looks.earlier.as_ref().zip(looks.now.as_ref());
+            assert_eq!(both.map(|(earlier, now)| (now.at_ns - earlier.at_ns) / 1_000_000), between_ms, "{why}");
+        }
     }
 }

@@ -3,17 +3,21 @@
 use crate::scene::{Scene, entity};
 use rerun::{StateChange, StateConfiguration, TextDocument, TextLog, TextLogLevel};
 use rohrpost::common::OutputLevel;
+use rohrpost::survey::Standing;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The states of a module, and their colours as 0xRRGGBBAA.
-const STATES: [(&str, u32); 6] = [
-    ("starting", 0x5B8D_EFFF),
-    ("off", 0x6B74_80FF),
-    ("on", 0x3FA7_60FF),
-    ("error", 0xE6A0_1FFF),
-    ("dead", 0xD643_4EFF),
-    ("silent", 0xA97B_D6FF),
+const COLOURS: [(Standing, u32); 9] = [
+    (Standing::Starting, 0x5B8D_EFFF),
+    (Standing::On, 0x3FA7_60FF),
+    (Standing::Off, 0x6B74_80FF),
+    (Standing::Error, 0xE6A0_1FFF),
+    (Standing::Busy, 0xF2C1_4EFF),
+    (Standing::Stopped, 0x8A8F_98FF),
+    (Standing::Failed, 0xD643_4EFF),
+    (Standing::Restarting { attempt: 0, most: 0 }, 0xE57F_84FF),
+    (Standing::Unreachable, 0xA97B_D6FF),
 ];
 
 /// What is so far behind is not told late: time itself went back.
@@ -81,13 +85,13 @@ impl States {
 }
 
 impl Scene {
-    /// `module` is in this state: `starting`, `off`, `on`, `error`, `dead`, or `silent`: its node
-    /// does not answer. Said again it changes nothing, so it may
-    /// come with every poll. `text` says why, and becomes a line of output; leave it empty if there is nothing to say.
-    pub fn module_state(&mut self, module: &str, state: &str, text: &str) {
+    /// `module` stands so. Said again it changes nothing, so it may come with every poll. `text` says why, and becomes a line of
+    /// output; leave it empty if there is nothing to say.
+    pub fn module_state(&mut self, module: &str, state: Standing, text: &str) {
         let lane = entity(&["modules", module]);
-        match self.states.last.insert(module.into(), state.into()) {
-            Some(last) if last == state => {
+        let told = state.to_string();
+        match self.states.last.insert(module.into(), told.clone()) {
+            Some(last) if last == told => {
                 if self.states.table_is_old {
                     self.draw_states();
                 }
@@ -96,26 +100,26 @@ impl Scene {
             Some(_) => {}
             None => self.log_static(lane.clone(), &colours()),
         }
-        self.log(lane, &StateChange::single(state));
+        self.log(lane, &StateChange::single(state.word()));
         self.draw_states();
         if text.is_empty() {
             return;
         }
         let level = match state {
-            "dead" => Level::Error,
-            "error" => Level::Warning,
-            _ => Level::Info,
+            Standing::Failed => Level::Error,
+            Standing::Error | Standing::Busy | Standing::Restarting { .. } | Standing::Unreachable => Level::Warning,
+            Standing::Starting | Standing::On | Standing::Off | Standing::Stopped => Level::Info,
         };
         self.output_line(module, level, text);
     }
 
     /// What is no module has a lane beside those that are: from now on it is in this state. Each change is drawn, however soon the next comes.
-    pub(crate) fn lane(&mut self, name: &str, state: &str) {
+    pub(crate) fn lane(&mut self, name: &str, state: Standing) {
         let lane = entity(&["modules", name]);
-        if self.states.last.insert(name.into(), state.into()).is_none() {
+        if self.states.last.insert(name.into(), state.to_string()).is_none() {
             self.log_static(lane.clone(), &colours());
         }
-        self.log_event(lane, &StateChange::single(state));
+        self.log_event(lane, &StateChange::single(state.word()));
         self.draw_states();
     }
 
@@ -138,7 +142,7 @@ impl Scene {
 }
 
 fn colours() -> StateConfiguration {
-    let (names, colours): (Vec<_>, Vec<_>) = STATES.into_iter().unzip();
+    let (names, colours): (Vec<_>, Vec<_>) = COLOURS.into_iter().map(|(state, colour)| (state.word(), colour)).unzip();
     StateConfiguration::new().with_values(names).with_colors(colours)
 }
 
@@ -155,13 +159,24 @@ mod tests {
     #[test]
     fn a_state_said_again_draws_nothing() {
         let mut drawing = Drawing::new();
-        for (state, text) in [("starting", ""), ("on", ""), ("on", "still on"), ("dead", "killed by signal 9")] {
+        let failed = (Standing::Failed, "was killed by signal 9");
+        for (state, text) in [(Standing::Starting, ""), (Standing::On, ""), (Standing::On, "still on"), failed] {
             drawing.scene.module_state("laser.0", state, text);
         }
         let rows = drawing.rows();
         assert_eq!(rows["/modules/laser.0"], 3 + 1, "three changes and the colours");
         assert_eq!(rows[r"/modules\ now"], 3);
         assert_eq!(rows["/output/laser.0"], 1, "the reason of the last one");
+    }
+
+    /// A lane is coloured by the word, so each needs its colour.
+    #[test]
+    fn each_state_has_a_colour() {
+        let mut words = COLOURS.map(|(state, _)| state.word());
+        let mut all = Standing::WORDS;
+        words.sort_unstable();
+        all.sort_unstable();
+        assert_eq!(words, all);
     }
 
     #[test]

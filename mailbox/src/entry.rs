@@ -2,6 +2,8 @@
 
 use crate::bell::Bell;
 use crate::name::Name;
+use crate::work::{InHand, Mark};
+use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Most participants of a node at a time.
@@ -55,7 +57,10 @@ pub(crate) struct Entry {
     pub(crate) joined_ns: AtomicU64,
     /// Not 0: it sleeps in `poll`; ring it through its pipe too.
     pub(crate) polling: AtomicU32,
+    /// What its thread has in hand. Senders touch this line only to wake it, which they do when it has nothing.
+    pub(crate) mark: Mark,
 }
+const _: () = assert!(size_of::<Entry>() == 64 && offset_of!(Entry, joined_ns) == 24 && offset_of!(Entry, mark) == 40);
 
 /// One participant, as the table has it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,6 +77,8 @@ pub struct ParticipantInfo {
     pub restarts: u32,
     /// When it joined, on the monotonic clock.
     pub joined_ns: u64,
+    /// What it has in hand, while it is in the module's own code.
+    pub in_hand: Option<InHand>,
 }
 
 impl Entry {
@@ -87,6 +94,7 @@ impl Entry {
             state: ModuleState::from_code(self.state.load(Ordering::Acquire)),
             restarts: self.restarts.load(Ordering::Relaxed),
             joined_ns: self.joined_ns.load(Ordering::Relaxed),
+            in_hand: self.mark.read(),
         }
     }
 }

@@ -25,6 +25,11 @@ pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
     }
 }
 
+/// The folder of this path, or the nearest around it that is there: what a person can look at when a node could not be made.
+pub(crate) fn existing(path: &Path) -> &Path {
+    path.ancestors().find(|folder| folder.exists()).unwrap_or(path)
+}
+
 /// Opens a file of the node's directory to look at it: never through a link, never waiting for a pipe's other end.
 pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
     let flags = libc::O_CLOEXEC | libc::O_NOFOLLOW | libc::O_NONBLOCK;

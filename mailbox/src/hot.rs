@@ -37,13 +37,21 @@ pub(crate) struct Hot {
 #[derive(Default)]
 #[repr(C)]
 pub(crate) struct ReceiverSays {
-    /// Not 0: it sleeps or is about to; ring its bell.
+    /// Not 0: it sleeps or is about to; see [`rings`].
     pub(crate) sleeping: AtomicU32,
     /// It has looked at all hints, and receives packages of this priority without looking again: who sends a more important one
     /// says so by `alert`.
     pub(crate) level: AtomicU32,
     /// Not 0: this mailbox has been given up; what is sent here is not received.
     pub(crate) retired: AtomicU32,
+}
+
+/// `sleeping` of a receiver that wakes up for every package; for those above a priority alone, it is more by one and the priority.
+const FOR_ALL: u32 = 1;
+
+/// Whether a package of this priority is to ring the bell of a receiver that says this of its sleep.
+pub(crate) fn rings(sleeping: u32, priority: Priority) -> bool {
+    sleeping != 0 && u32::from(priority.0) + FOR_ALL + 1 > sleeping
 }
 
 impl Slots<'_> {
@@ -62,8 +70,17 @@ impl Slots<'_> {
 
     /// Says that the receiver is about to sleep. Look at the hints after this, then sleep, then [`Slots::awake`].
     pub(crate) fn drowsy(&self) {
+        self.drowsy_until(FOR_ALL);
+    }
+
+    /// The same of one that sleeps on for all that is not above this priority.
+    pub(crate) fn drowsy_above(&self, priority: Priority) {
+        self.drowsy_until(FOR_ALL + 1 + u32::from(priority.0));
+    }
+
+    fn drowsy_until(&self, sleeping: u32) {
         // ORDERING: Release, at least; who sees this owner asleep sees whose bell to ring. Pairs with the load in `publish`.
-        self.hot.receiver.0.sleeping.store(1, Ordering::SeqCst);
+        self.hot.receiver.0.sleeping.store(sleeping, Ordering::SeqCst);
         // ORDERING (F): `sleeping` before the last look at the hints. Pairs with (E).
         seq_cst_accesses();
     }
@@ -116,5 +133,26 @@ impl Slots<'_> {
         self.hot.receiver.0.retired.store(1, Ordering::Relaxed);
         // ORDERING (G): `retired` before the owner's last look at the words. Pairs with (E).
         fence(Ordering::SeqCst);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_sleeps_above_a_priority_is_rung_for_what_is_above_it_alone() {
+        let above = |priority: u8| FOR_ALL + 1 + u32::from(priority);
+        for (sleeping, priority, wakes, why) in [
+            (0, 255, false, "nobody sleeps"),
+            (FOR_ALL, 0, true, "for every package"),
+            (above(0), 0, false, "not above"),
+            (above(0), 1, true, "above"),
+            (above(127), 127, false, "the most that is not above"),
+            (above(127), 128, true, "the least that is"),
+            (above(255), 255, false, "nothing is above all"),
+        ] {
+            assert_eq!(rings(sleeping, Priority(priority)), wakes, "{why}");
+        }
     }
 }

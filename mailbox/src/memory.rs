@@ -7,6 +7,7 @@ use std::io;
 use std::num::NonZeroUsize;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU32, AtomicU64};
+use std::sync::{Arc, Weak};
 
 /// Types that may lie in memory which other processes write at any time.
 ///
@@ -27,9 +28,18 @@ unsafe impl Shared for crate::traffic::TrafficPage {}
 // SAFETY: made of atomics alone.
 unsafe impl Shared for crate::system_time::TimePage {}
 
-/// A shared mapping of a file's beginning. Truncating the file afterwards is outside our contract: all processes of a user
+/// A shared mapping of a file's beginning, or one of several users of it in this process. Truncating the file afterwards is outside our contract: all processes of a user
 /// trust each other's memory.
+#[derive(Clone)]
 pub(crate) struct Mapping {
+    /// As in the region, which it keeps: reached without another look.
+    base: NonNull<u8>,
+    bytes: usize,
+    region: Arc<Region>,
+}
+
+/// What is mapped until its last user goes.
+pub(crate) struct Region {
     base: NonNull<u8>,
     bytes: usize,
 }
@@ -38,6 +48,10 @@ pub(crate) struct Mapping {
 unsafe impl Send for Mapping {}
 // SAFETY: as above: shared references give access to atomics only, bodies come as raw pointers.
 unsafe impl Sync for Mapping {}
+// SAFETY: it is an address that nothing but its end uses.
+unsafe impl Send for Region {}
+// SAFETY: as above.
+unsafe impl Sync for Region {}
 
 /// What a mapping is for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -72,7 +86,18 @@ impl Mapping {
             Err(Errno::EAGAIN | Errno::EPERM) if used == Use::Keep => map(MapFlags::empty())?,
             mapped => mapped?,
         };
-        Ok(Self { base: base.cast(), bytes })
+        let base = base.cast();
+        Ok(Self { base, bytes, region: Arc::new(Region { base, bytes }) })
+    }
+
+    /// By which it is found again while it has a user.
+    pub(crate) fn downgrade(&self) -> Weak<Region> {
+        Arc::downgrade(&self.region)
+    }
+
+    /// The mapping again, for another user.
+    pub(crate) fn of(region: Arc<Region>) -> Self {
+        Self { base: region.base, bytes: region.bytes, region }
     }
 
     /// The value at `offset`.
@@ -103,9 +128,9 @@ impl Mapping {
     }
 }
 
-impl Drop for Mapping {
+impl Drop for Region {
     fn drop(&mut self) {
-        // SAFETY: our own mapping, and every reference into it borrowed `self`.
+        // SAFETY: our own mapping; every reference into it borrowed a `Mapping`, and the last of them is gone.
         let unmapped = unsafe { munmap(self.base.cast(), self.bytes) };
         debug_assert!(unmapped.is_ok());
     }

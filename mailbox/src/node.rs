@@ -3,6 +3,7 @@
 //! ```text
 //! /dev/shm/rohrpost-UID/INSTALLATION.NODE/     mode 0700
 //!     node           this page: epochs, participants (their bells, states, process ids)
+//!     children       what launch knows of its modules (it writes it, not this crate)
 //!     config         where the configuration is that launch runs (launch writes it, not this crate)
 //!     time           system time (see `system_time`)
 //!     traffic.3      what participant 3 sends (see `traffic`)
@@ -74,7 +75,7 @@ pub enum NodeError {
     )]
     Version(PathBuf, u32),
     /// No memory, most likely.
-    #[error("node {path}: no shared memory: {source}; is it full (df {path})?", path = path.display())]
+    #[error("node {path}: no shared memory: {source}; is it full (df {})?", crate::files::existing(path).display(), path = path.display())]
     Memory {
         /// Its directory.
         path: PathBuf,
@@ -300,11 +301,15 @@ impl Node {
 
     /// The last that this process said of what it does as this module, also if it has died since; none when it has left in
     /// order, or another has taken its place in the table.
-    pub fn state_of(&self, module: Name, pid: u32) -> Option<ModuleState> {
+    pub fn last_word_of(&self, module: Name, pid: u32) -> Option<ParticipantInfo> {
         let all = self.page().entries.iter().map(Entry::read);
         // An earlier process may have had the number.
-        let last = all.filter(|p| p.module == module && p.pid == pid).max_by_key(|p| p.joined_ns);
-        last?.state
+        all.filter(|p| p.module == module && p.pid == pid).max_by_key(|p| p.joined_ns)
+    }
+
+    /// The state in it.
+    pub fn state_of(&self, module: Name, pid: u32) -> Option<ModuleState> {
+        self.last_word_of(module, pid)?.state
     }
 
     /// Process id of the launch that runs this node now.

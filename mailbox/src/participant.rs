@@ -9,9 +9,11 @@ use crate::node::{Node, NodeError};
 use crate::step::step;
 use crate::traffic::Table;
 use crate::word::Claimant;
+use crate::work::Work;
 use std::fs::File;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// This process's place in a node's table. A thread that sleeps on mailboxes of its own joins on its own.
 pub struct Participant {
@@ -54,6 +56,7 @@ impl Participant {
             entry.restarts.store(0, Ordering::Relaxed);
             // Who was here before may have died in its sleep.
             entry.polling.store(0, Ordering::Relaxed);
+            entry.mark.clear();
             doorbell::remove_pipe(node, participant);
             entry.joined_ns.store(crate::clock::monotonic_ns(), Ordering::Relaxed);
             step!("join: before incarnation");
@@ -98,6 +101,16 @@ impl Participant {
         self.entry().restarts.store(restarts, Ordering::Relaxed);
     }
 
+    /// Says that this part of the module's own code runs from now on, for everyone to read. One store; by one thread alone.
+    pub fn begin_work(&self, work: Work) {
+        self.entry().mark.begin(work);
+    }
+
+    /// Says that it has come back, and returns how long it took.
+    pub fn end_work(&self) -> Duration {
+        self.entry().mark.end()
+    }
+
     /// Ends this participant's sleep, now or when it next wants to: for signal handlers' threads and the like.
     pub fn ring(&self) {
         doorbell::ring(&self.node, self.me.participant);
@@ -135,6 +148,7 @@ impl Participant {
         doorbell::remove_pipe(&self.node, self.me.participant);
         entry.module.store(0, Ordering::Relaxed);
         entry.state.store(0, Ordering::Relaxed);
+        entry.mark.clear();
         entry.pid.store(0, Ordering::Release);
         // In a directory that was removed and made anew, the file of this name is somebody else's.
         if self.node.check_present(&self.file).is_ok() {

@@ -202,6 +202,10 @@ impl Receiver {
         self.segment.slots().drowsy();
     }
 
+    pub(crate) fn drowsy_above(&self, priority: Priority) {
+        self.segment.slots().drowsy_above(priority);
+    }
+
     pub(crate) fn awake(&self) {
         self.segment.slots().awake();
     }

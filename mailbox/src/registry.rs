@@ -44,7 +44,7 @@ pub enum CreateError {
     #[error(transparent)]
     Node(NodeError),
     /// No memory, most likely.
-    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is it full (df {})?", .node.display())]
+    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is it full (df {})?", crate::files::existing(.node).display())]
     Memory {
         /// Which mailbox.
         name: Name,

@@ -3,6 +3,7 @@
 use crate::clock::monotonic_ns;
 use crate::files::{open_shared, open_to_read};
 use crate::layout::{Identity, Page, SLOT_PREFIX, Shape, VERSION};
+use crate::mapped;
 use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::package::{HEAD_BYTES, Head};
@@ -60,9 +61,11 @@ impl Segment {
         Ok(segment)
     }
 
-    /// Maps the mailbox of this name as it stands.
+    /// The mailbox of this name as it stands, to send there; mapped once, however many of this process send there.
     pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
-        Self::check(&open_shared(&path_of(node, name), false)?, name, Use::Share)
+        let file = open_shared(&path_of(node, name), false)?;
+        let shape = Self::identify(&file, name)?;
+        Ok(Self::new(mapped::mapping(&file, shape.segment_bytes())?, name, shape))
     }
 
     /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.

@@ -183,6 +183,12 @@ impl Sender {
         self.to
     }
 
+    /// From now on packages are for another name, by the same way: for who sends by a router to names that others choose, and must not search
+    /// for each of them. Whether a router leads there is the caller's to know.
+    pub fn readdress(&mut self, to: Name) {
+        self.to = to;
+    }
+
     /// Largest body it takes.
     pub fn body_bytes_max(&self) -> usize {
         usize::from(self.segment.shape.body_bytes_max)

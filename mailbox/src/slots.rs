@@ -24,7 +24,7 @@
 //! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
 //! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G) and (J).
 
-use crate::hot::Hot;
+use crate::hot::{Hot, rings};
 use crate::name::Priority;
 use crate::step::step;
 use crate::sync::{AtomicU64, Ordering, fence, prefetch_to_read, prefetch_to_write, seq_cst_accesses};
@@ -320,7 +320,7 @@ impl<'a> Slots<'a> {
             self.hot.alert.0.swap(1, Ordering::Release);
             step!("publish: alert");
         }
-        let wake = receiver.sleeping.load(Ordering::SeqCst) != 0;
+        let wake = rings(receiver.sleeping.load(Ordering::SeqCst), priority);
         Published::Accepted { posted: Posted { slot, word }, wake }
     }
 

@@ -64,6 +64,10 @@ pub fn schedule(how: Scheduling) -> io::Result<()> {
             check(unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) })
         }
         Scheduling::Normal(nice) => {
+            // It may have inherited real time. To give that up needs no right.
+            let parameters = libc::sched_param { sched_priority: 0 };
+            // SAFETY: reads the parameters, which live here; 0 is the calling thread.
+            check(unsafe { libc::sched_setscheduler(0, libc::SCHED_OTHER, &raw const parameters) })?;
             // SAFETY: takes numbers only; 0 is the calling process.
             check(unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, i32::from(nice)) })
         }

@@ -5,7 +5,7 @@
 //! an *epoch* it only moves forward; a step is a new epoch, which readers can see. Timeouts and leases never use it: they
 //! are measured by the monotonic clock.
 
-use crate::clock::{monotonic_ns, realtime_ns};
+use crate::clock::{monotonic_ns, realtime_ns, slept_ns};
 use crate::files::{allocate, open_shared};
 use crate::memory::{Mapping, Use};
 use crate::node::{Node, NodeError};
@@ -24,6 +24,8 @@ const WRITE_TRIES: usize = 8;
 /// The error bound of who does not know the time: 292 years.
 pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
+/// Two readings of how long a computer has slept are off by less.
+const SLEPT_NS_MIN: u64 = 5_000_000;
 
 /// Where system time comes from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -120,7 +122,10 @@ pub(crate) struct TimePage {
     /// Records written so far; the last is in place `index % 2`. 0: none yet.
     index: AtomicU64,
     writer_pid: AtomicU32,
-    padding: [AtomicU32; 13],
+    padding: AtomicU32,
+    /// For how long the computer had slept when the last record was written, ns.
+    slept_ns: AtomicU64,
+    rest: [AtomicU32; 10],
     records: [SharedRecord; 2],
 }
 const _: () = assert!(size_of::<TimePage>() == 192);
@@ -317,9 +322,14 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
-    /// What the page says; none if nobody wrote it yet.
+    /// What the page says; none if nobody wrote it yet. If the computer has slept since, nobody knows how far off that is: its clocks count how long it
+    /// slept, some of them in seconds.
     pub fn record(&self) -> Option<TimeRecord> {
-        self.mapping.at::<TimePage>(0).read()
+        let page: &TimePage = self.mapping.at(0);
+        let record = page.read()?;
+        let slept_ns = slept_ns().saturating_sub(page.slept_ns.load(Ordering::Relaxed));
+        let is_known = record.source != TimeSource::Master || slept_ns < SLEPT_NS_MIN;
+        Some(if is_known { record } else { TimeRecord { error_ns: ERROR_UNKNOWN_NS, drift_ns_s: 0, ..record } })
     }
 
     /// Makes this the page's record. False, and the page stays as it was, if time would go back within its epoch just now: because the
@@ -332,6 +342,7 @@ impl TimeKeeper {
         let now_ns = monotonic_ns();
         let goes_on = last.is_none_or(|last| last.at(now_ns).ns <= record.at(now_ns).ns);
         if goes_on {
+            page.slept_ns.store(slept_ns(), Ordering::Relaxed);
             page.turn();
         }
         goes_on

@@ -94,7 +94,7 @@ pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, ot
 /// deadline has passed. Others may wait there all the while: for who cannot use them yet. May return early for no reason. Says how long it
 /// slept.
 ///
-/// Each package that comes meanwhile rings, whatever its priority: so this is for who is ready for the next one soon.
+/// What is not above `priority` rings no bell meanwhile: its sender makes no system call, and this thread sleeps on.
 pub fn wait_above(
     receiver: &mut Receiver,
     priority: Priority,
@@ -107,7 +107,7 @@ pub fn wait_above(
     loop {
         // In this order, as in `settled`: whatever is published after the look rings, and so changes what was seen.
         let seen = entry.bell().seen();
-        receiver.drowsy();
+        receiver.drowsy_above(priority);
         receiver.settle();
         if other() || receiver.has_above(priority) || waiting.is_over() {
             break;

@@ -7,7 +7,8 @@ mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, label};
 use rohrpost_mailbox::{
-    Class, Full, Interest, ModuleState, Name, Participant, ROUTES_MAX, Shape, TimeKeeper, TimeSource, Watches, local,
+    Class, Full, Interest, ModuleState, Name, Participant, ROUTES_MAX, Shape, TimeKeeper, TimeSource, Watches, Work,
+    local,
 };
 use std::os::unix::fs::{FileExt, FileTypeExt};
 use std::time::Duration;
@@ -17,7 +18,7 @@ const PAGE: &str = include_str!("../../docs/src/shared-memory.md");
 /// Where the parts of a mailbox and their fields are told.
 const PARTS: &str = "## A mailbox";
 const FIELDS: &str = "### Identity, owner, hot";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// The offset that a section's table gives for a field: the first of the row's cells that begins with its name tells.
 fn at(section: &str, field: &str) -> usize {
@@ -257,6 +258,7 @@ fn the_node_and_its_time_are_as_documented() {
     let me = Participant::join(&node, Name::new(1, 200, 0, 0)).unwrap();
     me.set_state(ModuleState::On);
     me.set_restarts(7);
+    me.begin_work(Work::Function(16));
     let _receiver = me.receiver(MAILBOX, Shape::default()).unwrap();
     me.ring();
     node.announce_death();
@@ -266,6 +268,12 @@ fn the_node_and_its_time_are_as_documented() {
     let entry = [0, 4, 8, 12, 16, 20].map(|at| there.u32(64 + at));
     assert_eq!(entry, [me.incarnation(), std::process::id(), 2, 0x01c8_0000, 3, 7]);
     assert!(there.u64(64 + 24) > 0);
+    let (mark, now_ns) = (there.u64(64 + 40), rohrpost_mailbox::monotonic_ns());
+    assert_eq!((mark >> 56, mark >> 40 & 0xffff), (7, 16));
+    let since_ns = (mark & ((1 << 40) - 1)) << 20;
+    assert!((now_ns.saturating_sub(60_000_000_000)..=now_ns).contains(&since_ns), "{since_ns} of {now_ns}");
+    me.end_work();
+    assert_eq!(file(&ground, "node").u64(64 + 40), 0);
 
     let _keeper = TimeKeeper::begin(&node, TimeSource::Log, 1_000, 2.0).unwrap();
     let there = file(&ground, "time");

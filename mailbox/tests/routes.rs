@@ -67,6 +67,35 @@ fn a_routed_package_comes_to_the_router_as_it_was_sent() {
     assert!(flows.iter().all(|flow| flow.to == FAR) && !flows.is_empty());
 }
 
+/// A module that sends to each mailbox of another node has the router's mailbox in its memory once, and each of its own node's once.
+#[test]
+fn a_mailbox_is_mapped_once_however_many_send_there() {
+    let ground = routed();
+    let mut transit = transit(&ground);
+    let mappings = |name: Name| {
+        let file = format!("{}/{:08x}.mbx", ground.node().path().display(), name.raw());
+        let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
+        maps.lines().filter(|line| line.ends_with(&file)).count()
+    };
+    // The receiver's own.
+    assert_eq!(mappings(TRANSIT), 1);
+    let me = ground.join();
+    let mut senders: Vec<Sender> = (0..200).map(|local| me.sender(FAR.with_local(local)).unwrap()).collect();
+    senders.push(ground.join().sender(FAR).unwrap());
+    assert_eq!(mappings(TRANSIT), 2);
+    for (id, sender) in (0..).zip(&mut senders) {
+        send(sender, id);
+        let received = transit.receive_timeout(PATIENCE).unwrap();
+        assert_eq!((received.head().id, received.head().to), (id, sender.name()));
+    }
+    drop(senders.split_off(1));
+    send(&mut senders[0], 7);
+    assert_eq!(mappings(TRANSIT), 2, "as long as one sends there");
+    drop(senders);
+    assert_eq!(mappings(TRANSIT), 1);
+    send(&mut me.sender(FAR).unwrap(), 8);
+}
+
 #[test]
 fn a_mailbox_of_this_node_goes_before_any_route() {
     let ground = routed();

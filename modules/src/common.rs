@@ -36,7 +36,7 @@ pub const EXCHANGE: u16 = 12;
 pub const FIRST_OWN: u16 = 16;
 
 /// Hash that commands to the common functions carry, which are of no interface: raised whenever one of them changes.
-pub const HASH: u32 = 2;
+pub const HASH: u32 = 3;
 
 /// Bytes of a description that go into one reply, so that it fits every reply mailbox.
 pub const DESCRIPTION_PART: usize = 768;
@@ -70,6 +70,27 @@ pub struct Status {
     pub output_suppressed: u64,
     /// Which output lines it sends; none when the configuration has no class `output`.
     pub output_level: Option<OutputLevel>,
+    /// Packages that it did not take.
+    pub refused: Refused,
+}
+
+/// Packages that a module did not take in this life of it, by cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Refused {
+    /// Commands from classes that `[access]` does not let command it.
+    pub not_allowed: u64,
+    /// Commands and subscriptions for which there was no place: the sender holds its share of them, or all are taken.
+    pub no_place: u64,
+    /// Packages that are no commands where commands are taken, or no data where data are.
+    pub malformed: u64,
+    /// Data of a subscription that there is not.
+    pub unasked: u64,
+    /// Data from another module than the one that is subscribed to.
+    pub other_publisher: u64,
+    /// Data of another number than the one that is subscribed to.
+    pub other_number: u64,
+    /// Data that an earlier life of the module asked for.
+    pub earlier_life: u64,
 }
 
 /// What a module is doing.
@@ -242,7 +263,7 @@ pub struct Change {
 }
 
 /// Before the value in a package of subscribed data, all little-endian:
-/// `system time u64 ns │ sequence u32 │ missed u32 │ value (postcard)`.
+/// `system time u64 ns │ sequence u32 │ missed u32 │ incarnation u32 │ value (postcard)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DataHead {
     /// When the data was true, ns since 1970.
@@ -251,18 +272,22 @@ pub struct DataHead {
     pub sequence: u32,
     /// Periods so far in which nothing could be delivered, and packages that found the mailbox full.
     pub missed: u32,
+    /// Of the subscriber, as the envelope of its request had it: a later life of the subscriber takes no data that an earlier one asked
+    /// for. 0 for data that nobody asked for, such as lines of output.
+    pub incarnation: u32,
 }
 
 impl DataHead {
     /// Bytes of it.
-    pub const BYTES: usize = 16;
+    pub const BYTES: usize = 20;
 
     /// As it stands in a body.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
         let mut bytes = [0; Self::BYTES];
         bytes[..8].copy_from_slice(&self.stamp_ns.to_le_bytes());
         bytes[8..12].copy_from_slice(&self.sequence.to_le_bytes());
-        bytes[12..].copy_from_slice(&self.missed.to_le_bytes());
+        bytes[12..16].copy_from_slice(&self.missed.to_le_bytes());
+        bytes[16..].copy_from_slice(&self.incarnation.to_le_bytes());
         bytes
     }
 
@@ -270,11 +295,13 @@ impl DataHead {
     pub fn split(body: &[u8]) -> Option<(Self, &[u8])> {
         let (stamp, rest) = body.split_first_chunk()?;
         let (sequence, rest) = rest.split_first_chunk()?;
-        let (missed, value) = rest.split_first_chunk()?;
+        let (missed, rest) = rest.split_first_chunk()?;
+        let (incarnation, value) = rest.split_first_chunk()?;
         let head = Self {
             stamp_ns: u64::from_le_bytes(*stamp),
             sequence: u32::from_le_bytes(*sequence),
             missed: u32::from_le_bytes(*missed),
+            incarnation: u32::from_le_bytes(*incarnation),
         };
         Some((head, value))
     }

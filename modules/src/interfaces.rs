@@ -10,8 +10,8 @@ pub use router::{
 };
 
 pub use tcp::{
-    BeyondClient, BeyondClients, BeyondHost, BeyondHosts, BeyondLink, BeyondOutage, BeyondState, BeyondTime,
-    ClassPassed, Tcp, TcpInterface, TcpProxy,
+    BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondOutage, BeyondState,
+    BeyondTime, ClassPassed, Tcp, TcpInterface, TcpProxy,
 };
 
 use crate::interface;
@@ -141,8 +141,25 @@ pub struct Page {
     pub first: u64,
     /// Number of the next line that will be collected.
     pub next: u64,
-    /// As many lines as fit in a reply.
+    /// As many lines as fit in a reply, and follow each other: one that is no longer kept ends the page.
     pub lines: Vec<OutputLine>,
+}
+
+/// Lines that the collector did not take, or not as they were, by cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct RefusedLines {
+    /// From another system, or in the name of one of its modules.
+    pub other_system: u64,
+    /// In another name than the sender's. (Launch may pass on what modules of its node print.)
+    pub foreign_name: u64,
+    /// More than the sender's share.
+    pub beyond_share: u64,
+    /// No lines at all.
+    pub unreadable: u64,
+    /// Taken, but for their time, which lay in the future.
+    pub ahead: u64,
+    /// Taken, but for the number of lines that they said were lost or suppressed.
+    pub losses: u64,
 }
 
 /// Collects what all modules say.
@@ -151,6 +168,10 @@ pub trait Collector {
     /// The lines that are kept, from this number on, as many as fit.
     #[command(16, idempotent)]
     fn lines_from(&mut self, number: u64) -> Page;
+
+    /// How many lines were not taken, and why.
+    #[command(17, idempotent)]
+    fn refused(&mut self) -> RefusedLines;
 
     /// Each line as it comes in.
     #[data(1)]

@@ -25,6 +25,7 @@ pub mod macro_support;
 mod module;
 pub mod output;
 pub mod parameter;
+mod places;
 mod publish;
 #[cfg(feature = "builtin")]
 pub mod robot;

@@ -1,10 +1,16 @@
 //! The publishing side of continuous data: who wants what, how often, and until when. Knows no clock and no mailbox.
 
 use crate::common::Subscribe;
+use crate::places::Places;
+use rohrpost_config::Principal;
 use rohrpost_mailbox::{Name, Priority};
 
-/// Subscriptions of one module at a time.
-pub(crate) const SUBSCRIPTIONS_MAX: usize = 64;
+/// Subscriptions to one module's data at a time, besides those of principals that always find a place.
+const SUBSCRIPTIONS_MAX: usize = 64;
+/// Each of those always finds so many.
+const OWN_SUBSCRIPTIONS: usize = 8;
+/// Whoever wants data for longer has to say so again, however long a lease it asked for, ms.
+const LEASE_MAX_MS: u32 = 60_000;
 /// A subscriber that wants data more often gets it so often: the period is its word, the work is ours.
 const PERIOD_MIN_US: u32 = 100;
 
@@ -23,6 +29,12 @@ pub(crate) struct Newest {
 /// Of a request that subscribes.
 #[derive(Clone, Copy)]
 pub(crate) struct Asked {
+    /// Reply mailbox of the subscriber.
+    pub(crate) by: Name,
+    /// Whose share of places it uses.
+    pub(crate) principal: Principal,
+    /// The subscriber's incarnation, from the call's envelope.
+    pub(crate) incarnation: u32,
     /// Mailbox that the data go to.
     pub(crate) to: Name,
     /// Its priority; the data carry the same.
@@ -35,12 +47,8 @@ pub(crate) struct Asked {
 pub(crate) struct Subscription {
     pub(crate) face: usize,
     pub(crate) wish: Subscribe,
-    /// Mailbox that it goes to.
-    pub(crate) to: Name,
-    /// Of the request that asked for it; the data carry the same.
-    pub(crate) priority: Priority,
-    /// Whether only the newest counts to who asked.
-    pub(crate) newest: bool,
+    /// The request that began or last renewed it; the data carry its priority and incarnation.
+    pub(crate) asked: Asked,
     pub(crate) sequence: u32,
     pub(crate) missed: u32,
     ends_ns: u64,
@@ -65,39 +73,46 @@ pub(crate) enum Delivery {
 }
 
 /// All subscriptions to a module's data.
-#[derive(Default)]
 pub(crate) struct Subscriptions {
     list: Vec<Subscription>,
+    places: Places,
     /// Misses of subscriptions that have ended.
     missed_before: u64,
 }
 
 impl Subscriptions {
-    /// Begins or renews; false when there is no room. Times are monotonic.
+    /// None yet. These principals always find [`OWN_SUBSCRIPTIONS`] places.
+    pub(crate) fn new(named: &[Principal]) -> Self {
+        let places = Places::new(named, OWN_SUBSCRIPTIONS, SUBSCRIPTIONS_MAX);
+        Self { list: Vec::new(), places, missed_before: 0 }
+    }
+
+    /// Begins or renews; false when there is no place. Times are monotonic.
     pub(crate) fn subscribe(&mut self, face: usize, asked: Asked, mut wish: Subscribe, now_ns: u64) -> bool {
-        let Asked { to, priority, newest } = asked;
         wish.period_us = if wish.period_us == 0 { 0 } else { wish.period_us.max(PERIOD_MIN_US) };
-        let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms) * 1_000_000);
+        let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms.min(LEASE_MAX_MS)) * 1_000_000);
         let due_ns = if wish.period_us == 0 { 0 } else { now_ns };
-        if let Some(known) = self.list.iter_mut().find(|s| s.to == to && s.wish.id == wish.id) {
+        // A new life of the subscriber: nobody takes what its earlier life asked for.
+        self.retain(|s| s.asked.by != asked.by || s.asked.incarnation == asked.incarnation);
+        if let Some(known) = self.list.iter_mut().find(|s| s.asked.to == asked.to && s.wish.id == wish.id) {
             known.ends_ns = ends_ns;
             let changed = (known.wish.number, known.wish.period_us, known.face) != (wish.number, wish.period_us, face);
             if changed {
                 // What was fresh was another's.
                 (known.due_ns, known.fresh, known.told) = (due_ns, false, false);
             }
-            (known.face, known.wish, known.priority, known.newest) = (face, wish, priority, newest);
+            (known.face, known.wish, known.asked) = (face, wish, asked);
             return true;
         }
-        if self.list.len() >= SUBSCRIPTIONS_MAX {
+        // One whose lease is over holds no place, whether or not it was dropped by now.
+        let held = self.list.iter().filter(|s| s.ends_ns > now_ns).map(|s| s.asked.principal);
+        if !self.places.allows(asked.principal, held) {
             return false;
         }
         self.list.push(Subscription {
             face,
             wish,
-            to,
-            priority,
-            newest,
+            asked,
             sequence: 0,
             missed: 0,
             ends_ns,
@@ -110,7 +125,7 @@ impl Subscriptions {
 
     /// Ends one.
     pub(crate) fn unsubscribe(&mut self, to: Name, id: u16) {
-        self.retain(|subscription| subscription.to != to || subscription.wish.id != id);
+        self.retain(|subscription| subscription.asked.to != to || subscription.wish.id != id);
     }
 
     fn retain(&mut self, keep: impl Fn(&Subscription) -> bool) {
@@ -206,11 +221,19 @@ mod tests {
     }
 
     fn asked(local: u8) -> Asked {
-        Asked { to: Name::new(1, 9, 0, local), priority: Priority(9), newest: false }
+        let name = |local| Name::new(1, 9, 0, local);
+        Asked {
+            by: name(1),
+            principal: Principal::Unknown,
+            incarnation: 5,
+            to: name(local),
+            priority: Priority(9),
+            newest: false,
+        }
     }
 
     fn subscribed(period_ms: u32) -> Subscriptions {
-        let mut all = Subscriptions::default();
+        let mut all = Subscriptions::new(&[]);
         assert!(all.subscribe(0, asked(2), wish(period_ms), 1));
         all
     }
@@ -276,18 +299,61 @@ mod tests {
     }
 
     #[test]
+    fn a_lease_is_a_minute_at_most_whatever_its_subscriber_says() {
+        let mut all = Subscriptions::new(&[]);
+        assert!(all.subscribe(0, asked(2), Subscribe { lease_ms: u32::MAX, ..wish(0) }, 1));
+        let minute_ns = 60_000 * MS;
+        tick(&mut all, minute_ns);
+        assert_eq!(all.len(), 1);
+        tick(&mut all, minute_ns + 1);
+        assert_eq!(all.len(), 0);
+    }
+
+    #[test]
+    fn who_takes_all_places_it_can_leaves_some_and_who_is_named_always_finds_its_own() {
+        let named = Principal::Module(Name::new(1, 140, 0, 0));
+        let mut all = Subscriptions::new(&[named]);
+        let take = |all: &mut Subscriptions, principal: Principal, class: u8| {
+            let places = |id: &u16| {
+                let asked =
+                    Asked { principal, by: Name::new(1, class, 0, 1), to: Name::new(1, class, 0, 2), ..asked(2) };
+                all.subscribe(0, asked, Subscribe { id: *id, lease_ms: u32::MAX, ..wish(0) }, 1)
+            };
+            (0..200).filter(places).count()
+        };
+        let taken: Vec<usize> = (2..9).map(|n| take(&mut all, Principal::System(n), n)).collect();
+        assert_eq!(taken, [32, 16, 8, 4, 2, 1, 1]);
+        assert_eq!(take(&mut all, Principal::System(9), 9), 0, "all that are for all are taken");
+        assert_eq!(take(&mut all, named, 140), OWN_SUBSCRIPTIONS);
+        // Over, and not dropped yet.
+        let again = Asked { principal: Principal::System(9), ..asked(2) };
+        assert!(all.subscribe(0, again, wish(0), 60_000 * MS + 1));
+    }
+
+    #[test]
+    fn a_subscriber_that_was_started_again_has_none_of_its_earlier_subscriptions() {
+        let mut all = subscribed(0);
+        assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
+        publish(&mut all, || Delivery::Full);
+        let later = Asked { incarnation: 6, ..asked(2) };
+        assert!(all.subscribe(0, later, Subscribe { number: 2, ..wish(0) }, 2));
+        let left: Vec<_> = all.list.iter().map(|s| (s.wish.number, s.asked.incarnation, s.sequence)).collect();
+        assert_eq!((left, all.missed()), (vec![(2, 6, 0)], 2), "and its numbers begin at 0");
+    }
+
+    #[test]
     fn mailboxes_of_one_subscriber_have_ids_of_their_own() {
         let mut all = subscribed(0);
         let own = Name::new(1, 9, 0, 3);
         assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
         assert_eq!((all.len(), publish(&mut all, || Delivery::Sent)), (2, 2));
         all.unsubscribe(own, 7);
-        assert_eq!((all.len(), all.list[0].to.local()), (1, 2));
+        assert_eq!((all.len(), all.list[0].asked.to.local()), (1, 2));
     }
 
     #[test]
     fn no_period_is_too_short_to_live_with() {
-        let mut all = Subscriptions::default();
+        let mut all = Subscriptions::new(&[]);
         let hasty = Subscribe { period_us: 1, lease_ms: u32::MAX, ..wish(0) };
         assert!(all.subscribe(0, asked(2), hasty, 1));
         let mut now_ns = 1;

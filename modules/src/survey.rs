@@ -12,12 +12,16 @@
 
 mod distant;
 mod form;
+mod standing;
 mod usage;
 
 pub use distant::{Distant, LookFailure, look_at_all};
 pub use form::Seen;
+pub(crate) use standing::in_words;
+pub use standing::{Standing, Working};
 pub use usage::Usage;
 
+use crate::launch::{ChildState, known_children};
 use postcard_schema::Schema;
 use rohrpost_config::{Installation, ROUTER, TCP};
 use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
@@ -74,6 +78,12 @@ pub struct ModuleSurvey {
     pub usage: Option<Usage>,
     /// How it really is scheduled; likewise.
     pub scheduling: Option<Scheduling>,
+    /// Which part of its own code runs, if that has not come back for long.
+    pub working: Option<Working>,
+    /// What its launch knows of it; none if no launch says anything.
+    pub child: Option<ChildState>,
+    /// Why it is in error, if launch does not know it and it was asked itself.
+    pub error: Option<String>,
     /// Packages that its mailboxes received so far.
     pub received: u64,
     /// Bytes of their bodies.
@@ -102,10 +112,14 @@ impl Survey {
         let participants = node.participants();
         let flows = node.traffic();
         let at_ns = monotonic_ns();
-        let survey = |name, faces| ModuleSurvey {
-            node: node_name.into(),
-            at_ns: Some(at_ns),
-            ..survey(name, faces, &participants, &mailboxes, &flows)
+        let survey = |name, faces| {
+            let mut module = ModuleSurvey {
+                node: node_name.into(),
+                at_ns: Some(at_ns),
+                ..survey(name, faces, &participants, &mailboxes, &flows)
+            };
+            module.working = Working::of(&module, node, installation, at_ns);
+            module
         };
         let mut modules: Vec<ModuleSurvey> =
             installation.modules_on(node_name).map(|module| survey(module.name, module.faces.clone())).collect();
@@ -114,6 +128,7 @@ impl Survey {
                 modules.push(survey(participant.module, Vec::new()));
             }
         }
+        add_children(&mut modules, installation, known_children(node));
         let classes = sum_of_ends(installation, &mailboxes);
         Ok(Self { node: node_name.into(), at_ns, modules, mailboxes, classes, flows })
     }
@@ -202,6 +217,16 @@ impl Survey {
     }
 }
 
+/// Adds what launch knows of its modules.
+fn add_children(modules: &mut [ModuleSurvey], installation: &Installation, children: Vec<ChildState>) {
+    for child in children {
+        let is_it = |module: &&mut ModuleSurvey| installation.classes.format(module.name) == child.module;
+        if let Some(module) = modules.iter_mut().find(is_it) {
+            module.child = Some(child);
+        }
+    }
+}
+
 fn survey(
     name: Name,
     faces: Vec<Name>,
@@ -226,6 +251,9 @@ fn survey(
         process,
         usage: None,
         scheduling: None,
+        working: None,
+        child: None,
+        error: None,
         received: saturating_sum(classes().map(|class| class.received)),
         bytes_in: saturating_sum(classes().map(|class| class.body_bytes)),
         lost: saturating_sum(classes().map(ClassTraffic::lost_in_all)),

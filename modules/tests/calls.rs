@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+use rohrpost_config::Principal;
 use rohrpost_mailbox::{Head, Label, Name, Node, Options, Participant, Receiver, SendError, Sender, Shape, Type};
 use rohrpost_modules::call::{
     CallEnvelope, CallError, Fault, Link, Once, Pending, REPLIES_KEPT, ReplyEnvelope, Request, Verdict,
@@ -253,7 +254,7 @@ fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
     let mut ground = ground();
     let name = Name::new(1, 90, 2, 0);
     let [first, second] = [(); 2].map(|()| Participant::join(&ground.node, Name::NONE).unwrap());
-    let mut once = Once::new(0);
+    let mut once = Once::new(0, &[]);
     for participant in [&second, &first, &second] {
         let replies = participant.receiver(name.with_local(1), Shape::default()).unwrap();
         let mut link = Link::new(participant, name, replies);
@@ -262,6 +263,7 @@ fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
         let (envelope, _) = CallEnvelope::split(package.body()).unwrap();
         let request = Request {
             from: package.head().from,
+            principal: Principal::Unknown,
             incarnation: envelope.incarnation,
             sequence: envelope.sequence,
             valid_for_ns: u64::from(envelope.valid_for_us) * 1000,

@@ -101,7 +101,7 @@ fn a_line_of_output_has_the_documented_bytes() {
         suppressed: 0,
         text: "is on".into(),
     };
-    let data = DataHead { stamp_ns: line.time_ns, sequence: 2, missed: line.lost };
+    let data = DataHead { stamp_ns: line.time_ns, sequence: 2, missed: line.lost, incarnation: 0 };
     let (kind, priority, options) = (Type::data(1), Priority(32), Options::STAMPED);
     let head = Head { to: Name::new(1, 32, 0, LINES), from: MOTOR, kind, priority, options, ..Head::default() };
     check("line", head, &data.to_bytes(), &postcard::to_stdvec(&line).unwrap());
@@ -133,6 +133,7 @@ fn faults_have_the_documented_numbers() {
         Fault::RouterFull,
         Fault::Delayed,
         Fault::NotAllowed { node: text(), rule: text() },
+        Fault::EarlierIncarnation,
     ];
     assert_eq!(rows, faults.len());
     for (number, fault) in faults.iter().enumerate() {

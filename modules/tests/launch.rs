@@ -235,7 +235,7 @@ fn one_that_hangs_keeps_nobody_from_being_watched_and_is_killed_at_the_end() {
 
 #[test]
 fn what_does_not_start_is_told_and_leaves_nothing_running() {
-    let never = "restart = { policy = \"never\" }";
+    let never = "restart = { policy = \"never\" }\nrequired = true";
     for (manner, why) in [("refuses", "no wheels"), ("never-ready", "killed by signal 9")] {
         let mut ground = ground(manner, &["well", manner], never);
         let error = ground.begin().err().unwrap().to_string();
@@ -299,7 +299,7 @@ fn one_that_is_stopped_before_its_turn_does_not_keep_the_start() {
 fn a_program_that_cannot_be_run_ends_the_start_as_its_policy_has_it() {
     let again = "restart = { policy = \"on-failure\", at-most = 2, within = \"1 min\", backoff = \"1 ms\" }";
     for (policy, tries) in [("restart = \"never\"", 1), (again, 3)] {
-        let mut ground = ground("cannot", &["well", "cannot-run"], policy);
+        let mut ground = ground("cannot", &["well", "cannot-run"], &format!("{policy}\nrequired = true"));
         end_in_the_end(&ground);
         let error = ground.begin().err().unwrap().to_string();
         assert!(error.contains("second.0 did not become ready: could not be started: "), "{error}");

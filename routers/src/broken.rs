@@ -22,6 +22,18 @@ macro_rules! broken {
 }
 
 pub(crate) use broken;
+
+/// Runs something as a router does that lets its programs hurry as they like, if it `does_harm` and mistakes can be switched on.
+#[cfg(any(test, feature = "broken-variants"))]
+pub(crate) fn harmful<R>(does_harm: bool, run: impl FnOnce() -> R) -> R {
+    if does_harm { with(Broken::Hurries, run) } else { run() }
+}
+
+/// See there.
+#[cfg(not(any(test, feature = "broken-variants")))]
+pub(crate) fn harmful<R>(_: bool, run: impl FnOnce() -> R) -> R {
+    run()
+}
 #[cfg(any(test, feature = "broken-variants"))]
 pub(crate) use variants::is;
 
@@ -55,7 +67,9 @@ mod variants {
         Unpaced,
         /// Outbound: what is more important than what left last waits for the pace as well.
         NeverInAdvance,
-        /// Outbound: a command may hurry more than its sender.
+        /// Outbound: while the way to one peer has no room, nothing goes to the others.
+        WaitsForOne,
+        /// Outbound: a package may hurry more than its sender, or than who asked for it.
         Hurries,
         /// Outbound: what waited too long leaves nevertheless.
         SendsStale,
@@ -65,6 +79,8 @@ mod variants {
         OverrunsSlot,
         /// Outbound: in a slot a datagram has company that is less important than what waits for others.
         AnyCompany,
+        /// Outbound: in a slot a datagram has company that is less important than what waits in the mailbox.
+        ForgetsMailbox,
         /// Link: nobody is ever silent.
         NeverSilent,
         /// Link: nobody is ever unheard.
@@ -77,12 +93,26 @@ mod variants {
         TakesLate,
         /// Inbound: a flow that has no place in the table is not ordered.
         ForgetsFloor,
+        /// Inbound: a package that came in parts is judged by what is known of its flow when the last part has come.
+        ForgetsBegun,
+        /// Inbound: a new life of a peer is believed at its first datagram.
+        BelievesLives,
+        /// Inbound: so is a sequence that is far ahead.
+        BelievesJumps,
         /// Inbound: datagrams of lives that are over are taken.
         TakesOldLives,
         /// Inbound: other configurations are not refused.
         TakesOtherDigests,
         /// Inbound: what waited in the socket for too long is delivered.
         TakesStale,
+        /// Admission: what comes keeps the priority that its sender wrote.
+        AdmitsHurry,
+        /// Admission: whoever sends may take any name.
+        AdmitsForeignNames,
+        /// Admission: what is for a router's own mailboxes gets there.
+        AdmitsRoutersOwn,
+        /// Admission: any body is an IP packet of the node that it comes from.
+        AdmitsPackets,
         /// Fragment: parts of different packages of one flow are put together.
         MixesPackages,
         /// Fragment: a part that comes twice is counted twice.
@@ -93,10 +123,22 @@ mod variants {
         Unbounded,
         /// Session: what came of a frame before it was split is forgotten.
         ForgetsPieces,
-        /// Session: what two clients host is registered for both.
+        /// Session: what another client hosts is given away.
         TakesTwice,
-        /// Session: a name is looked up in any range that it lies in.
-        TakesAnyRange,
+        /// Session: a narrower range inside another client's is given away.
+        TakesInside,
+        /// Session: what the file gives the nodes of the own system is given to whoever asks.
+        GivesAwayOwn,
+        /// Session: to register goes through the ranges of all clients.
+        GoesThroughAll,
+        /// Session: a principal may have as many ranges as there is room for.
+        FillsTable,
+        /// Session: of too many connections those of whoever has most do not give way.
+        CrowdsOut,
+        /// Session: what one principal has waiting gives way to what is more important of another.
+        SharesQueue,
+        /// Session: what is most important goes first however much of it one principal sends.
+        IgnoresShares,
         /// Session: what was made ready for a connection that broke goes by the next one.
         SendsCutAgain,
         /// Session: what was under way too long is delivered.
@@ -145,6 +187,8 @@ mod variants {
         OpensTwice,
         /// Security: whoever says hello is held to live.
         BeginsUnproven,
+        /// Security: what cannot be opened is believed to come from a peer that is heard.
+        BelievesUnopened,
         /// Time slots: a wake-up that comes too late is none too late.
         NoLateGate,
         /// Time slots: a node sends however far off its clock may be.
@@ -183,6 +227,16 @@ mod variants {
         AsksWithoutPause,
         /// Time: a master does not care who is too far off to follow it.
         NeverBeginsEpoch,
+        /// Time by the TCP router: of what cannot all be true that counts which is said to be off least.
+        TakesSmallest,
+        /// Time: that the computer slept goes unnoticed.
+        SleepsUnnoticed,
+        /// Time: that somebody slews the clock goes unnoticed.
+        SlewsUnnoticed,
+        /// Time slots: what comes of nodes that go by another configuration says nothing.
+        DeafToOtherTables,
+        /// Time slots: whoever has the lesser claim goes on.
+        NeverYieldsToOthers,
     }
 
     impl Broken {
@@ -213,11 +267,27 @@ mod variants {
             Self::Unbounded,
         ];
 
+        /// All mistakes of admission.
+        pub const ADMISSION: [Self; 4] =
+            [Self::AdmitsHurry, Self::AdmitsForeignNames, Self::AdmitsRoutersOwn, Self::AdmitsPackets];
+
+        /// Those that show where many flows are under way and nothing is reordered.
+        pub const CROWDED: [Self; 1] = [Self::ForgetsBegun];
+
+        /// Those that show where somebody sends what a router could have sent.
+        pub const FORGED: [Self; 2] = [Self::BelievesLives, Self::BelievesJumps];
+
         /// All mistakes of sessions.
-        pub const SESSION: [Self; 25] = [
+        pub const SESSION: [Self; 31] = [
             Self::ForgetsPieces,
             Self::TakesTwice,
-            Self::TakesAnyRange,
+            Self::TakesInside,
+            Self::GivesAwayOwn,
+            Self::GoesThroughAll,
+            Self::FillsTable,
+            Self::CrowdsOut,
+            Self::SharesQueue,
+            Self::IgnoresShares,
             Self::SendsCutAgain,
             Self::DeliversOld,
             Self::TrustsTheWay,
@@ -243,7 +313,8 @@ mod variants {
         ];
 
         /// All mistakes of what leaves in a slot. Where packages leave as they come they do not show.
-        pub const IN_SLOT: [Self; 3] = [Self::OvertakesInSlot, Self::OverrunsSlot, Self::AnyCompany];
+        pub const IN_SLOT: [Self; 4] =
+            [Self::OvertakesInSlot, Self::OverrunsSlot, Self::AnyCompany, Self::ForgetsMailbox];
 
         /// All mistakes of time slots.
         pub const SLOTS: [Self; 9] = [
@@ -268,6 +339,14 @@ mod variants {
             Self::TellsUnproven,
             Self::AsksWithoutPause,
         ];
+    }
+
+    impl Broken {
+        /// All mistakes of a clock that is not steady.
+        pub const UNSTEADY: [Self; 2] = [Self::SleepsUnnoticed, Self::SlewsUnnoticed];
+
+        /// All mistakes of time slots beside other tables.
+        pub const TABLES: [Self; 2] = [Self::DeafToOtherTables, Self::NeverYieldsToOthers];
     }
 
     /// Runs something on this thread with a mistake.

@@ -1,6 +1,6 @@
 //! What the tests of the cores have in common: settings from plain values, a log of all that is told, and a router without sockets.
 
-use crate::access::Access;
+use crate::admission::Admission;
 use crate::broken::{Broken, with};
 use crate::flows::Flow;
 use crate::frame::NodeIndex;
@@ -53,8 +53,10 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
         tdma: None,
         routes: (1..=255).flat_map(|class| others().map(move |node| route(class, node))).collect(),
         senders: vec![vec![module(200, own)], vec![module(100, own)]],
-        access: Access::default(),
+        hosts: Vec::new(),
+        admission: Admission::default(),
         flows: Vec::new(),
+        real_time_from: 0,
     }
 }
 
@@ -234,7 +236,8 @@ impl End {
 fn every_mistake_is_noticed() {
     let checks = || [crate::queue::CHECKS, crate::outbound::CHECKS, crate::inbound::CHECKS, crate::fragment::CHECKS];
     let mut missed = Vec::new();
-    for broken in Broken::ALL.into_iter().chain(Broken::IN_SLOT) {
+    let all = Broken::ALL.into_iter().chain(Broken::ADMISSION).chain(Broken::IN_SLOT);
+    for broken in all.chain(Broken::CROWDED).chain(Broken::FORGED) {
         let notices = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
         if !checks().into_iter().flatten().any(notices) {
             missed.push(broken);

@@ -1,9 +1,9 @@
 //! What a router with time slots takes from its mailbox, and when.
 //!
 //! ```text
-//!  between slots                             shortly before the call              in the slot, a few before each datagram
-//!  all stays in the mailbox; if that has     as much as the slot has room for,    what still has room, or is more important
-//!  more than half of its slots full: ─▶      the most important first: ─▶         than what was taken, or too much: ─▶   queue
+//!  between slots                             shortly before the call              in the slot, before each datagram
+//!  all stays in the mailbox; if that has     as much as the slot has room for,    a few that are to leave next; others while
+//!  more than half of its slots full: ─▶      the most important first: ─▶         the wire is busy: for what has room: ─▶   queue
 //! ```
 //!
 //! The mailbox outlives a router that is killed, the queue does not: so what waits for a slot waits in the mailbox. A flood is taken out of it,
@@ -11,19 +11,28 @@
 //!
 //! No mailbox and no clock here: the thread of the time slots has them (`shell::slots`), and the simulation.
 
+use crate::admission::capped;
 use crate::outbound::Accepted;
-use rohrpost_mailbox::{HEAD_BYTES, Head, Kind, Priority};
+use rohrpost_config::wire::HAND_OVER;
+use rohrpost_mailbox::{HEAD_BYTES, Head, Priority};
 
 /// If no slot came for so long, what waits is taken: whether its peer is there, and whether it is too old, is found in the queue. A third of
 /// the time after which packages are dropped.
 pub(crate) const UNTAKEN_NS_MAX: u64 = crate::outbound::WAIT_MAX_NS / 3;
 /// Packages taken at a time: all that the mailbox may hold.
 const BURST: usize = 64;
-/// Before each datagram of a slot at most so many, since it is to be handed over at once: the rest has its turn before the next. Bounds
-/// count on one only, for they give each package a datagram of its own.
+/// Before a datagram at most so many of its level are taken, and of those that hurry more than they may, since it is to be handed over at once:
+/// the rest has its turn before the next.
 pub(crate) const FEW: usize = 4;
 /// Nothing more is taken between slots with less than this until the thread has to wake up: to take one lasts for some ten microseconds.
 pub(crate) const LEFT_NS_MIN: u64 = 50_000;
+/// To take a package lasts about so long, ns.
+pub(crate) const TAKING_NS: u64 = 10_000;
+/// A datagram is made so long before it is handed over, at most, unless the thread stands still, ns.
+pub(crate) const MAKING_NS: u64 = 10_000;
+/// In the last moments before the call nothing is begun that might last until then, ns.
+pub(crate) const QUIET_NS: u64 = 20_000;
+const _: () = assert!(TAKING_NS + MAKING_NS <= HAND_OVER.as_nanos() as u64, "bounds have room for both");
 
 /// A router's mailbox, and the queue behind it.
 pub trait Transit {
@@ -31,8 +40,12 @@ pub trait Transit {
     fn waits(&mut self) -> (usize, Option<Priority>);
     /// How many it holds.
     fn slots(&self) -> usize;
-    /// Whether something waits in the queue.
-    fn has_queued(&self) -> bool;
+    /// The first level on which something waits in the queue.
+    fn queued(&self) -> Option<u8>;
+    /// The level on which such packages wait there.
+    fn level(&self, priority: Priority) -> u8;
+    /// For so long the wire is still busy with what the slot has carried, ns.
+    fn busy_ns(&self) -> u64;
     /// Takes the most important package into the queue: its head, and what became of it. None if there is none.
     fn take(&mut self) -> Option<(Head, Accepted)>;
 }
@@ -66,15 +79,26 @@ impl Intake {
 
     /// Before the call: takes the next package, if the slot wants it; whether it took one.
     pub fn take_one(&mut self, transit: &mut impl Transit) -> bool {
-        (self.room_bytes > 0 || self.is_outranked(transit)) && self.take(transit)
+        (self.room_bytes > 0 || self.is_outranked(transit)) && self.take(transit).is_some()
     }
 
-    /// In the slot, before each datagram: takes a few, and more only while there is nothing to send.
+    /// In the slot, before each datagram: takes what is to leave next and a few that may go with it; what is less important only while the wire
+    /// is busy. Bounds give each package of its level time to be taken and handed over, but none for those below.
     pub fn take_on(&mut self, transit: &mut impl Transit) {
-        for taken in 0..BURST {
-            let has_enough = taken >= FEW && transit.has_queued();
-            let wants = self.room_bytes > 0 || self.is_outranked(transit) || is_full(transit);
-            if has_enough || !wants || !self.take(transit) {
+        let (mut hurried, mut beside) = (0, 0);
+        for _ in 0..BURST {
+            let queued = transit.queued();
+            if !self.is_next(transit, queued, beside < FEW) || queued.is_some() && hurried >= FEW {
+                break;
+            }
+            let Some(head) = self.take(transit) else { break };
+            hurried += usize::from(hurries(&head));
+            beside += usize::from(transit.queued() == Some(transit.level(head.priority)));
+        }
+        for _ in 0..BURST {
+            let has_time = transit.busy_ns() > TAKING_NS + MAKING_NS;
+            let wants = has_time && (self.room_bytes > 0 || self.is_outranked(transit) || is_full(transit));
+            if !wants || self.take(transit).is_none() {
                 return;
             }
         }
@@ -85,9 +109,20 @@ impl Intake {
         if is_full(transit) || now_ns.saturating_sub(self.taken_ns) > UNTAKEN_NS_MAX {
             self.taken_ns = now_ns;
             let mut taken = 0;
-            while taken < BURST && left_ns() > LEFT_NS_MIN && self.take(transit) {
+            while taken < BURST && left_ns() > LEFT_NS_MIN && self.take(transit).is_some() {
                 taken += 1;
             }
+        }
+    }
+
+    /// Whether what waits first leaves before all that is queued, or, where there may be more of that, as company of what does.
+    fn is_next(&self, transit: &mut impl Transit, queued: Option<u8>, more: bool) -> bool {
+        let (_, first) = transit.waits();
+        let wants = self.room_bytes > 0 || self.is_outranked(transit) || is_full(transit);
+        match (first.map(|first| transit.level(first)), queued) {
+            (Some(first), Some(queued)) => first < queued || first == queued && more && wants,
+            (Some(_), None) => wants,
+            (None, _) => false,
         }
     }
 
@@ -96,15 +131,15 @@ impl Intake {
         transit.waits().1.is_some_and(|first| first.outranks(self.least))
     }
 
-    /// Takes the most important package; whether there was one.
-    fn take(&mut self, transit: &mut impl Transit) -> bool {
-        let Some((head, accepted)) = transit.take() else { return false };
+    /// Takes the most important package, if there is one.
+    fn take(&mut self, transit: &mut impl Transit) -> Option<Head> {
+        let (head, accepted) = transit.take()?;
         // What is lost takes no room; and who hurries more than it may stands further behind in the queue.
         if accepted == Accepted::Waits && !hurries(&head) {
             self.room_bytes = self.room_bytes.saturating_sub(HEAD_BYTES + usize::from(head.len));
             self.least = self.least.at_most(head.priority);
         }
-        true
+        Some(head)
     }
 }
 
@@ -113,7 +148,7 @@ fn is_full(transit: &mut impl Transit) -> bool {
     2 * transit.waits().0 > transit.slots()
 }
 
-/// Whether a package stands further ahead in the mailbox than its sender may have it in the queue, see [`Outbound::accept`](crate::outbound::Outbound::accept).
-fn hurries(head: &Head) -> bool {
-    matches!(head.kind.kind(), Kind::Command(_)) && head.priority.outranks(head.from.class().priority())
+/// Whether a package stands further ahead in the mailbox than it may in the queue, see [`Outbound::accept`](crate::outbound::Outbound::accept).
+pub(crate) fn hurries(head: &Head) -> bool {
+    head.priority.outranks(capped(head).priority)
 }

@@ -13,7 +13,7 @@
 
 #![forbid(unsafe_code)]
 
-pub mod access;
+pub mod admission;
 pub mod broken;
 pub mod flows;
 pub mod fragment;

@@ -50,6 +50,15 @@ pub struct Link {
     pub since_ns: Count,
     /// Datagrams of ours that it misses, as it says.
     pub missed_by_it: Count,
+    /// When it refused us last since its configuration is another, ns; 0: never. And its digest.
+    pub refuses_us_ns: Count,
+    /// See `refuses_us_ns`.
+    pub refuses_us_digest: Count,
+    /// When it has shown last, by what was sealed, that it lives and has said what time it is by another configuration, ns; 0: never. And its
+    /// digest.
+    pub tells_other_ns: Count,
+    /// See `tells_other_ns`.
+    pub tells_other_digest: Count,
     /// When one of us refused the other last, ns; 0: never.
     refused_ns: Count,
     /// What differs: version, reason, whether a digest is known; and that.
@@ -106,6 +115,18 @@ impl Link {
         self.refused_ns.set(now_ns.max(1));
     }
 
+    /// It goes by another configuration, and says that it takes nothing from us.
+    pub(crate) fn refuses_us(&self, now_ns: u64, digest: u64) {
+        self.refuses_us_digest.set(digest);
+        self.refuses_us_ns.set(now_ns.max(1));
+    }
+
+    /// It lives, goes by another configuration, and says what time it is.
+    pub(crate) fn tells_other(&self, now_ns: u64, digest: u64) {
+        self.tells_other_digest.set(digest);
+        self.tells_other_ns.set(now_ns.max(1));
+    }
+
     /// What comes from it now is of our version and digest.
     pub(crate) fn accept(&self) {
         if self.refused_ns.get() != 0 {
@@ -119,6 +140,7 @@ impl Link {
             1 => Reason::Version,
             2 => Reason::Digest,
             4 => Reason::Sealed,
+            5 => Reason::Key,
             _ => Reason::Stranger,
         };
         let digest = (why >> 16 & 1 == 1).then(|| self.refused_digest.get());

@@ -40,9 +40,6 @@ pub enum NotDelivered {
     /// Its slots are smaller.
     #[error("larger than the mailbox's slots")]
     TooLarge,
-    /// Who sent it may not command it.
-    #[error("its class takes no commands of this class")]
-    NotAllowed,
 }
 
 impl From<SendError> for NotDelivered {

@@ -2,7 +2,7 @@
 //!
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
-use crate::access::Access;
+use crate::admission::{Admission, Way, capped};
 use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
 use crate::stats::Cause;
@@ -52,10 +52,15 @@ pub struct Settings {
     pub routes: Vec<Route>,
     /// The modules of this node: the names of a group have a quota together, and so have all other names.
     pub senders: Vec<Vec<Name>>,
-    /// Which classes may command which on this node.
-    pub access: Access,
+    /// The names of this node, with all their mailboxes, as ranges that do not overlap: what others send to no other name is delivered.
+    pub hosts: Vec<(Name, Name)>,
+    /// What is admitted of what comes from other nodes.
+    pub admission: Admission,
     /// Declared flows that leave this node, to be measured.
     pub flows: Vec<Flow>,
+    /// Packages of lower priority are not real time: without time slots, threads that are scheduled as their modules carry them, by a port
+    /// of their own. 0: all are.
+    pub real_time_from: u16,
 }
 
 /// A node, as others see it.
@@ -102,8 +107,10 @@ impl Settings {
             tdma: installation.tdma.clone(),
             routes: installation.routes_from(node),
             senders: installation.modules_on(node).map(|module| module.names().collect()).collect(),
-            access: Access::new(&installation.access),
+            hosts: installation.names_on(node),
+            admission: Admission::new(installation, node),
             flows: Flow::all_from(installation, node),
+            real_time_from: installation.real_time_from(),
         })
     }
 
@@ -111,6 +118,16 @@ impl Settings {
     pub fn overhead_bytes(&self) -> usize {
         let is_v6 = self.nodes.iter().any(|node| node.address.is_ipv6());
         Network::around_bytes(is_v6, self.network.security)
+    }
+
+    /// Whether what is not real time goes by threads and a port of its own. In time slots all goes through these, by its level.
+    pub fn parts_rest(&self) -> bool {
+        self.tdma.is_none() && self.real_time_from > 0
+    }
+
+    /// Whether a package of this head goes that way.
+    pub fn is_rest(&self, head: &Head) -> bool {
+        self.parts_rest() && u16::from(capped(head).priority.0) < self.real_time_from
     }
 
     /// Whether what passes between nodes is sealed.
@@ -141,16 +158,19 @@ impl Settings {
 
     /// Why a package of a node is not to be delivered, whatever its mailbox says. That a seal is right says which node has sent it, so a
     /// node speaks for its own names alone; without seals anyone may say that.
-    pub fn refuses(&self, from: NodeIndex, package: &Head) -> Option<Cause> {
-        if self.is_sealed() && self.node_of(package.from) != Some(from) {
-            return Some(Cause::ForeignName);
-        }
-        (!self.access.allows(package)).then_some(Cause::NotAllowed)
+    pub fn refuses(&self, node: NodeIndex, head: &Head, body: &[u8]) -> Option<Cause> {
+        let is_its_name = !self.is_sealed() || self.node_of(head.from) == Some(node);
+        self.admission.judge(Way::Lan { node, is_its_name }, head, body).err().map(Cause::from)
     }
 
     /// The nodes besides this one.
     pub fn peers(&self) -> impl Iterator<Item = NodeIndex> {
         (0..self.nodes.len() as NodeIndex).filter(|node| *node != self.own)
+    }
+
+    /// Where datagrams of the others come from.
+    pub fn peer_addresses(&self) -> Vec<IpAddr> {
+        self.peers().map(|peer| self.nodes[usize::from(peer)].address).collect()
     }
 
     /// The node with an address.

@@ -1,7 +1,8 @@
 //! What a router counts, for whoever wants to know: packages by class, losses by cause, peers.
 //!
 //! One thread writes each counter (`out`: the one that sends; `inn`: the one that receives), any thread reads: so a count is a load
-//! and a store, no locked instruction. Accounts balance, by class:
+//! and a store, no locked instruction. What is not real time has threads of its own ([`Stats::of_rest`]): they count its classes in the same
+//! places, and datagrams in their own. Accounts balance, by class:
 //!
 //! ```text
 //! out.packages  =  out.passed + out.lost, all causes  + those that wait
@@ -48,11 +49,15 @@ pub enum Cause {
     ForeignName,
     /// Incoming: a command of a class that may not command this one.
     NotAllowed,
+    /// Incoming: from or for a mailbox by which routers carry packages.
+    RoutersOwn,
+    /// Incoming: no IP packet from the tunnel's address of the node that sent it to ours.
+    BadPacket,
 }
 
 impl Cause {
     /// All, in their order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::NoRoute,
         Self::Quota,
         Self::Stale,
@@ -67,6 +72,8 @@ impl Cause {
         Self::TooLarge,
         Self::ForeignName,
         Self::NotAllowed,
+        Self::RoutersOwn,
+        Self::BadPacket,
     ];
 
     /// A word for people and programs.
@@ -86,6 +93,8 @@ impl Cause {
             Self::TooLarge => "too-large",
             Self::ForeignName => "foreign-name",
             Self::NotAllowed => "not-allowed",
+            Self::RoutersOwn => "routers-own",
+            Self::BadPacket => "bad-packet",
         }
     }
 }
@@ -215,7 +224,7 @@ pub struct PeerReceived {
     pub returned: Count,
     /// Datagrams that came before, or so late that it cannot be told; dropped.
     pub copies: Count,
-    /// Datagrams of an earlier life of the peer; dropped.
+    /// Datagrams of an earlier life of the peer, or of one that is doubted; dropped.
     pub old: Count,
     /// Datagrams that came after later ones; taken.
     pub overtaken: Count,
@@ -249,20 +258,26 @@ pub struct PeerStats {
 #[derive(Debug)]
 pub struct Stats {
     /// To other nodes.
-    pub out: Side,
+    pub out: Arc<Side>,
     /// From other nodes.
-    pub inn: Side,
+    pub inn: Arc<Side>,
     peers: Box<[PeerStats]>,
     /// Packages that wait, by level.
     pub waiting: [Count; LEVELS],
     /// Bytes that they take up in the queue's memory.
     pub waiting_bytes: Count,
-    /// Datagrams from addresses that no node has, or that are nothing of ours.
+    /// Datagrams that came from a node's address and are nothing of ours.
     pub foreign: Count,
+    /// Datagrams that the kernel dropped at the socket: from addresses that no node has, or since the socket was full.
+    pub dropped: Count,
     /// The declared flows that leave the node.
-    pub flows: Flows,
+    pub flows: Arc<Flows>,
+    /// Bytes that were sent, all heads counted.
+    pub on_wire_bytes: Count,
     /// When the router began, ns of the monotonic clock.
     pub started_ns: u64,
+    /// Of what is not real time: who knows which peers are there.
+    knows: Option<Arc<Self>>,
 }
 
 /// After so long the wire holds no copy any more of what a router's life before took.
@@ -276,14 +291,35 @@ impl Stats {
     /// Of a router that begins now.
     pub fn new(settings: &Settings, now_ns: u64) -> Arc<Self> {
         Arc::new(Self {
-            out: Side::new(),
-            inn: Side::new(),
+            out: Arc::new(Side::new()),
+            inn: Arc::new(Side::new()),
             peers: settings.nodes.iter().map(|_| PeerStats::default()).collect(),
             waiting: Default::default(),
             waiting_bytes: Count::default(),
             foreign: Count::default(),
-            flows: Flows::new(&settings.flows),
+            dropped: Count::default(),
+            flows: Arc::new(Flows::new(&settings.flows)),
+            on_wire_bytes: Count::default(),
             started_ns: now_ns,
+            knows: None,
+        })
+    }
+
+    /// Of the same router, for the threads that carry what is not real time.
+    pub fn of_rest(settings: &Settings, all: &Arc<Self>) -> Arc<Self> {
+        let Self { out, inn, flows, started_ns, .. } = &**all;
+        Arc::new(Self {
+            out: out.clone(),
+            inn: inn.clone(),
+            peers: settings.nodes.iter().map(|_| PeerStats::default()).collect(),
+            waiting: Default::default(),
+            waiting_bytes: Count::default(),
+            foreign: Count::default(),
+            dropped: Count::default(),
+            flows: flows.clone(),
+            on_wire_bytes: Count::default(),
+            started_ns: *started_ns,
+            knows: Some(all.clone()),
         })
     }
 
@@ -297,7 +333,20 @@ impl Stats {
 
     /// Whether a peer is there.
     pub fn state(&self, peer: NodeIndex, now_ns: u64) -> crate::link::State {
-        self.peer(peer).link.state(self.started_ns, now_ns)
+        self.knows.as_deref().unwrap_or(self).peer(peer).link.state(self.started_ns, now_ns)
+    }
+
+    /// Whether a life of a peer is another than the one that is heard at the port of what is real time, where that is found out.
+    pub(crate) fn is_other_life(&self, peer: NodeIndex, incarnation: u64) -> bool {
+        self.knows.as_ref().is_some_and(|all| {
+            let known = all.peer(peer).link.incarnation.get();
+            known != 0 && known != incarnation
+        })
+    }
+
+    /// Whether it is that life.
+    pub(crate) fn is_known_life(&self, peer: NodeIndex, incarnation: u64) -> bool {
+        self.knows.as_ref().is_some_and(|all| all.peer(peer).link.incarnation.get() == incarnation)
     }
 
     /// Whether the router has just begun: what comes may be a copy of what its life before took, so nothing is said of its fate.

@@ -4,6 +4,9 @@
 
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::frame::{Alive, Fragment, Frame, FrameHead, Kind, Reason, Refusal, VERSION};
+use rohrpost_routers::session::frame::HOPS_MAX;
+use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, GREETING_MAX_NS};
+use rohrpost_routers::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
 use rohrpost_routers::time::Term;
 use rohrpost_routers::time::message::{Message, Reply, Request, Sync};
 
@@ -141,4 +144,24 @@ fn time_has_the_documented_bytes() {
             assert_eq!(Message::parse(kind, rest), Ok(message), "{name}");
         });
     }
+}
+
+#[test]
+fn sessions_close_after_the_documented_times() {
+    let seconds = |ns: u64| format!("{} s", ns as f64 / 1e9);
+    for (ns, words) in [
+        (GREETING_MAX_NS, "from its beginning to the welcome"),
+        (SILENT_AFTER_NS, "in which nothing came; in the middle of a frame 8 s"),
+        (SILENT_AFTER_NS, "if also the oldest question of the client that was not answered left 2.5 s ago"),
+        (STALLED_AFTER_NS, "in which the stream took nothing of what was ready"),
+        (FRAME_MAX_NS, "from the first byte of a frame to its last"),
+    ] {
+        let line = PAGE.lines().find(|line| line.contains(words)).unwrap_or_else(|| panic!("nothing of `{words}`"));
+        assert!(line.starts_with(&format!("| {} |", seconds(ns))), "{}: {line}", seconds(ns));
+    }
+    let (slow, before) = (SLOW_SILENT_AFTER_NS, ASK_EVERY_NS);
+    assert_eq!([SILENT_AFTER_NS - before, slow, slow - before].map(seconds), ["2.5 s", "8 s", "7 s"]);
+    assert!(PAGE.contains(&format!("has {HOPS_MAX} hops already")));
+    let spaced = format!("{} {:03} ranges in all", ENTRIES_MAX / 1000, ENTRIES_MAX % 1000);
+    assert!(PAGE.contains(&spaced) && PAGE.contains(&format!("or {} of one certificate", ENTRIES_MAX / 8)));
 }

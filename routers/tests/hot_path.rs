@@ -9,12 +9,14 @@ pub mod counting;
 use counting::{CountingHeap, heap_uses};
 use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_routers::access::Access;
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::{Datagram, Inbound};
 use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
 use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
+use rohrpost_routers::session::frame::Range;
+use rohrpost_routers::session::{ClientIndex, Table};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::stats::{Cause, Stats};
 use rohrpost_routers::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
@@ -56,7 +58,9 @@ fn settings(own: NodeIndex) -> Settings {
         tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(255), node: other }],
         senders: vec![vec![module(own)]],
-        access: Access::default(),
+        hosts: Vec::new(),
+        admission: Admission::default(),
+        real_time_from: 0,
         flows: vec![Flow {
             from: vec![module(own)],
             to: vec![module(other)],
@@ -290,4 +294,17 @@ fn a_clock_takes_nothing_from_the_heap() {
         let _ = clocks.clocks[1].poll(clocks.now_ns, &mut [0; TIME_BYTES]);
     }
     assert_eq!(heap_uses() - before, 0);
+}
+
+#[test]
+fn who_hosts_a_name_at_the_tcp_router_is_looked_up_without_the_heap() {
+    let mut table = Table::default();
+    for client in 0..16 {
+        let module = |index: usize| Range::module(Name::new(1 + client as u8, (index >> 8) as u8, index as u8, 0));
+        table.register(ClientIndex(client), 1000, |_| true, (0..1000).map(module)).unwrap();
+    }
+    let before = heap_uses();
+    let hosted = (0..1 << 14).filter(|name| table.client_of(Name::from_raw(name << 14)).is_some()).count();
+    assert_eq!(heap_uses(), before);
+    assert!(hosted > 100, "{hosted} names are hosted");
 }

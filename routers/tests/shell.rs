@@ -9,12 +9,14 @@ mod common;
 use common::{PATIENCE, Pair, Side, label, module};
 use rohrpost_config::Security;
 use rohrpost_mailbox::monotonic_ns;
-use rohrpost_mailbox::{Kind, Name, Options, Receiver, SendError, Shape, Type, local};
+use rohrpost_mailbox::{Kind, Label, Name, Options, Receiver, SendError, Shape, Type, local};
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::link::State;
+use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
+use rohrpost_routers::stats::Stats;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
@@ -144,17 +146,20 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
     let here = &pair.sides[0];
     let to = (here.settings.nodes[0].address, here.settings.network.port);
     let refused = |peer: u8| here.shell().stats().peer(peer).received.refused.get();
-    let foreign = || here.shell().stats().foreign.get();
+    let [foreign, dropped] = [|stats: &Stats| stats.foreign.get(), |stats: &Stats| stats.dropped.get()];
+    let [foreign, dropped] = [foreign, dropped].map(|count| move || count(here.shell().stats()));
     let head = FrameHead { kind: FrameKind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation: 99, sequence: 0 };
     let told = [0; 24];
     let claims = [&head.to_bytes(&[&told])[..HEAD_BYTES], &told].concat();
     until("the peer is heard", || here.shell().stats().peer(1).link.incarnation.get() == 2);
-    let before = foreign();
+    let before = (foreign(), dropped());
     let stranger = UdpSocket::bind((IpAddr::V4(Ipv4Addr::new(127, 127, 127, 127)), 0)).unwrap();
     for bytes in [&claims[..], b"anything", b""] {
         stranger.send_to(bytes, to).unwrap();
     }
-    until("all are counted", || foreign() == before + 3);
+    // By the kernel, which tells with the next datagram of the peer.
+    until("all are counted", || dropped() == before.1 + 3);
+    assert_eq!(foreign(), before.0, "none came to the router");
     assert_eq!(here.shell().stats().peer(1).link.incarnation.get(), 2, "the peer's own life still is the known one");
     // From the node's address, but of another system.
     let own = UdpSocket::bind((here.settings.nodes[1].address, 0)).unwrap();
@@ -208,7 +213,7 @@ fn what_waited_for_a_router_for_long_says_nothing_of_who_lives_now() {
     pair.sides.iter_mut().for_each(|side| side.shell = None);
     let [there, here] = [0, 1].map(|node: usize| pair.sides[1].settings.nodes[node].address);
     let at = SocketAddr::new(here, pair.sides[1].settings.network.port);
-    pair.sides[1].socket = Some(listen(at).unwrap());
+    pair.sides[1].socket = Some(listen(at, &[there]).unwrap());
     let peer = UdpSocket::bind((there, 0)).unwrap();
     let says = |sequence: u32| {
         let (incarnation, told) = (99, [0; 24]);
@@ -227,9 +232,8 @@ fn what_waited_for_a_router_for_long_says_nothing_of_who_lives_now() {
     std::thread::sleep(Duration::from_nanos(SOCKET_MAX_NS) + Duration::from_millis(100));
     pair.sides[1].start();
     // Behind it in the socket, and young.
-    let stranger = UdpSocket::bind((IpAddr::V4(Ipv4Addr::new(127, 127, 127, 127)), 0)).unwrap();
     until("what is behind it is counted", || {
-        stranger.send_to(b"anything", at).unwrap();
+        peer.send_to(b"anything", at).unwrap();
         pair.sides[1].shell().stats().foreign.get() > 0
     });
     let heard = || pair.sides[1].shell().stats().peer(0).link.incarnation.get();
@@ -239,5 +243,104 @@ fn what_waited_for_a_router_for_long_says_nothing_of_who_lives_now() {
         says(sequence);
         sequence += 1;
         heard() == 99
+    });
+}
+
+/// What is real time and what is not, both ways, each by threads and a port of its own; unsealed and sealed.
+#[test]
+fn what_is_not_real_time_goes_by_a_port_of_its_own() {
+    for is_sealed in [false, true] {
+        let mut pair = Pair::new();
+        for side in &mut pair.sides {
+            // The class of the modules is 100.
+            side.settings.real_time_from = 50;
+            if is_sealed { side.seal() } else { side.start() }
+        }
+        let shape = Shape { body_bytes_max: 8000, ..Shape::default() };
+        let mut receiver = pair.sides[1].receiver(module(1), shape);
+        let mut sender = pair.sides[0].sender(module(1));
+        let data = |priority, id| Label { kind: Type::data(1), ..label(module(0), priority, id) };
+        let counts = || {
+            let [sent, came] = [&pair.sides[0], &pair.sides[1]].map(Side::shell);
+            let all = [(sent, 1), (came, 0)]
+                .map(|(shell, peer)| [shell.stats(), shell.rest_stats().unwrap()].map(|stats| stats.peer(peer)));
+            let [[a, b], [c, d]] = all;
+            [a.sent.packages.get(), b.sent.packages.get(), c.received.packages.get(), d.received.packages.get()]
+        };
+        let (mut id, mut rest) = (0, 0);
+        for (priority, body, why) in [
+            (100, 10, "real time"),
+            (50, 4000, "the least that is, in parts"),
+            (49, 10, "the most that is not"),
+            (20, 4000, "not, in parts"),
+        ] {
+            let before = counts();
+            let began = Instant::now();
+            loop {
+                id += 1;
+                sender.send(&data(priority, id), &[&vec![7; body]]).unwrap();
+                let came = receiver.receive_timeout(Duration::from_millis(200));
+                let came = came.map(|came| (came.head().id, came.head().priority.0, came.body().len()));
+                if came == Some((id, priority, body)) {
+                    break;
+                }
+                assert!(began.elapsed() < PATIENCE, "{why}: {came:?}");
+            }
+            let after = counts();
+            let went = [0, 1, 2, 3].map(|at: usize| after[at] > before[at]);
+            let is_rest = priority < 50;
+            assert_eq!(went, [!is_rest, is_rest, !is_rest, is_rest], "{why}, sealed {is_sealed}");
+            rest += u64::from(is_rest);
+        }
+        assert_eq!(rest, 2);
+        let classes: Vec<_> = pair.sides[1].shell().stats().inn.classes().map(|(class, _)| class.0).collect();
+        assert_eq!(classes, [100, 50, 49, 20], "one account of all");
+        if is_sealed {
+            assert!(pair.sides[1].shell().rejections(Port::Rest).is_some());
+        }
+    }
+}
+
+/// A command that hurries more than its sender may goes with what its sender may.
+#[test]
+fn who_may_not_hurry_is_not_carried_as_if_it_might() {
+    let mut pair = Pair::new();
+    for side in &mut pair.sides {
+        side.settings.real_time_from = 128;
+        side.start();
+    }
+    let mut receiver = pair.sides[1].receiver(module(1), Shape::default());
+    pair.sides[0].sender(module(1)).send(&label(module(0), 255, 1), &[b"drive"]).unwrap();
+    assert_eq!(receiver.receive_timeout(PATIENCE).unwrap().head().priority.0, 100);
+    let shell = pair.sides[0].shell();
+    let packages = [shell.stats(), shell.rest_stats().unwrap()].map(|stats| stats.peer(1).sent.packages.get());
+    assert_eq!(packages, [0, 1]);
+}
+
+/// The two threads that carry what is not real time are never in real time, whatever their process is.
+#[test]
+fn who_carries_what_is_not_real_time_runs_below_all_that_is() {
+    let mut pair = Pair::new();
+    let _ = rohrpost_mailbox::sys::schedule(rohrpost_mailbox::sys::Scheduling::Fifo(1));
+    for side in &mut pair.sides {
+        side.settings.real_time_from = 128;
+        side.start();
+    }
+    let policies = || -> Vec<(String, String)> {
+        let read = |task: &std::path::Path, file: &str| std::fs::read_to_string(task.join(file)).unwrap_or_default();
+        let tasks = std::fs::read_dir("/proc/self/task").unwrap().flatten();
+        let named = tasks.map(|task| (read(&task.path(), "comm"), read(&task.path(), "sched")));
+        let policy = |text: &str| text.lines().find(|line| line.starts_with("policy")).map(str::to_string);
+        named
+            .filter(|(name, _)| name.starts_with("rest-"))
+            .filter_map(|(name, sched)| Some((name, policy(&sched)?)))
+            .collect()
+    };
+    if policies().is_empty() {
+        // A kernel that does not tell.
+        return;
+    }
+    until("both have begun and are scheduled as others are", || {
+        policies().len() >= 2 && policies().iter().all(|(_, policy)| policy.ends_with(" 0"))
     });
 }

@@ -1,6 +1,6 @@
 //! `rohrpost bench local`: how this computer hands packages over, beside what it could do at best.
 
-use super::{Failure, say};
+use super::{Failure, complain, say};
 use rohrpost::mailbox::{Node, base_directory};
 use rohrpost_bench::environment::Environment;
 use rohrpost_bench::harness::Scheduling;
@@ -8,7 +8,6 @@ use rohrpost_bench::report::{self, Report};
 use rohrpost_bench::rounds::Row;
 use rohrpost_bench::{Settings, cases};
 use std::fs;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -56,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let launched = launched();
     let scheduling = if launched.is_empty() { Scheduling::Fifo } else { Scheduling::Normal };
     for node in &launched {
-        warn(&format!(
+        complain(format_args!(
             "warning: {} is launched on this computer, and this takes two processors for some seconds: measuring with the \
              default scheduler, so that real-time modules keep theirs; the figures are worse for it",
             node.display()
@@ -68,10 +67,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say(format!("\n{}", meaning(&report, scheduling, &Hints::look())));
     }
     Ok(if report.is_sound() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-fn warn(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Nodes that a launch runs now.

@@ -5,6 +5,7 @@ use super::units::seconds;
 use super::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::description::{Description, Function};
+use rohrpost::output::plain;
 use rohrpost::value::{Value, decode, describe_result, describe_type, encode, parse_argument};
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
@@ -171,13 +172,13 @@ pub(super) fn usage(function: &Function) -> String {
     let arguments: Vec<String> = function
         .arguments
         .iter()
-        .map(|argument| format!(" <{}: {}>", argument.name, describe_type(&argument.ty)))
+        .map(|argument| format!(" <{}: {}>", plain::line(&argument.name), describe_type(&argument.ty)))
         .collect();
-    format!("{}{}", function.name, arguments.concat())
+    format!("{}{}", plain::line(&function.name), arguments.concat())
 }
 
 fn listing(description: &Description) -> String {
-    let mut text = format!("class {}: {}\n", description.class, description.text);
+    let mut text = format!("class {}: {}\n", plain::line(&description.class), plain::line(&description.text));
     if !description.functions.is_empty() {
         text.push_str("\nfunctions\n");
     }
@@ -186,14 +187,15 @@ fn listing(description: &Description) -> String {
             "  {} -> {}\n      {}\n",
             usage(function),
             describe_result(&function.result),
-            function.text
+            plain::line(&function.text)
         ));
     }
     if !description.data.is_empty() {
         text.push_str("\ndata\n");
     }
     for item in &description.data {
-        text.push_str(&format!("  {}: {}\n      {}\n", item.name, describe_type(&item.ty), item.text));
+        let (name, about) = (plain::line(&item.name), plain::line(&item.text));
+        text.push_str(&format!("  {name}: {}\n      {about}\n", describe_type(&item.ty)));
     }
     text.push_str("\nevery module: on, off, status, get DATA, output-level LEVEL");
     text

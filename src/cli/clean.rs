@@ -1,8 +1,9 @@
 //! `rohrpost clean`.
 
+use super::demo::abandoned;
 use super::{Failure, say};
 use rohrpost::mailbox::{Node, NodeError, base_directory, remove_base_if_empty};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -24,15 +25,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             outcome => done.push((path, outcome)),
         }
     }
+    // Somebody else may have removed one meanwhile.
+    let demos = abandoned(&std::env::temp_dir()).into_iter().filter(|folder| std::fs::remove_dir_all(folder).is_ok());
+    let demos: Vec<PathBuf> = demos.collect();
     if arguments.json {
         let nodes: Vec<serde_json::Value> = done.iter().map(|(path, outcome)| json(path, outcome)).collect();
-        say(serde_json::json!({ "directory": base, "nodes": nodes }));
-    } else if done.is_empty() {
+        say(serde_json::json!({ "directory": base, "nodes": nodes, "demos": demos }));
+        remove_base_if_empty();
+        return Ok(ExitCode::SUCCESS);
+    }
+    if done.is_empty() {
         say(format_args!("nothing to clean in {}", base.display()));
-    } else {
-        for (path, outcome) in &done {
-            say(text(path, outcome));
-        }
+    }
+    for (path, outcome) in &done {
+        say(text(path, outcome));
+    }
+    for folder in demos {
+        say(format_args!("removed {}, the files of a demo", folder.display()));
     }
     remove_base_if_empty();
     Ok(ExitCode::SUCCESS)

@@ -15,6 +15,7 @@ use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::config::Installation;
 use rohrpost::description::Description;
+use rohrpost::output::plain;
 use rohrpost::survey::purpose;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -128,8 +129,10 @@ fn installation() -> Option<Installation> {
     Installation::load(named.as_ref()).ok()
 }
 
-fn candidate(name: impl Into<std::ffi::OsString>, help: &str) -> CompletionCandidate {
-    CompletionCandidate::new(name).help(Some(StyledStr::from(help.to_owned())).filter(|_| !help.is_empty()))
+/// The shell puts it on the command line and into its list: what a terminal would obey is written out.
+fn candidate(name: impl AsRef<str>, help: &str) -> CompletionCandidate {
+    let help = Some(StyledStr::from(plain::line(help).into_owned())).filter(|_| !help.is_empty());
+    CompletionCandidate::new(plain::line(name.as_ref()).into_owned()).help(help)
 }
 
 fn modules() -> Vec<CompletionCandidate> {

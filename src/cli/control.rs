@@ -4,6 +4,7 @@ use super::target::{Running, Target};
 use super::{Failure, say};
 use rohrpost::launch::{ChildState, ControlError, Phase};
 use rohrpost::mailbox::{ModuleState, Name};
+use rohrpost::output::plain;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, ToolLink};
 use std::process::ExitCode;
@@ -126,7 +127,7 @@ impl Asked<'_> {
         let state = process.filter(|process| process.pid == pid).and_then(|process| process.state);
         if state == Some(ModuleState::Error) {
             let why = self.tool.status(self.name).map(|status| status.error).unwrap_or_default();
-            return Err(format!("{text} was started (process {pid}), but is in error: {why}").into());
+            return Err(format!("{text} was started (process {pid}), but is in error: {}", plain::line(&why)).into());
         }
         let state = state.map_or("gone", ModuleState::name);
         Ok(format!("{text} runs and is {state} after {took_s:.2} s (process {pid}{before})"))
@@ -166,6 +167,6 @@ impl Asked<'_> {
     fn told(&self, error: &CallError<ControlError>) -> Failure {
         let node = self.running.node_of(self.name);
         let launch = if self.running.is_own(self.name) { "launch".into() } else { format!("launch of node {node}") };
-        error.to_string().replace(&self.launcher.to_string(), &launch).into()
+        plain::line(&error.to_string().replace(&self.launcher.to_string(), &launch)).into()
     }
 }

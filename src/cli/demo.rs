@@ -4,6 +4,7 @@ mod account;
 mod beyond;
 mod copy;
 mod ears;
+mod folder;
 mod lives;
 mod losses;
 mod nodes;
@@ -14,6 +15,8 @@ use super::launch::{View, end};
 use super::speech::Speech;
 use super::summary::print_classes;
 use super::{Failure, say};
+use folder::Folder;
+pub(super) use folder::abandoned;
 use rohrpost::common::State;
 use rohrpost::config::Installation;
 use rohrpost::interface::Interface;
@@ -106,7 +109,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if arguments.kill_master {
         return Err("one node alone has no master to be killed; say --nodes 3".into());
     }
-    let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
+    let folder = Folder::new()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let node = choose_node(&installation, None)?.name.clone();
     let (drawing, begun) = (drawing(&installation), SystemTime::now());

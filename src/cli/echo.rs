@@ -84,6 +84,8 @@ fn follow(
     tool: &mut ToolLink,
 ) -> Result<(), Failure> {
     tool.data()?;
+    // What an earlier program under this name asked for still comes for a while.
+    let incarnation = tool.link.incarnation();
     let patience = super::units::seconds(arguments.timeout)?;
     let (mut renew_at, mut count) = (Instant::now(), 0);
     let mut heard = Instant::now();
@@ -103,7 +105,8 @@ fn follow(
         let Some(package) = tool.data()?.receive_timeout(Duration::from_millis(50)) else { continue };
         let Kind::Data(number) = package.head().kind.kind() else { continue };
         let Some((head, value)) = DataHead::split(package.body()) else { continue };
-        if number != item.number || package.head().from.module() != module {
+        let (from, id) = (package.head().from.module(), package.head().id);
+        if (number, from, id, head.incarnation) != (item.number, module, wish.id, incarnation) {
             continue;
         }
         heard = Instant::now();

@@ -5,6 +5,7 @@ use super::target::Target;
 use super::units::{fine, short};
 use super::watch::{Figures, Pace};
 use super::{Failure, say};
+use rohrpost::output::plain;
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -39,13 +40,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     let tell = |watched: &mut Watched| {
         watched.renew(&mut data, wanted);
-        let wide = data.iter().map(|(_, name)| name.len()).max().unwrap_or(0);
+        let wide = data.iter().map(|(_, name)| plain::line(name).len()).max().unwrap_or(0);
         for (number, name) in &data {
             let figures = watched.figures(*number);
             let line = if arguments.pace.json {
                 in_json(&arguments.name, name, figures)
             } else {
-                in_text(name, wide, figures)
+                in_text(&plain::line(name), wide, figures)
             };
             if !say(line) {
                 return Ok(false);

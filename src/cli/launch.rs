@@ -10,6 +10,7 @@ use super::summary::{ModuleLine, module_lines, print_modules_live};
 pub(super) use all::{Nodes, lab};
 use rohrpost::config::{Installation, Keys};
 use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost::output::plain::Lines;
 use rohrpost::survey::Survey;
 use rohrpost_routers::impair;
 use std::io::IsTerminal;
@@ -105,16 +106,14 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     shown.map(|()| code)
 }
 
-/// Stops everything; what failed for good makes the exit code.
+/// Stops everything; what failed for good or is in error makes the exit code.
 pub(super) fn end(mut launch: Launch, speech: &Speech) -> ExitCode {
     launch.take_notes().iter().for_each(|note| speech.say(note));
     let failures = launch.failures();
     launch.stop().iter().for_each(|note| speech.say(note));
     // What failed for good stands below all else, where both streams lead to one place.
     speech.settle();
-    for (module, why) in &failures {
-        speech.complain(&format!("{module} failed for good: {why}"));
-    }
+    failures.iter().for_each(|failure| speech.complain(failure));
     if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
@@ -168,9 +167,7 @@ impl<'a> View<'a> {
             return Ok(());
         }
         let survey = launch.survey()?;
-        let lines = module_lines(launch.installation(), &survey, self.last.as_ref(), |name| {
-            (launch.restarts(name), launch.phase(name))
-        });
+        let lines = module_lines(launch.installation(), &survey, self.last.as_ref());
         self.draw(&launch.installation().name, &lines);
         self.last = Some(survey);
         Ok(())
@@ -183,7 +180,7 @@ impl<'a> View<'a> {
         // Home, then each line cleared to its end, then all below: no flicker. Lines that are too long are cut off, not
         // wrapped: else the table would be no table.
         let text = format!("{head}\n\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
-        let text = text.replace('\n', "\x1b[K\n");
+        let text = Lines(text).to_string().replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };
         self.speech.draw(format!("{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J"));
     }

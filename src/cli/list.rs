@@ -9,6 +9,7 @@ use rohrpost::Name;
 use rohrpost::config::Installation;
 use rohrpost::interfaces::{BeyondHost, BeyondHosts};
 use rohrpost::mailbox::{Loss, MailboxInfo, saturating_sum};
+use rohrpost::output::plain;
 use rohrpost::survey::{Scope, node_of, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
@@ -106,7 +107,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         installation: &running.installation.name,
         node: &running.node_name,
         nodes: nodes.iter().map(|node| node_line(node, &silent)).collect(),
-        modules: module_lines(&running.installation, &survey, None, |_| (0, None)),
+        modules: module_lines(&running.installation, &survey, None),
         mailboxes: mailbox_lines(&running.installation, &survey.mailboxes),
         beyond,
         beyond_more,
@@ -135,7 +136,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         ));
     }
     if let Some(why) = &listing.beyond_silent {
-        say(format_args!("\nmodules at the TCP router are not known: {why}"));
+        say(format_args!("\nmodules at the TCP router are not known: {}", plain::line(why)));
     }
     if !silent.is_empty() {
         let lines: Vec<String> = silent.iter().map(Silence::text).collect();

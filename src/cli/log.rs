@@ -5,7 +5,7 @@ mod levels;
 mod reader;
 
 use super::target::{Running, Target};
-use super::{Failure, say};
+use super::{Failure, complain, say};
 use filter::Filter;
 use levels::Setting;
 use reader::Reader;
@@ -176,7 +176,7 @@ impl Show<'_> {
     /// A word of ours between the lines; programs read lines alone.
     fn note(&self, note: &str) -> bool {
         if self.arguments.json {
-            eprintln!("… {note}");
+            complain(format_args!("… {note}"));
             return true;
         }
         say(format_args!("… {note}"))

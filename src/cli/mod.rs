@@ -7,6 +7,7 @@ mod check;
 mod clean;
 mod completions;
 mod control;
+mod daemons;
 mod delay;
 mod demo;
 mod doctor;
@@ -45,6 +46,7 @@ mod version;
 mod watch;
 
 use clap::{FromArgMatches, Parser, Subcommand};
+use rohrpost::output::plain::Lines;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -169,13 +171,19 @@ pub(crate) fn main() -> ExitCode {
         Command::TcpClient(arguments) => tcp::join(arguments),
     };
     result.unwrap_or_else(|error| {
-        // Who would read it may be gone, too.
-        let _ = writeln!(std::io::stderr(), "{error}");
+        complain(error);
         ExitCode::FAILURE
     })
 }
 
-/// Prints a line; false when nobody reads any more (a closed pipe is the reader's way to say enough).
+/// Prints a line, or several; false when nobody reads any more (a closed pipe is the reader's way to say enough). All that the command prints
+/// goes through here and [`complain`], and so nothing that a terminal would obey: names, texts and faults are those of others.
 fn say(line: impl std::fmt::Display) -> bool {
-    writeln!(std::io::stdout(), "{line}").is_ok()
+    writeln!(std::io::stdout(), "{}", Lines(line)).is_ok()
+}
+
+/// Prints a line, or several, to the standard error.
+fn complain(line: impl std::fmt::Display) {
+    // Who would read it may be gone.
+    let _ = writeln!(std::io::stderr(), "{}", Lines(line));
 }

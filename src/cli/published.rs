@@ -1,10 +1,11 @@
 //! What a module publishes, by its own counters, on a node that may be launched again meanwhile.
 
-use super::Failure;
 use super::target::{Running, Target};
 use super::watch::{Figures, Tracks};
+use super::{Failure, complain};
 use rohrpost::Name;
 use rohrpost::mailbox::{FlowInfo, Type};
+use rohrpost::output::plain;
 use rohrpost::survey::{Scope, Survey};
 use std::time::Duration;
 
@@ -13,7 +14,7 @@ pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Re
     let text = running.text(module);
     let description = running.describe(module)?;
     let known: Vec<(u16, String)> = description.data.into_iter().map(|item| (item.number, item.name)).collect();
-    let names = || known.iter().map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ");
+    let names = || known.iter().map(|(_, name)| plain::line(name)).collect::<Vec<_>>().join(", ");
     match name {
         _ if known.is_empty() => {
             let faces = running.installation.module(module).map(|found| &found.faces[..]).unwrap_or_default();
@@ -50,6 +51,14 @@ impl Watched {
     pub(super) fn new(target: &Target, text: &str, window: Duration) -> Result<Self, Failure> {
         let running = target.find()?;
         let module = running.module(text)?;
+        if running.is_beyond(module) {
+            return Err(format!(
+                "{text} is beyond this system's nodes, and what it counts stands in its own node's memory; run this in system {}, or \
+                 take `rohrpost echo {text}`, which subscribes",
+                module.system()
+            )
+            .into());
+        }
         let launched = running.node.launcher().is_some();
         Ok(Self {
             running,
@@ -73,7 +82,7 @@ impl Watched {
         match self.running.look(node, Scope::Module(self.module.raw())) {
             Ok(survey) => {
                 if std::mem::take(&mut self.silent) {
-                    eprintln!("node {node} answers again");
+                    complain(format_args!("node {node} answers again"));
                     self.changed = true;
                 }
                 self.heard = true;
@@ -84,7 +93,7 @@ impl Watched {
             Err(error) if own || !self.heard => Err(error),
             Err(error) => {
                 if !std::mem::replace(&mut self.silent, true) {
-                    eprintln!("{error}; waiting for it (Ctrl-C ends this)");
+                    complain(format_args!("{error}; waiting for it (Ctrl-C ends this)"));
                 }
                 Ok(None)
             }
@@ -107,12 +116,14 @@ impl Watched {
         }
         let node = &self.running.node_name;
         if std::mem::take(&mut self.launched) {
-            eprintln!("launch of node `{node}` has ended; waiting until it is launched again (Ctrl-C ends this)");
+            complain(format_args!(
+                "launch of node `{node}` has ended; waiting until it is launched again (Ctrl-C ends this)"
+            ));
         }
         let Some(running) = self.running.again().ok().filter(|again| again.node.launcher().is_some()) else {
             return Ok(());
         };
-        eprintln!("node `{node}` was launched again");
+        complain(format_args!("node `{node}` was launched again"));
         self.module = running.module(&self.text)?;
         self.tracks = Tracks::new(self.tracks.window());
         (self.running, self.launched, self.changed) = (running, true, true);

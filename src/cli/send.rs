@@ -4,9 +4,10 @@
 use super::call::{COMMON, body_of, names};
 use super::target::{Running, Target};
 use super::units::{Stop, rate, seconds};
-use super::{Failure, say};
+use super::{Failure, complain, say};
 use rohrpost::description::{Description, Function};
 use rohrpost::mailbox::wait_any;
+use rohrpost::output::plain;
 use rohrpost::value::{Value, decode};
 use rohrpost::{CallError, Name, ToolLink};
 use std::process::ExitCode;
@@ -97,7 +98,7 @@ fn no_function(arguments: &Arguments, description: &Description) -> String {
     }
     match &names(description)[..] {
         [] => format!("no function `{function}`; {name} has none to send"),
-        own => format!("no function `{function}`; it has: {}", own.join(", ")),
+        own => plain::line(&format!("no function `{function}`; it has: {}", own.join(", "))).into_owned(),
     }
 }
 
@@ -176,7 +177,7 @@ impl Sending<'_> {
             Ok(bytes) => match decode(&self.function.result, &bytes) {
                 Ok(Value::Variant(outcome, why)) if outcome == "Err" => {
                     self.counts.refused += 1;
-                    self.tell_once(format!("{}: {why}", self.function.name));
+                    self.tell_once(format!("{}: {why}", plain::line(&self.function.name)));
                 }
                 _ => self.counts.answered += 1,
             },
@@ -196,7 +197,7 @@ impl Sending<'_> {
 
     fn tell_once(&mut self, text: String) {
         if !self.told.contains(&text) {
-            eprintln!("{text}");
+            complain(&text);
             self.told.push(text);
         }
     }

@@ -2,7 +2,6 @@
 //! [`PATIENCE`]; a node that does not answer is silent, and that is told.
 
 use super::Failure;
-use super::summary::is_left_out;
 use super::target::Running;
 use super::units::short;
 use rohrpost::common::GET_DATA;
@@ -12,7 +11,7 @@ use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInt
 use rohrpost::launch::{Look, launcher_of};
 use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::mailbox::{InspectError, Name, SendError, realtime_ns};
-use rohrpost::output::iso;
+use rohrpost::output::{iso, plain};
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::survey::{LookFailure, MailboxLook, Scope, Seen, Survey, look_at_all};
 use rohrpost::{CallError, Fault, ToolLink};
@@ -71,7 +70,7 @@ impl Silence {
     }
 
     pub(super) fn text(&self) -> String {
-        format!("node {} is {}: {}", self.node, self.since(), self.why)
+        format!("node {} is {}: {}", self.node, self.since(), plain::line(&self.why))
     }
 }
 
@@ -163,6 +162,12 @@ impl Running {
         Some(told.map_err(|error| format!("{error}; `rohrpost list` in the system that runs it shows them").into()))
     }
 
+    /// Whether the TCP router says that somebody hosts this name.
+    pub(super) fn is_hosted_beyond(&self, module: Name) -> bool {
+        let Some(Ok(hosts)) = self.hosts_beyond() else { return false };
+        hosts.hosts.iter().any(|host| (host.first..=host.last).contains(&module.raw()))
+    }
+
     /// Whether this node takes part at the TCP router, or why not.
     fn takes_part(&self) -> Result<(), Failure> {
         let Some(client) = self.installation.tcp_client_of(&self.node_name) else { return Ok(()) };
@@ -177,7 +182,7 @@ impl Running {
     /// The modules of all nodes that are meant, but for those that need not run; with why, those that cannot be asked.
     pub(super) fn modules_to_ask(&self) -> Result<Vec<(Name, Option<Silence>)>, Failure> {
         let (survey, silent) = self.survey(Scope::Modules)?;
-        let all = survey.modules.iter().filter(|module| !is_left_out(module, &self.installation));
+        let all = survey.modules.iter().filter(|module| !module.is_left_out(&self.installation));
         let why = |node: &str| silent.iter().find(|silence| silence.node == node).cloned();
         Ok(all.map(|module| (module.name, why(&module.node))).collect())
     }

@@ -6,6 +6,7 @@
 //! launch ── line ──▶ queue, 256 lines ──▶ thread ──▶ stdout          the same with stderr
 //! ```
 
+use rohrpost::output::plain::Lines;
 use std::collections::VecDeque;
 use std::io::{self, Write};
 use std::os::fd::AsFd;
@@ -98,7 +99,7 @@ impl Stream {
 
 /// A line, or several, as the journal wants them: each begins with its urgency.
 fn marked(mark: &str, line: &str) -> String {
-    format!("{mark}{}\n", line.replace('\n', &format!("\n{mark}")))
+    format!("{mark}{}\n", Lines(line).to_string().replace('\n', &format!("\n{mark}")))
 }
 
 impl Shared {

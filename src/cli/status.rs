@@ -1,9 +1,14 @@
 //! `rohrpost status`.
 
+use super::sight::Silence;
+use super::summary::Account;
 use super::table::{table, time};
-use super::target::Target;
+use super::target::{Running, Target};
 use super::{Failure, say};
-use rohrpost::common::{State, Status};
+use rohrpost::common::{OutputLevel, Refused, Status};
+use rohrpost::output::plain;
+use rohrpost::survey::{ModuleSurvey, Scope, Standing, Survey};
+use rohrpost::{Name, ToolLink};
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -28,52 +33,106 @@ struct Line {
     module: String,
     node: String,
     #[serde(flatten)]
-    status: Option<Status>,
+    account: Account,
+    /// What it says itself.
+    #[serde(flatten)]
+    figures: Option<Figures>,
+    /// Why it says nothing.
     failure: Option<String>,
+}
+
+/// What only the module itself knows.
+#[derive(Serialize)]
+struct Figures {
+    incarnation: u32,
+    uptime_ms: u64,
+    subscribers: u32,
+    missed: u64,
+    lost: u64,
+    output_lost: u64,
+    output_suppressed: u64,
+    output_level: Option<OutputLevel>,
+    refused: Refused,
+}
+
+impl From<Status> for Figures {
+    fn from(status: Status) -> Self {
+        let Status { incarnation, uptime_ms, subscribers, missed, lost, .. } = status;
+        let Status { output_lost, output_suppressed, output_level, refused, .. } = status;
+        Self {
+            incarnation,
+            uptime_ms,
+            subscribers,
+            missed,
+            lost,
+            output_lost,
+            output_suppressed,
+            output_level,
+            refused,
+        }
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
-    let names = match &arguments.name {
-        Some(name) => vec![(running.module(name)?, None)],
-        None => running.modules_to_ask()?,
+    let (survey, silent) = running.survey(Scope::Modules)?;
+    let named = arguments.name.as_deref().map(|name| running.module(name)).transpose()?;
+    let names: Vec<Name> = match named {
+        Some(name) => vec![name],
+        None => {
+            let need_run = |module: &&ModuleSurvey| !module.is_left_out(&running.installation);
+            survey.modules.iter().filter(need_run).map(|module| module.name).collect()
+        }
     };
     let mut tool = running.join(super::units::seconds(arguments.timeout)?)?;
-    let mut lines = Vec::new();
-    for (name, silence) in names {
-        let (status, failure) = match silence.map_or_else(|| Ok(tool.status(name)), Err) {
-            Ok(Ok(status)) => (Some(status), None),
-            Ok(Err(error)) => (None, Some(running.told(name, &error).to_string())),
-            Err(silence) => (None, Some(silence.text())),
-        };
-        lines.push(Line { module: running.text(name), node: running.node_of(name).into(), status, failure });
-    }
+    let lines: Vec<Line> = names.into_iter().map(|name| ask(&running, &mut tool, &survey, &silent, name)).collect();
     tool.close();
     if arguments.json {
         say(serde_json::to_string(&lines)?);
     } else {
         say(print(&lines).trim_end());
     }
-    let well = |line: &Line| line.status.as_ref().is_some_and(|status| status.state != State::Error);
+    let well = |line: &Line| line.figures.is_some() && line.account.state != Standing::Error;
     Ok(if lines.iter().all(well) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn print(lines: &[Line]) -> String {
-    let rows = lines.iter().map(|line| match &line.status {
-        Some(status) => [
-            line.module.clone(),
-            format!("{:?}", status.state).to_lowercase(),
-            time(Duration::from_millis(status.uptime_ms)),
-            status.subscribers.to_string(),
-            status.missed.to_string(),
-            status.lost.to_string(),
-            status.error.clone(),
-        ],
-        None => {
-            let dash = || "-".to_owned();
-            let failure = line.failure.clone().unwrap_or_default();
-            [line.module.clone(), "silent".into(), dash(), dash(), dash(), dash(), failure]
+/// What there is to say of a module: as launch and its node's table have it, and what it says itself, unless it is known that it cannot.
+fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silence], name: Name) -> Line {
+    let (text, node) = (running.text(name), running.node_of(name).to_owned());
+    let account = survey.module(name).map(|module| Account::of(module, &running.installation));
+    let silence = silent.iter().find(|silence| silence.node == node).map(Silence::text);
+    let (failure, account) = match account {
+        Some(account) if silence.is_none() && !account.state.answers() => {
+            let busy = account.error.clone().filter(|_| account.state == Standing::Busy);
+            let failure = Some(busy.unwrap_or_else(|| running.absent(name).to_string()));
+            return Line { module: text, node, account, figures: None, failure };
         }
+        account => match silence.map_or_else(|| Ok(tool.status(name)), Err) {
+            Ok(Ok(status)) => {
+                let account = Account::said(&status, account);
+                return Line { module: text, node, account, figures: Some(status.into()), failure: None };
+            }
+            Ok(Err(error)) => (running.told(name, &error).to_string(), account),
+            Err(silence) => (silence, account),
+        },
+    };
+    let account = Account::unreachable(&failure, account);
+    Line { module: text, node, account, figures: None, failure: Some(failure) }
+}
+
+fn print(lines: &[Line]) -> String {
+    let rows = lines.iter().map(|line| {
+        let figure = |of: fn(&Figures) -> String| line.figures.as_ref().map_or("-".into(), of);
+        [
+            line.module.clone(),
+            line.account.state.to_string(),
+            figure(|figures| time(Duration::from_millis(figures.uptime_ms))),
+            line.account.restarts.to_string(),
+            figure(|figures| figures.subscribers.to_string()),
+            figure(|figures| figures.missed.to_string()),
+            figure(|figures| figures.lost.to_string()),
+            plain::line(line.account.error.as_deref().unwrap_or_default()).into_owned(),
+        ]
     });
-    table(["module", "state", ">up", ">subscribers", ">missed", ">lost", "error"], rows)
+    table(["module", "state", ">up", ">restarts", ">subscribers", ">missed", ">lost", "last error"], rows)
 }

@@ -1,17 +1,15 @@
 //! What a node does, as text: modules, and traffic by class.
 
 use super::table::{table, table_of, time};
+use rohrpost::Class;
+use rohrpost::common::Status;
 use rohrpost::config::Installation;
-use rohrpost::launch::Phase;
 use rohrpost::mailbox::sys::Scheduling;
-use rohrpost::mailbox::{ClassTraffic, Loss, ModuleState, saturating_sum};
-use rohrpost::survey::{ModuleSurvey, Survey};
-use rohrpost::{Class, Name};
+use rohrpost::mailbox::{ClassTraffic, Loss, saturating_sum};
+use rohrpost::output::plain;
+use rohrpost::survey::{ModuleSurvey, Standing, Survey};
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// State of modules whose node does not answer.
-pub(super) const SILENT: &str = "silent";
 
 /// A module, as the tables show it.
 #[derive(Clone, Serialize)]
@@ -19,7 +17,8 @@ pub(super) struct ModuleLine {
     pub(super) module: String,
     pub(super) node: String,
     pub(super) faces: Vec<String>,
-    pub(super) state: String,
+    #[serde(flatten)]
+    pub(super) account: Account,
     pub(super) priority: u8,
     pub(super) scheduling: String,
     pub(super) pid: Option<u32>,
@@ -28,32 +27,78 @@ pub(super) struct ModuleLine {
     pub(super) waiting: u32,
     #[serde(flatten)]
     pub(super) losses: Losses,
+}
+
+/// How a module stands, the same in every table and for every program that reads JSON.
+#[derive(Clone, Serialize)]
+pub(super) struct Account {
+    pub(super) state: Standing,
+    /// It is started again for the so manieth time that counts,
+    attempt: Option<u32>,
+    /// and at so many it is given up.
+    attempts_max: Option<u32>,
+    /// The last that went wrong.
+    pub(super) error: Option<String>,
     pub(super) restarts: u32,
 }
 
-/// The modules of a survey; rates since an earlier one. `launch` knows restarts and phases that the node's table does not.
-pub(super) fn module_lines(
-    installation: &Installation,
-    survey: &Survey,
-    earlier: Option<&Survey>,
-    launch: impl Fn(Name) -> (u32, Option<Phase>),
-) -> Vec<ModuleLine> {
-    let line = |module: &ModuleSurvey| {
-        let (restarts, phase) = launch(module.name);
-        ModuleLine {
-            module: installation.classes.format(module.name),
-            node: module.node.clone(),
-            faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
-            state: state(module, phase, installation),
-            priority: module.name.class().0,
-            scheduling: scheduling(module.scheduling),
-            pid: module.process.as_ref().map(|process| process.pid),
-            received: module.received,
-            received_per_s: earlier.map(|earlier| survey.received_per_s(earlier, module.name)),
-            waiting: module.depth,
-            losses: Losses::new(&module.losses),
-            restarts: module.process.as_ref().map_or(restarts, |process| process.restarts),
+impl Account {
+    pub(super) fn of(module: &ModuleSurvey, installation: &Installation) -> Self {
+        let state = module.standing();
+        let counts = match state {
+            Standing::Restarting { attempt, most } => Some((attempt, most)),
+            _ => None,
+        };
+        Self {
+            state,
+            attempt: counts.map(|(attempt, _)| attempt),
+            attempts_max: counts.map(|(_, most)| most),
+            error: Some(module.last_error(installation)).filter(|error| !error.is_empty()),
+            restarts: module.restarts(),
         }
+    }
+
+    /// As the module itself has just said; `before` is what others know of it.
+    pub(super) fn said(status: &Status, before: Option<Self>) -> Self {
+        let before = before.unwrap_or_else(Self::unknown);
+        let error = Some(status.error.clone()).filter(|error| !error.is_empty()).or(before.error);
+        Self { state: status.state.into(), attempt: None, attempts_max: None, error, restarts: before.restarts }
+    }
+
+    /// Of one that does not answer, for this reason.
+    pub(super) fn unreachable(why: &str, before: Option<Self>) -> Self {
+        let before = before.unwrap_or_else(Self::unknown);
+        Self { state: Standing::Unreachable, attempt: None, attempts_max: None, error: Some(why.into()), ..before }
+    }
+
+    const fn unknown() -> Self {
+        Self { state: Standing::Unreachable, attempt: None, attempts_max: None, error: None, restarts: 0 }
+    }
+
+    /// The last that went wrong, at most so many characters of it.
+    pub(super) fn short_error(&self, most: usize) -> String {
+        let error = plain::line(self.error.as_deref().unwrap_or_default());
+        match error.char_indices().nth(most) {
+            Some(_) => error.chars().take(most - 1).chain(['…']).collect(),
+            None => error.into_owned(),
+        }
+    }
+}
+
+/// The modules of a survey; rates since an earlier one.
+pub(super) fn module_lines(installation: &Installation, survey: &Survey, earlier: Option<&Survey>) -> Vec<ModuleLine> {
+    let line = |module: &ModuleSurvey| ModuleLine {
+        module: installation.classes.format(module.name),
+        node: module.node.clone(),
+        faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
+        account: Account::of(module, installation),
+        priority: module.name.class().0,
+        scheduling: scheduling(module.scheduling),
+        pid: module.process.as_ref().map(|process| process.pid),
+        received: module.received,
+        received_per_s: earlier.map(|earlier| survey.received_per_s(earlier, module.name)),
+        waiting: module.depth,
+        losses: Losses::new(&module.losses),
     };
     survey.modules.iter().map(line).collect()
 }
@@ -67,28 +112,16 @@ fn scheduling(scheduling: Option<Scheduling>) -> String {
     }
 }
 
-pub(super) fn state(module: &ModuleSurvey, phase: Option<Phase>, installation: &Installation) -> String {
-    match (&module.process, phase) {
-        _ if module.at_ns.is_none() => SILENT.into(),
-        (_, Some(phase)) if phase.is_over() || phase == Phase::Waiting => phase.name().into(),
-        (Some(process), _) => process.state.map_or("-", ModuleState::name).into(),
-        (None, _) if is_left_out(module, installation) => "left out".into(),
-        (None, _) => "dead".into(),
-    }
-}
-
-/// Whether a module does not run and need not: it is optional, and its program most likely not there.
-pub(super) fn is_left_out(module: &ModuleSurvey, installation: &Installation) -> bool {
-    module.at_ns.is_some()
-        && module.process.is_none()
-        && installation.module(module.name).is_some_and(|configured| configured.optional)
-}
-
 /// Modules as a table, one a line; of several nodes, with their nodes.
 pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     let mut all = heads(">received").to_vec();
     let mut rows: Vec<Vec<String>> =
         lines.iter().map(|line| cells(line, " ", line.received.to_string()).into()).collect();
+    // As a column only if it says anything.
+    if lines.iter().any(|line| line.account.error.is_some()) {
+        all.push("last error");
+        rows.iter_mut().zip(lines).for_each(|(row, line)| row.push(line.account.short_error(ERROR_MAX)));
+    }
     if with_nodes {
         all.insert(1, "node");
         rows.iter_mut().zip(lines).for_each(|(row, line)| row.insert(1, line.node.clone()));
@@ -96,11 +129,20 @@ pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     table_of(&all, rows)
 }
 
-/// The same for a terminal of 80 columns: faces below their module, and rates.
+/// The same for a terminal of 80 columns: faces below their module, and rates; below all, what went wrong last.
 pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
     let rate = |line: &ModuleLine| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}"));
-    table(heads(">in/s"), lines.iter().map(|line| cells(line, "\n", rate(line))))
+    let mut text = table(heads(">in/s"), lines.iter().map(|line| cells(line, "\n", rate(line))));
+    for line in lines.iter().filter(|line| line.account.error.is_some()) {
+        let room = LIVE_COLUMNS.saturating_sub(line.module.len() + 2);
+        text.push_str(&format!("{}: {}\n", line.module, line.account.short_error(room)));
+    }
+    text
 }
+
+/// As much of an error as a table shows; the whole is in JSON.
+const ERROR_MAX: usize = 100;
+const LIVE_COLUMNS: usize = 80;
 
 const HEADS: usize = 9;
 
@@ -111,17 +153,17 @@ const fn heads(received: &str) -> [&str; HEADS] {
 /// Of what does not answer, nothing is known.
 fn cells(line: &ModuleLine, gap: &str, received: String) -> [String; HEADS] {
     let faces: Vec<String> = line.faces.iter().map(|face| format!("{gap}+ {face}")).collect();
-    let known = |text: String| if line.state == SILENT { "-".into() } else { text };
+    let known = |text: String| if line.account.state == Standing::Unreachable { "-".into() } else { text };
     [
         line.module.clone() + &faces.concat(),
-        line.state.clone(),
+        line.account.state.to_string(),
         line.priority.to_string(),
         line.scheduling.clone(),
         line.pid.map_or("-".into(), |pid| pid.to_string()),
         known(received),
         known(line.waiting.to_string()),
         known(line.losses.lost.to_string()),
-        known(line.restarts.to_string()),
+        known(line.account.restarts.to_string()),
     ]
 }
 

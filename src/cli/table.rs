@@ -1,6 +1,7 @@
 //! Tables for terminals.
 
 use comfy_table::{CellAlignment, Table, presets};
+use rohrpost::output::plain;
 use std::time::Duration;
 
 /// A plain table: a line of heads, then rows; columns whose head begins with `>` stand to the right.
@@ -8,12 +9,13 @@ pub(super) fn table<const N: usize>(heads: [&str; N], rows: impl IntoIterator<It
     table_of(&heads, rows)
 }
 
-/// The same, where the number of columns depends on what there is.
+/// The same, where the number of columns depends on what there is. What others wrote stays in its line.
 pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[&str], rows: impl IntoIterator<Item = R>) -> String {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     table.set_header(heads.iter().map(|head| head.trim_start_matches('>')));
-    table.add_rows(rows.into_iter().map(Into::<Vec<String>>::into));
+    let plain = |row: R| row.into().iter().map(|cell| plain::line(cell).into_owned()).collect::<Vec<_>>();
+    table.add_rows(rows.into_iter().map(plain));
     for (column, head) in table.column_iter_mut().zip(heads) {
         column.set_padding((0, 2));
         if head.starts_with('>') {

@@ -6,6 +6,7 @@ use clap::Args;
 use rohrpost::config::Installation;
 use rohrpost::launch::{choose_node, launcher_of};
 use rohrpost::mailbox::{Name, Node, NodeError, SendError, local, node_directory};
+use rohrpost::output::plain;
 use rohrpost::survey::node_of;
 use rohrpost::{Fault, ToolLink};
 use std::path::{Path, PathBuf};
@@ -139,17 +140,30 @@ impl Running {
         self.node_of(module) == self.node_name && !self.is_beyond(module)
     }
 
-    /// Whether it is of another system, and so nowhere but at the TCP router: this configuration knows nothing of it.
+    /// Whether it is nowhere but at the TCP router: of another system, or a program of this one that the configuration does not have.
     pub(super) fn is_beyond(&self, module: Name) -> bool {
-        self.installation.tcp.is_some() && module.system() != self.installation.system.id
+        if self.installation.tcp.is_none() || module.system() != self.installation.system.id {
+            return self.installation.tcp.is_some();
+        }
+        !self.is_known(module) && !self.is_here(module)
     }
 
-    /// The module or face that a user names, or a program run by hand: one of the configuration, or with mailboxes here.
+    /// Whether the configuration has it, or has a range of tools for it.
+    fn is_known(&self, module: Name) -> bool {
+        self.installation.module(module).is_some() || module.class() == self.installation.classes.tool()
+    }
+
+    /// Whether it has mailboxes on the node that the tool takes part on.
+    fn is_here(&self, module: Name) -> bool {
+        self.node.mailboxes().is_ok_and(|all| all.iter().any(|mailbox| mailbox.module() == module))
+    }
+
+    /// The module or face that a user names, or a program run by hand: one of the configuration, with mailboxes here, of another system,
+    /// or of this one and registered at the TCP router.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
-        let classes = &self.installation.classes;
-        let module = classes.parse_name(text)?.module();
-        let known = self.installation.module(module).is_some() || module.class() == classes.tool();
-        if known || self.is_beyond(module) || self.node.mailboxes()?.iter().any(|mailbox| mailbox.module() == module) {
+        let module = self.installation.classes.parse_name(text)?.module();
+        let is_other = self.is_beyond(module) && module.system() != self.installation.system.id;
+        if is_other || self.is_known(module) || self.is_here(module) || self.is_hosted_beyond(module) {
             return Ok(module);
         }
         let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
@@ -172,7 +186,7 @@ impl Running {
             Some(_) => {
                 format!("{name} does not run, and no launch watches over it; start it as you started the others")
             }
-            None if self.is_beyond(module) => {
+            None if self.is_beyond(module) && module.system() != self.installation.system.id => {
                 format!("{name} does not run; start it in system {}, where it belongs", module.system())
             }
             None => format!(
@@ -193,7 +207,7 @@ impl Running {
         if let Some(router) = self.missing_router(&text) {
             return router;
         }
-        text.replace(&module.to_string(), &self.text(module)).into()
+        plain::line(&text.replace(&module.to_string(), &self.text(module))).into()
     }
 
     /// An error about this node's own router, without which nothing goes to other nodes.

@@ -117,7 +117,7 @@ fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
 
 /// A program calls, subscribes and is called.
 fn check_foreign(systems: &Systems, system: u8, order: &str, certificates: &[&str]) {
-    let mut program = systems.foreign(system, order, certificates);
+    let mut program = systems.foreign(&format!("{system}.96.0.0"), order, certificates);
     for line in ["takes part", "counted ", "heard 3 beats"] {
         program.wait_for(line);
     }
@@ -145,6 +145,27 @@ fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
     std::fs::write(&file, configured("python", 5, SEALED)).unwrap();
     systems.place.say(&["keys", "new", file.to_str().unwrap()]).ok();
     check_foreign(&systems, 5, "big", &["certificates", "python.system-5"]);
+    systems.stop();
+}
+
+/// Its class is one of the file, its instance is none.
+#[test]
+fn a_program_of_the_own_system_that_the_file_does_not_know_is_reached_by_its_name() {
+    let Some(systems) = Systems::launched(OPEN) else { return };
+    let mut program = systems.foreign("1.96.7.0", "little", &[]);
+    program.wait_for("takes part");
+    wait("probe.7 in the list", || {
+        let list = systems.says("north", &["list"]).ok();
+        list.lines().any(|line| line.starts_with("probe.7 ") && line.ends_with("a program in Python")).then_some(())
+    });
+    assert_eq!(systems.says("north", &["call", "probe.7", "double", "21"]).ok(), "42\n");
+    program.wait_for("doubled 21");
+    let told = systems.says("north", &["call", "probe.8", "double", "21"]).fails();
+    assert!(told.contains("the configuration has no module `probe.8`"), "nobody hosts it: {told}");
+    for module in ["probe.7", "2.probe.0.0"] {
+        let told = systems.says("north", &["hz", module, "--count", "1"]).fails();
+        assert!(told.contains("is beyond this system's nodes") && told.contains("`rohrpost echo"), "{told}");
+    }
     systems.stop();
 }
 

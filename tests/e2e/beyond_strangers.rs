@@ -41,6 +41,31 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     systems.stop();
 }
 
+/// What the TCP router says to a program of a node's system that asks for these ranges one after the other.
+fn objections(systems: &Systems, node: &str, own: &str, ranges: &[&str]) -> Vec<String> {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/python/hijack.py");
+    let digests = systems.robot(node).installation.digest().to_string();
+    let arguments = [&[page, NODES[0].1, "21119", &digests, own], ranges].concat();
+    systems.python(&arguments).said().ok().lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn a_program_gets_no_name_of_the_files_nodes_and_no_part_of_what_another_hosts() {
+    let Some(systems) = Systems::launched(OPEN) else { return };
+    let [file, around, free] = ["1.96.0.0-1.96.0.255", "1.1.0.0-1.254.255.255", "1.96.9.0-1.96.9.255"];
+    let own = objections(&systems, "north", "1.96.9.0", &[file, around, free]);
+    let expected = [(file, 3), (around, 3), (free, 0)].map(|(range, objection)| format!("{range}: {objection}"));
+    assert_eq!(own, expected, "names of the file's nodes");
+    let [whole, inside, beside] = ["2.96.0.0-2.96.0.255", "2.96.0.1-2.96.0.1", "2.90.0.0-2.99.255.255"];
+    let other = objections(&systems, "south", "2.96.9.0", &[whole, inside, beside]);
+    let by = "node south of south";
+    let expected =
+        [(whole, 1), (inside, 1), (beside, 2)].map(|(range, objection)| format!("{range}: {objection} {by}"));
+    assert_eq!(other, expected, "names that another hosts");
+    check_crossing(&systems);
+    systems.stop();
+}
+
 #[test]
 fn a_robot_starts_without_its_certificates_and_takes_part_when_they_are_there() {
     let place = Place::new();

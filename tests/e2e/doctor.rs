@@ -51,6 +51,7 @@ fn the_network_of_a_configuration_is_examined() {
     let is = |what: &str| find(&findings, what)["is"].as_str().unwrap();
     assert!(is("node address").starts_with("127.251.7.1"), "{}", is("node address"));
     assert_eq!((is("port of packages"), is("port of time")), ("UDP 21117, free", "UDP 21118, free"));
+    assert_eq!(is("port of the rest"), "UDP 21119, free");
     assert_eq!(is("time stamps"), "sending and receiving");
     assert_eq!(is("peer"), "arm at 127.251.7.2: is there; no router runs on it yet");
     assert!(is("packet size").starts_with("1500 B of the 65"), "{}", is("packet size"));
@@ -67,6 +68,80 @@ fn the_network_of_a_configuration_is_examined() {
     assert!(mend.contains("base") && mend.contains("elsewhere.toml"), "{mend}");
     assert_eq!(find(&findings, "port of time")["is"], "UDP 21118, not tried");
     place.assert_empty();
+}
+
+/// What the file says of security is told, as text and as JSON, and whether what that takes is here.
+#[test]
+fn the_security_of_a_configuration_is_told() {
+    let place = Place::new();
+    let nodes = |security: &str, tcp: &str| {
+        let node = |name: &str, host: u8, tools: &str| {
+            format!("[nodes.{name}]\naddress = \"127.251.8.{host}\"\ntools = {tools}\n")
+        };
+        let text = node("base", 1, "[0, 3]") + &node("arm", 2, "[4, 7]");
+        format!(
+            "{text}[network]\nsecurity = \"{security}\"\n[tcp]\naddress = \"127.251.8.1\"\n{tcp}\n[time]\nsource = \"master\"\n"
+        )
+    };
+    let module = probe("probe.0", "", "node = \"arm\"");
+    let config = |security: &str, tcp: &str| {
+        let file = place.config_of("test", &nodes(security, tcp), &[&module]);
+        // The class of clients of the TCP router, which other tests do not need.
+        let text = std::fs::read_to_string(&file).unwrap().replacen("[classes]", "[classes]\ntcp = { id = 249 }", 1);
+        std::fs::write(&file, text).unwrap();
+        file
+    };
+    let told = |file: &std::path::Path| {
+        let file = file.to_str().unwrap();
+        let findings = examine(&place, &["--config", file, "--node", "base"]);
+        let page = place.say(&["doctor", "--config", file, "--node", "base"]).out;
+        ["network security", "TCP security"].map(|what| {
+            let found = find(&findings, what);
+            let (state, is) = (found["state"].as_str().unwrap(), found["is"].as_str().unwrap());
+            assert!(page.contains(&format!("{state:4}  {what:<18}{is}\n")), "{what}: {found} and {page}");
+            (state.to_owned(), is.to_owned())
+        })
+    };
+    let open = config("none", "security = \"none\"");
+    for (state, is) in told(&open) {
+        assert_eq!((&*state, is.starts_with("none, as ")), ("warn", true), "{is}");
+    }
+    let sealed = config("keys", "security = \"tls\"\ncertificates = \"certificates\"");
+    let [lan, tcp] = told(&sealed);
+    assert!(lan.0 == "bad" && lan.1.contains("udp.keys"), "{lan:?}");
+    assert!(tcp.0 == "bad" && tcp.1.contains("certificates/ca.pem"), "{tcp:?}");
+    assert_eq!(place.say(&["keys", "new", sealed.to_str().unwrap()]).code, Some(0));
+    let [lan, tcp] = told(&sealed);
+    assert!(lan.0 == "ok" && lan.1.starts_with("key 1 of ") && lan.1.contains("udp.keys"), "{lan:?}");
+    assert!(tcp.0 == "ok" && tcp.1.starts_with("TLS 1.3 with certificates in "), "{tcp:?}");
+    // Of another node, nothing is needed here.
+    for file in ["arm.system-1.pem", "arm.system-1.key"] {
+        std::fs::remove_file(place.path("certificates").join(file)).unwrap();
+    }
+    assert_eq!(told(&sealed)[1].0, "ok");
+    std::fs::remove_file(place.path("certificates").join("base.system-1.key")).unwrap();
+    let [_, tcp] = told(&sealed);
+    assert!(tcp.0 == "bad" && tcp.1.contains("base.system-1.key"), "{tcp:?}");
+}
+
+/// Whoever launched the bridge may have had another PATH.
+#[test]
+fn a_bridge_that_runs_is_found() {
+    let place = Place::new();
+    let bridge = place.path("bin/rohrpost-gui-bridge");
+    std::fs::create_dir(bridge.parent().unwrap()).unwrap();
+    std::fs::copy(std::env::current_exe().unwrap(), &bridge).unwrap();
+    let found = |arguments: &[&str]| find(&examine(&place, arguments), "GUI bridge").clone();
+    let module =
+        probe("probe.0", "", "").replace(std::env::current_exe().unwrap().to_str().unwrap(), "bin/rohrpost-gui-bridge");
+    assert!(module.contains("[\"bin/"), "{module}");
+    let config = place.config(&[&module]);
+    // A bridge of the tests' own may be on the PATH; this one is not.
+    assert_ne!(found(&[])["is"], bridge.to_str().unwrap());
+    assert_eq!(found(&["--config", config.to_str().unwrap()])["is"], bridge.to_str().unwrap());
+    let (_launch, robot) = place.launched(&[&module]);
+    let is = format!("{}, process {}", bridge.display(), robot.pid("probe.0"));
+    assert_eq!(found(&[])["is"], is.as_str());
 }
 
 #[test]

@@ -1,9 +1,34 @@
 //! `graph`: who sends what to whom, as a table, as JSON, and drawn.
 
-use crate::harness::{PATIENCE, Place, probe, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, probe, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use serde_json::Value;
+
+/// A mailbox of a module's own takes data, whichever local id it has; output lines go to the collector alone.
+#[test]
+fn data_in_a_mailbox_of_ones_own_are_named() {
+    let place = Place::new();
+    let modules = [
+        OUTPUT,
+        &probe("probe.0", "rate-hz = 50.0, blob-hz = 50.0", ""),
+        &probe("probe.1", "hears = \"probe.0\"", "calls = [\"probe.0\"]"),
+        &probe("probe.2", "watches = \"probe.0\"", "calls = [\"probe.0\"]"),
+    ];
+    let (_launch, _robot) = place.launched(&modules);
+    place.say(&["call", "probe.1", "say", "info", "a line"]).ok();
+    let graph = place.say(&["graph", "--seconds", "0.5", "--silent", "--json"]).json();
+    let flows = |to: &str| {
+        let edges = graph["edges"].as_array().unwrap().iter().filter(|edge| edge["to"] == to);
+        let sent = edges.filter(|edge| edge["carries"] == "data" || edge["carries"] == "output");
+        sent.map(|edge| ["from", "carries", "what"].map(|key| edge[key].as_str().unwrap().to_owned()))
+            .collect::<Vec<_>>()
+    };
+    let data = |name: &str| ["probe.0", "data", name].map(str::to_owned);
+    assert_eq!(flows("probe.1"), [data("beat")], "its data mailbox, and one of its own");
+    assert_eq!(flows("probe.2"), [data("blob")]);
+    assert!(flows("output.0").contains(&["probe.1", "output", "lines"].map(str::to_owned)), "{:?}", flows("output.0"));
+}
 
 #[test]
 fn graph_shows_who_sends_what_to_whom() {

@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
+mod access;
 mod all_nodes;
 mod bench;
 mod beyond;
@@ -21,9 +22,12 @@ mod far;
 mod faults;
 mod graph;
 mod harness;
+mod hostile;
+mod hostile_texts;
 mod lan;
 mod lan_tools;
 mod launch;
+mod lines;
 mod looks;
 mod mailbox;
 mod mailboxes;
@@ -44,6 +48,7 @@ mod readme;
 mod restart;
 mod screen;
 mod start;
+mod stuck;
 mod subscribe;
 mod systems;
 mod takeover;

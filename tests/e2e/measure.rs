@@ -3,7 +3,7 @@
 use crate::harness::{PATIENCE, Place, Robot, patient, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
-use rohrpost::common::{SUBSCRIBE, Subscribe};
+use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe};
 use rohrpost::macro_support::append;
 use rohrpost::mailbox::{Receiver, local, monotonic_ns};
 use serde_json::Value;
@@ -71,7 +71,7 @@ fn figures_agree_with_a_known_source() {
     let place = Place::new();
     let (_launch, robot) = place.launched(&[&probe("probe.0", "blob-hz = 150.0", "start = \"off\"")]);
     let mut tool = robot.tool(PATIENCE);
-    let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 600_000, mailbox: local::DATA };
+    let wish = Subscribe { number: 3, id: 1, period_us: 0, lease_ms: 60_000, mailbox: local::DATA };
     tool.data().unwrap();
     let write = |body: &mut Vec<u8>| append(body, &wish);
     wait("probe.0 is ready", || (robot.state("probe.0") == "off").then_some(()));
@@ -157,7 +157,10 @@ fn figures_agree_with_a_known_source() {
         last(bw_in, |line| line["direction"] == "in" && line["packages"] == all)
     });
     assert_eq!(line["bytes"], taken.iter().map(|taken| taken.bytes).sum::<u64>());
-    assert_eq!((&line["bytes_min"], &line["bytes_max"]), (&(11 + 16).into(), &(101 + 16).into()));
+    assert_eq!(
+        (&line["bytes_min"], &line["bytes_max"]),
+        (&(11 + DataHead::BYTES).into(), &(101 + DataHead::BYTES).into())
+    );
 
     let row = wait("delay has counted all", || {
         let line = last(delay, |_| true)?;

@@ -3,6 +3,7 @@
 use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::{COUNT, COUNT_AGAIN, ProbingInterface};
 use nix::sys::signal::Signal;
+use rohrpost::common;
 use rohrpost::launch::{ControlError, LauncherInterface};
 use rohrpost::mailbox::{Full, Label, Name, Options, Participant, Receiver, Sender, Shape, Type, local};
 use rohrpost::serde::{Serialize, de::DeserializeOwned};
@@ -129,11 +130,15 @@ fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
         let (envelope, result) = raw.answer();
         assert_eq!((envelope, result), (ReplyEnvelope { incarnation, sequence }, Ok(u64::from(number))));
     }
-    // Late packages of the earlier life: one that ran, and one that never came before.
-    raw.send(COUNT, Raw::envelope(7, 2, 500), 5);
-    raw.send(COUNT, Raw::envelope(7, 3, 0), 6);
+    // Late packages of the earlier life: one that ran, and one that never came before. If that life is none, but a program whose node's
+    // clock was set back, it learns why it is not served.
+    for (sequence, age_us, number) in [(2, 500, 5), (3, 0, 6)] {
+        raw.send(COUNT, Raw::envelope(7, sequence, age_us), number);
+        let refused = (ReplyEnvelope { incarnation: 7, sequence }, Err(Fault::EarlierIncarnation));
+        assert_eq!(raw.answer(), refused);
+    }
     raw.send(COUNT, Raw::envelope(8, 3, 0), 7);
-    assert_eq!(raw.answer().0, ReplyEnvelope { incarnation: 8, sequence: 3 }, "the others are answered with silence");
+    assert_eq!(raw.answer().0, ReplyEnvelope { incarnation: 8, sequence: 3 });
     // The same with real tools: each is a new life under the same name, with numbers from 1 on.
     for number in 8..=10u32 {
         place.say(&["call", "probe.0", "count", &number.to_string()]).ok();
@@ -302,4 +307,26 @@ fn callers_in_a_crowd_before_a_small_mailbox_and_a_halting_server_never_run_twic
         }] += 1;
     }
     assert!(seen[0] > 0 && seen[1] > 0, "too calm to prove anything: {seen:?}");
+}
+
+/// As docs/src/wire.md says, of the common functions too.
+#[test]
+fn what_follows_the_arguments_is_refused_and_nothing_is_run() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let mut tool = robot.tool(PATIENCE);
+    let module = robot.name("probe.0");
+    let write = |body: &mut Vec<u8>| {
+        body.push(0);
+        Ok(())
+    };
+    for function in [common::OFF, common::ON, common::STATUS, common::TIME] {
+        match tool.call(module, function, common::HASH, write, |_| Ok(())) {
+            Err(CallError::Fault(_, Fault::Arguments(why))) => assert_eq!(why, "1 bytes too many"),
+            other => panic!("{function}: {other:?}"),
+        }
+    }
+    assert_eq!(robot.state("probe.0"), "on");
+    tool.close();
+    launch.stop();
 }

@@ -12,10 +12,10 @@ fn log(place: &Place, arguments: &[&str]) -> crate::process::Said {
     place.say(&[&PATIENT, arguments].concat())
 }
 
-/// What was said, without time and node, and without the modules' own words.
+/// What was said, without time and node, without the modules' own words, and without what `log` says of lines that are gone.
 fn shown(place: &Place, arguments: &[&str]) -> Vec<String> {
     let text = log(place, arguments).ok();
-    let said = text.lines().map(|line| line.split_once("main/").unwrap().1);
+    let said = text.lines().filter(|line| !line.starts_with('…')).map(|line| line.split_once("main/").unwrap().1);
     said.filter(|line| !is_own(line.split_once(": ").unwrap().1)).map(str::to_owned).collect()
 }
 

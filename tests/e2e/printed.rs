@@ -69,13 +69,16 @@ fn a_panic_comes_once_and_its_back_trace_with_it() {
     });
     let panics = errors.iter().filter(|text| text.contains("two lines"));
     assert_eq!(panics.count(), 1, "{errors:#?}");
+    let is_trace = |text: &str| text.contains("/tests/e2e/probe.rs:") && !text.contains("panicked");
+    let all = lines(&place, "probe.0");
     assert!(
-        errors.iter().any(|text| text.contains("tests/e2e/probe.rs:") && !text.contains("panicked")),
-        "{errors:#?}"
+        all.iter().all(|line| !is_trace(line["text"].as_str().unwrap())),
+        "where it came from is no output: {all:#?}"
     );
     let out = launch.stop();
     assert!(out.contains("error thread `probe::module` panicked at tests/e2e/probe.rs:"), "{out}");
-    assert!(!out.contains('\u{1e}'), "marks are for launch only: {out:?}");
+    assert!(out.lines().any(is_trace), "{out}");
+    assert!(!out.contains(['\u{1d}', '\u{1e}']), "marks are for launch only: {out:?}");
 }
 
 #[test]
@@ -133,4 +136,24 @@ fn without_a_collector_launch_repeats_errors() {
     drop(dying);
     let out = launch.stop();
     assert!(out.contains("\n    error nobody collects this\n    no more oil\n"), "{out}");
+}
+
+#[test]
+fn the_back_trace_of_a_panic_that_comes_again_and_again_is_told_once_with_the_own_frames() {
+    let place = Place::new();
+    let restart = "restart = { backoff = \"1 ms\", at-most = 3 }";
+    let config = place.config(&[OUTPUT, &probe("probe.0", "panic-at-start = true", restart)]);
+    let mut command = place.command(&["launch", "--quiet", config.to_str().unwrap()]);
+    command.env("RUST_BACKTRACE", "1");
+    let said = Running::start(command).said();
+    assert_eq!(said.code, Some(1), "{said:?}");
+    let all = said.out + &said.err;
+    let count = |text: &str| all.lines().filter(|line| line.contains(text)).count();
+    assert!(count("panicked at tests/e2e/probe.rs:") >= 4, "each end says why: {all}");
+    let place_of_panic = all.lines().find_map(|line| line.split("panicked at ").nth(1)).unwrap();
+    let traced = format!("/{}", place_of_panic.trim_end_matches(':'));
+    assert_eq!(count(&traced), 1, "{traced} in {all}");
+    for others in ["/rustc/", "modules/src/", "std::panicking"] {
+        assert_eq!(count(others), 0, "{others}: {all}");
+    }
 }

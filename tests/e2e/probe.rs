@@ -36,6 +36,9 @@ pub(crate) const WORK: u16 = 23;
 /// A mailbox of its own, of policy `latest`.
 pub(crate) const NEWEST: u8 = 3;
 
+/// See [`Settings::mixes`].
+pub(crate) const SWAPPED: &str = "swapped";
+
 /// Why a probe refuses.
 #[rohrpost::data]
 #[derive(Debug, Clone, PartialEq)]
@@ -137,10 +140,14 @@ pub(crate) struct Settings {
     wait_for: Option<PathBuf>,
     refuse_at_start: bool,
     refuse_on: bool,
+    /// Publishes data of an interface that it does not serve.
+    foreign_data: bool,
     /// Stops itself as Ctrl-Z would, before it is ready.
     hang_at_start: bool,
     /// Hears each beat of this probe twice: in its data mailbox, and in [`NEWEST`].
     hears: Option<String>,
+    /// Hears each beat and each blob of this probe in its data mailbox; in the other order if there is a file [`SWAPPED`].
+    mixes: Option<String>,
     /// Does nothing on any signal that asks it to end.
     ignore_stop: bool,
 }
@@ -163,6 +170,7 @@ pub(crate) struct Probe {
     /// Each, and the newest.
     hears: Option<[Subscription<u64>; 2]>,
     watches: Option<Subscription<Vec<u8>>>,
+    mixes: Option<(Subscription<u64>, Subscription<Vec<u8>>)>,
 }
 
 impl Probe {
@@ -216,6 +224,17 @@ fn watch(from: &str, context: &mut Context) -> Result<Subscription<Vec<u8>>, Mod
     Ok(context.subscribe_in(NEWEST, ProbingInterface::BLOB, from, Rate::Each)?)
 }
 
+/// Follows another probe's beats and blobs, in one order or the other.
+fn mix(from: &str, context: &mut Context) -> Result<(Subscription<u64>, Subscription<Vec<u8>>), ModuleError> {
+    let beats = |context: &mut Context| context.subscribe(ProbingInterface::BEAT, from, Rate::Each);
+    let blobs = |context: &mut Context| context.subscribe(ProbingInterface::BLOB, from, Rate::Each);
+    if context.path(SWAPPED).exists() {
+        let blobs = blobs(context)?;
+        return Ok((beats(context)?, blobs));
+    }
+    Ok((beats(context)?, blobs(context)?))
+}
+
 impl Module for Probe {
     type Settings = Settings;
     type Interfaces = ProbingInterface;
@@ -227,7 +246,8 @@ impl Module for Probe {
         context.set_period(Duration::from_secs_f64(1.0 / rate_hz));
         let hears = settings.hears.as_deref().map(|from| hear(from, context)).transpose()?;
         let watches = settings.watches.as_deref().map(|from| watch(from, context)).transpose()?;
-        let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None, hears, watches };
+        let mixes = settings.mixes.as_deref().map(|from| mix(from, context)).transpose()?;
+        let probe = Self { settings, record, me, counted: 0, beats: 0, leave: None, hears, watches, mixes };
         probe.note("start");
         if probe.settings.panic_at_start {
             panic!("a probe was asked to panic");
@@ -271,6 +291,10 @@ impl Module for Probe {
                 self.note(&format!("{which} {beat}"));
             }
         }
+        if let Some((beats, blobs)) = self.mixes {
+            data.read(&beats).iter().for_each(|beat| self.note(&format!("mixed beat {beat}")));
+            data.read(&blobs).iter().for_each(|blob| self.note(&format!("mixed blob {}", blob.len())));
+        }
         if let Some(blob) = self.watches.as_ref().and_then(|watched| data.read(watched)) {
             let word = |at: usize| u64::from_le_bytes(blob[at..at + 8].try_into().unwrap());
             let age_us = rohrpost::mailbox::monotonic_ns().saturating_sub(word(8)) / 1000;
@@ -284,6 +308,10 @@ impl Module for Probe {
             std::process::exit(code);
         }
         self.beats += 1;
+        if self.settings.foreign_data {
+            let noise = rohrpost::interface::DataPort::<u64>::new("probe", 9, "noise", || 0);
+            context.publish_now(noise, &self.beats)?;
+        }
         if self.settings.rate_hz > 0.0 {
             context.publish_now(ProbingInterface::BEAT, &self.beats)?;
         }

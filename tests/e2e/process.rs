@@ -1,8 +1,10 @@
 //! A process that a test started, and what it says.
 
 use crate::harness::{PATIENCE, signal};
+use nix::sys::resource::{Resource, setrlimit};
 use nix::sys::signal::Signal;
 use std::io::{BufRead, BufReader, Read};
+use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -67,6 +69,19 @@ impl Printed {
         });
         Self { text, reader }
     }
+}
+
+/// Takes the right to real time from a command, also where root runs the tests.
+pub(crate) fn without_real_time(command: &mut Command) {
+    const CAP_SYS_NICE: nix::libc::c_ulong = 23;
+    let give_up = || {
+        // SAFETY: a system call with a number; it touches no memory. Who is not root has no such right, and may not do this.
+        unsafe { nix::libc::prctl(nix::libc::PR_CAPBSET_DROP, CAP_SYS_NICE, 0, 0, 0) };
+        setrlimit(Resource::RLIMIT_RTPRIO, 0, 0)?;
+        Ok(())
+    };
+    // SAFETY: between fork and exec it makes two system calls and nothing else.
+    unsafe { command.pre_exec(give_up) };
 }
 
 impl Running {

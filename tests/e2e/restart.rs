@@ -99,7 +99,7 @@ fn a_stopped_module_does_not_keep_its_launch_from_watching_others() {
     let status = place.say(&["status", "--timeout", "0.3"]);
     assert_eq!(status.code, Some(1));
     let silent = status.out.lines().find(|line| line.starts_with("probe.0")).unwrap();
-    assert!(silent.contains("silent") && silent.contains("no answer from"), "{silent}");
+    assert!(silent.contains("unreachable") && silent.contains("no answer from"), "{silent}");
     launch.stop();
 }
 

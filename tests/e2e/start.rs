@@ -14,7 +14,8 @@ fn a_module_that_does_not_start_is_named_and_nothing_is_left() {
         ("speed = 3", restart, ["test.toml:", "speed"]),
     ] {
         let place = Place::new();
-        let config = place.config(&[&probe("probe.0", "", ""), &probe("probe.1", settings, keys)]);
+        let config = place
+            .config(&[&probe("probe.0", "", ""), &probe("probe.1", settings, &format!("required = true\n{keys}"))]);
         let said = place.say(&["launch", config.to_str().unwrap()]);
         assert_eq!(said.code, Some(1), "{settings}: {said:?}");
         let told = said.err;
@@ -62,7 +63,9 @@ fn a_module_that_does_not_switch_on_is_in_error_and_the_others_work() {
     let refused = place.say(&["call", "probe.0", "count", "1"]).fails();
     assert!(refused.contains("a probe was asked not to work"), "{refused}");
     place.say(&["status", "probe.1"]).ok();
-    launch.stop();
+    launch.signal(Signal::SIGINT);
+    assert_eq!(launch.end().code(), Some(1), "somebody is in error");
+    assert!(launch.err().contains("probe.0 is in error: a probe was asked not to work"), "{}", launch.err());
 }
 
 #[test]

@@ -1,12 +1,13 @@
-//! Who subscribes says into which of its mailboxes the data go.
+//! Who subscribes says into which of its mailboxes the data go, and takes there what it asked for, and nothing else.
 
 use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
-use crate::probe::{NEWEST, ProbingInterface};
+use crate::probe::{NEWEST, ProbingInterface, SWAPPED};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
-use rohrpost::common::{GET_DATA, SUBSCRIBE, Subscribe};
+use rohrpost::common::{DataHead, GET_DATA, Refused, SUBSCRIBE, Subscribe};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{Loss, local};
+use rohrpost::mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
+use rohrpost_modules::call::CallEnvelope;
 
 /// The newest beat that has been published: whoever subscribed to each of them has been sent it.
 fn beat(robot: &Robot, tool: &mut ToolLink) -> u64 {
@@ -76,6 +77,91 @@ fn data_do_not_go_where_commands_and_replies_go() {
         assert!(why.contains(&format!("mailbox {mailbox} takes no data; name 2 or one above")), "{why}");
     }
     assert_eq!(tool.status(robot.name("probe.0")).unwrap().subscribers, 0);
+    tool.close();
+    launch.stop();
+}
+
+/// Asks `probe.1` what it did not take until that is this.
+fn refuses(robot: &Robot, tool: &mut ToolLink, expected: Refused) {
+    let module = robot.name("probe.1");
+    wait(format!("{expected:?}"), || (tool.status(module).ok()?.refused == expected).then_some(()));
+}
+
+#[test]
+fn data_that_nobody_asked_for_are_dropped_and_counted_by_cause() {
+    let place = Place::new();
+    // The test itself is the publisher: so it knows what was asked for, and can send all but that.
+    let (mut launch, robot) = place.launched(&[&probe("probe.1", "hears = \"probe.7\"", "")]);
+    let mut tool = robot.tool(PATIENCE);
+    let (module, publisher) = (robot.name("probe.1"), robot.name("probe.7"));
+    let mut asked = Participant::join(&robot.node, publisher).unwrap().receiver(publisher, Shape::default()).unwrap();
+    let (incarnation, wish) = wait("it subscribes", || {
+        let package = asked.receive_timeout(PATIENCE)?;
+        let (envelope, arguments) = CallEnvelope::split(package.body()).unwrap();
+        let wish: Subscribe = from_bytes(arguments).unwrap();
+        (package.head().kind.kind() == Kind::Command(SUBSCRIBE) && wish.mailbox == local::DATA)
+            .then_some((envelope.incarnation, wish))
+    });
+    let mut send = |from: Name, id: u16, number: u16, incarnation: u32, beat: u64| {
+        let head = DataHead { stamp_ns: 1, sequence: beat as u32, missed: 0, incarnation };
+        let mut body = head.to_bytes().to_vec();
+        append(&mut body, &beat).unwrap();
+        let label = Label { from, id, kind: Type::data(number), options: Options::STAMPED, ..Label::default() };
+        tool.link.send(module.with_local(local::DATA), &label, &[&body]).unwrap();
+    };
+    let Subscribe { id, number, .. } = wish;
+    let stranger = Name::new(2, publisher.class().0, publisher.instance(), 0);
+    send(stranger, id, number, incarnation, 1);
+    send(robot.name("probe.1"), id, number, incarnation, 2);
+    send(publisher, id + 7, number, incarnation, 3);
+    // Of the other subscription, whose data go to another mailbox.
+    send(publisher, 0, number, incarnation, 4);
+    send(publisher, id, number + 1, incarnation, 5);
+    send(publisher, id, number, incarnation - 1, 6);
+    send(publisher, id, number, 0, 7);
+    send(publisher, id, number, incarnation, 8);
+    let label = Label { from: publisher, kind: Type::data(number), ..Label::default() };
+    tool.link.send(module.with_local(local::DATA), &label, &[b"short"]).unwrap();
+    tool.link.send(module, &label, &[b"no command"]).unwrap();
+    let expected = Refused {
+        other_publisher: 2,
+        unasked: 2,
+        other_number: 1,
+        earlier_life: 2,
+        malformed: 2,
+        ..Refused::default()
+    };
+    refuses(&robot, &mut tool, expected);
+    wait("what it asked for comes", || (!heard(&place, "each").is_empty()).then_some(()));
+    assert_eq!((heard(&place, "each"), heard(&place, "newest")), (vec![8], vec![]));
+    tool.close();
+    launch.stop();
+}
+
+#[test]
+fn a_subscriber_that_restarts_with_its_subscriptions_in_another_order_takes_no_other_type() {
+    let place = Place::new();
+    const BLOB: u64 = 3000;
+    let settings = format!("rate-hz = 100.0, blob-hz = 100.0, blob-bytes = {BLOB}");
+    let (mut launch, robot) = place.launched(&[
+        &probe("probe.0", &settings, ""),
+        &probe("probe.1", "mixes = \"probe.0\"", "calls = [\"probe.0\"]"),
+    ]);
+    let mut tool = robot.tool(PATIENCE);
+    let mixed = |what: &str| heard(&place, &format!("mixed {what}"));
+    wait("it hears both", || (!mixed("beat").is_empty() && !mixed("blob").is_empty()).then_some(()));
+    std::fs::write(place.path(SWAPPED), "").unwrap();
+    let pid = robot.pid("probe.1");
+    let before = mixed("beat").len();
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("probe.1", pid);
+    wait("it hears again", || (mixed("beat").len() > before + 20).then_some(()));
+    // What its earlier life asked for came to it, and the beats are the publisher's own.
+    let refused = tool.status(robot.name("probe.1")).unwrap().refused;
+    let said = place.record().join("\n");
+    assert!(refused.earlier_life + refused.other_number > 0, "{refused:?}: nothing of before came");
+    assert!(mixed("beat").windows(2).all(|two| two[0] < two[1]) && mixed("beat").last() < Some(&BLOB), "{said}");
+    assert!(mixed("blob").iter().all(|blob| *blob == BLOB), "{said}");
     tool.close();
     launch.stop();
 }

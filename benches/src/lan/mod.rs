@@ -11,6 +11,7 @@
 pub mod chain;
 pub mod ends;
 pub mod flow;
+pub mod junk;
 pub mod load;
 pub mod nodes;
 pub mod router;

@@ -19,17 +19,42 @@ impl Wire {
         Lab::new(&[node(End::Ping), node(End::Pong)], mtu).map(|lab| Self { lab }).map_err(failure)
     }
 
+    /// The same with a third computer on it, which is no node.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_stranger(mtu: u16) -> Result<Self, Failure> {
+        let node = |end| NodeSpec { name: name_of(end).into(), address: address(end) };
+        let stranger = NodeSpec { name: STRANGER.into(), address: Ipv4Addr::new(10, 117, 0, 3).into() };
+        Lab::new(&[node(End::Ping), node(End::Pong), stranger], mtu).map(|lab| Self { lab }).map_err(failure)
+    }
+
+    /// The calling process goes to the third computer, and stays.
+    ///
+    /// # Errors
+    /// When it may not.
+    pub fn enter_stranger(&self) -> Result<(), Failure> {
+        self.go(STRANGER)
+    }
+
     /// The calling process goes to this end, and stays: what it opens and starts from now on is there.
     ///
     /// # Errors
     /// When it may not.
     pub fn enter(&self, end: End) -> Result<(), Failure> {
-        let inside = self.lab.enter(name_of(end)).map_err(failure)?;
+        self.go(name_of(end))
+    }
+
+    fn go(&self, place: &str) -> Result<(), Failure> {
+        let inside = self.lab.enter(place).map_err(failure)?;
         // Dropped, it would lead out again.
         std::mem::forget(inside);
         Ok(())
     }
 }
+
+/// The third computer.
+const STRANGER: &str = "stranger";
 
 /// Lets this process make such networks, also if it is not root's. First thing in `main`; where it is refused, the cases say so.
 pub fn prepare() {

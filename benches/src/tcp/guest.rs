@@ -5,6 +5,7 @@ use super::tally::Tally;
 use crate::harness::{End, Failure};
 use nix::sys::epoll::{Epoll, EpollEvent, EpollFlags};
 use rohrpost_mailbox::{Head, Name, Options, Priority, Type, monotonic_ns};
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
 use rohrpost_routers::session::client::{Client, ClientSettings, Event, Host, Output, Package};
 use rohrpost_routers::session::frame::{Carried, Range};
@@ -55,6 +56,7 @@ impl Guest {
             life: u64::from(index) + 1,
             quota_bytes: QUOTA_BYTES,
             levels: LEVELS,
+            admission: Admission::default(),
         };
         let own = guest(index);
         let client = Client::new(settings, vec![Range { first: own, last: own }], now_ns);

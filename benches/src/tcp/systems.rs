@@ -206,9 +206,9 @@ pub fn bench(end: End, turn: u8) -> Name {
     Name::new(system_of(end), BENCH.0, 0, turn)
 }
 
-/// The mailbox of a session of the crowd, which are all of the second system.
+/// The mailbox of a session of the crowd, which are all of the second system. Not of its module's names: those are its node's.
 pub fn guest(index: u16) -> Name {
-    let [instance, local] = index.to_be_bytes();
+    let [instance, local] = (index + 256).to_be_bytes();
     Name::new(system_of(End::Pong), BENCH.0, instance, local)
 }
 

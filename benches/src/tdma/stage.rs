@@ -1,6 +1,7 @@
 //! The network: a namespace for each node and for two bystanders, joined by a bridge.
 
 use crate::Failure;
+use crate::lan::junk::Junk;
 use crate::lan::load::Load;
 use crate::lan::udp::Datagrams;
 use crate::lan::wire::failure;
@@ -78,6 +79,14 @@ impl Stage {
     /// When it may not.
     pub fn enter_bridge(&self) -> Result<(), Failure> {
         self.lab.enter_bridge().map(std::mem::forget).map_err(failure)
+    }
+
+    /// Junk to ports of the last node, from an address that no node has.
+    ///
+    /// # Errors
+    /// When there can be no further process, or no socket.
+    pub fn junk(&self, ports: &[u16]) -> Result<Junk, Failure> {
+        Junk::start(|| self.enter(Place::Flooder), Place::Node(NODES - 1).address(), ports)
     }
 
     /// Work on both processors, and a flood across the bridge from one bystander to the other.

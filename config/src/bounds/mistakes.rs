@@ -47,10 +47,12 @@ mod switch {
         OneSlotFirst,
         /// Routers say nothing to each other, and slots are begun in time.
         SaysNothing,
+        /// The time of the slots goes as fast as the clocks of the computers.
+        ForgetsBend,
     }
 
     impl Mistake {
-        pub(crate) const ALL: [Self; 8] = [
+        pub(crate) const ALL: [Self; 9] = [
             Self::CatchesTheSlot,
             Self::WastesNothing,
             Self::ForgetsOwn,
@@ -59,6 +61,7 @@ mod switch {
             Self::FirstOnly,
             Self::OneSlotFirst,
             Self::SaysNothing,
+            Self::ForgetsBend,
         ];
     }
 

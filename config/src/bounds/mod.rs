@@ -16,7 +16,7 @@ use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::network::LEVEL_NOT_REAL_TIME;
 use crate::tdma::{LATE, Tdma, TimeSlot, cycles};
-use crate::wire::Link;
+use crate::wire::{BEND_MAX_PER, Link, RATE_MAX_PER};
 use response::{Ahead, Never, Stream, Supply, Window};
 use rohrpost_mailbox::Priority;
 use std::time::Duration;
@@ -169,6 +169,7 @@ fn supply(installation: &Installation, tdma: &Tdma, link: &Link, node: u8) -> Su
         said_ns: link.said_ns(tdma, installation.lan_nodes().len(), installation.time.masters().len()),
         taken_before_ns: ns(TAKEN_BEFORE),
         late_ns: ns(LATE),
+        bends_ns_s: (1_000_000_000 / BEND_MAX_PER + 1_000_000_000 / RATE_MAX_PER).into(),
     }
 }
 

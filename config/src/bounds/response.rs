@@ -37,6 +37,8 @@ pub(crate) struct Supply {
     pub(crate) taken_before_ns: u64,
     /// A slot may be begun so late, ns.
     pub(crate) late_ns: u64,
+    /// Slots keep to a time that is bent: by the clock of what publishes it may go so much slower, or faster, ns a second.
+    pub(crate) bends_ns_s: u64,
 }
 
 /// One slot of a round.
@@ -128,10 +130,17 @@ pub(crate) enum Never {
 }
 
 impl Supply {
+    /// By a clock that goes as much faster than the time of the slots as it can: then most is published between two, and it waits longest.
     fn begin_ns(&self, index: usize) -> u64 {
         let round = index / self.windows.len();
         // One round ahead, so that what is taken before the first slot is no negative time.
-        (round as u64 + 1) * self.repeats_ns + self.windows[index % self.windows.len()].begin_ns
+        let begin_ns = (round as u64 + 1) * self.repeats_ns + self.windows[index % self.windows.len()].begin_ns;
+        begin_ns + self.bent_by_ns(begin_ns)
+    }
+
+    fn bent_by_ns(&self, for_ns: u64) -> u64 {
+        let bends_ns_s = if mistake!(ForgetsBend) { 0 } else { self.bends_ns_s };
+        (u128::from(for_ns) * u128::from(bends_ns_s)).div_ceil(u128::from(SECOND_NS)) as u64
     }
 
     /// Up to this time, what is published is found by a slot.
@@ -139,8 +148,16 @@ impl Supply {
         self.begin_ns(index).saturating_sub(self.taken_before_ns)
     }
 
+    /// By a clock that goes as much slower: what a slot holds then is least.
     fn sends_ns(&self, index: usize) -> u64 {
-        self.windows[index % self.windows.len()].sends_ns
+        let sends_ns = self.windows[index % self.windows.len()].sends_ns;
+        sends_ns - self.bent_by_ns(sends_ns)
+    }
+
+    /// When a slot's guard begins at the latest, counted from its beginning.
+    fn ends_ns(&self, index: usize) -> u64 {
+        let sends_ns = self.windows[index % self.windows.len()].sends_ns;
+        sends_ns + self.bent_by_ns(sends_ns)
     }
 
     /// Time for packages.
@@ -234,7 +251,8 @@ impl Analysis<'_> {
         }
         let asked = self.streams().map(|stream| a_second(stream.work(1), stream.period_ns, u128::div_ceil));
         let asked: Work = asked.sum();
-        let carried = a_second(carried, self.supply.repeats_ns, std::ops::Div::div);
+        let repeats_ns = self.supply.repeats_ns + self.supply.bent_by_ns(self.supply.repeats_ns);
+        let carried = a_second(carried, repeats_ns, std::ops::Div::div);
         if asked.ns >= carried.ns && asked.datagrams >= carried.datagrams {
             return Err(Never::Overload { asked_ns_s: asked.ns / 1000, carried_ns_s: carried.ns / 1000 });
         }
@@ -296,7 +314,7 @@ impl Analysis<'_> {
                 return Err(Never::Late);
             }
             if let Some((others_ns, starts_ns)) = self.fits(at, later_ns, own_earlier) {
-                let end_ns = (starts_ns + self.own.last_ns).min(self.supply.sends_ns(at.index));
+                let end_ns = (starts_ns + self.own.last_ns).min(self.supply.ends_ns(at.index));
                 return Ok(Worst {
                     latency_ns: begin_ns + end_ns - published_ns,
                     waits_ns: begin_ns.saturating_sub(published_ns),

@@ -27,7 +27,7 @@ pub(super) struct Sent {
 /// How a play differs from others.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Play {
-    /// From the beginning of a round to the first package of any stream, ns.
+    /// The first package of any stream comes just after the slot that begins so long after the first round took what it sends, ns.
     pub(super) from_ns: u64,
     /// Shifts the streams against each other and draws what is left open; 0: all come at once, and all is as bad as can be.
     pub(super) seed: u64,
@@ -35,6 +35,18 @@ pub(super) struct Play {
     pub(super) looks_again: bool,
     /// Rounds of the table.
     pub(super) rounds: u64,
+}
+
+impl Play {
+    /// When it is some time of the slots, by the clock of the computer.
+    fn local_ns(&self, supply: &Supply, system_ns: u64) -> u64 {
+        let by_ns = (u128::from(system_ns) * u128::from(supply.bends_ns_s) / 1_000_000_000) as u64;
+        match self.seed % 3 {
+            0 => system_ns + by_ns,
+            1 => system_ns - by_ns,
+            _ => system_ns,
+        }
+    }
 }
 
 struct Waiting {
@@ -82,10 +94,13 @@ impl System {
         for round in 0..play.rounds {
             for window in &self.supply.windows {
                 let begin_ns = round * self.supply.repeats_ns + window.begin_ns;
-                self.slot(play, begin_ns, window, &mut draw, &mut published, &mut waiting, &mut worst);
+                let local_ns = |system_ns| play.local_ns(&self.supply, system_ns);
+                let sends_ns = local_ns(begin_ns + window.sends_ns) - local_ns(begin_ns);
+                let here = Window { begin_ns: local_ns(begin_ns), sends_ns, ..*window };
+                self.slot(play, &here, &mut draw, &mut published, &mut waiting, &mut worst);
             }
         }
-        let end_ns = play.rounds * self.supply.repeats_ns;
+        let end_ns = play.local_ns(&self.supply, play.rounds * self.supply.repeats_ns);
         for late in waiting {
             worst[late.flow] = worst[late.flow].max(end_ns - late.published_ns);
         }
@@ -94,10 +109,12 @@ impl System {
 
     /// All packages by time; of those at one time the last stream's first, so that the first stream finds all others ahead of it.
     fn published(&self, play: Play, draw: &mut Draw) -> Vec<(u64, usize)> {
-        let end_ns = play.rounds.saturating_sub(1) * self.supply.repeats_ns;
+        let end_ns = play.local_ns(&self.supply, play.rounds.saturating_sub(1) * self.supply.repeats_ns);
+        let from_ns = play.local_ns(&self.supply, self.supply.repeats_ns + play.from_ns);
+        let from_ns = from_ns.saturating_sub(self.supply.taken_before_ns) + 1;
         let mut all = Vec::new();
         for (index, flow) in self.flows.iter().enumerate() {
-            let mut at_ns = play.from_ns + draw.below(flow.period_ns);
+            let mut at_ns = from_ns + draw.below(flow.period_ns);
             while at_ns < end_ns {
                 all.push((at_ns, index));
                 at_ns += flow.period_ns + if draw.below(4) == 3 { draw.below(flow.period_ns / 4) } else { 0 };
@@ -107,19 +124,17 @@ impl System {
         all
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the whole state of a play")]
     fn slot(
         &self,
         play: Play,
-        begin_ns: u64,
-        window: &Window,
+        &Window { begin_ns, sends_ns, .. }: &Window,
         draw: &mut Draw,
         published: &mut Vec<(u64, usize)>,
         waiting: &mut Vec<Waiting>,
         worst: &mut [u64],
     ) {
         let mut now_ns = begin_ns + draw.most(self.supply.late_ns) + draw.most(self.supply.said_ns);
-        let guard_ns = begin_ns + window.sends_ns;
+        let guard_ns = begin_ns + sends_ns;
         let mut takes_until_ns = begin_ns.saturating_sub(draw.most(self.supply.taken_before_ns));
         loop {
             while published.last().is_some_and(|(at_ns, _)| *at_ns <= takes_until_ns) {

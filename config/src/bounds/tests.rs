@@ -10,6 +10,7 @@ use proptest::test_runner::{Config, TestRunner};
 const US: u64 = 1_000;
 const MS: u64 = 1_000_000;
 const LONGEST_NS: u64 = 1_500 * MS;
+const BENDS_NS_S: u64 = 1_250_000;
 
 /// Tables of one to three cycles with one or two slots each, and one to five streams of three levels to two peers.
 fn systems() -> impl Strategy<Value = System> {
@@ -41,6 +42,7 @@ fn systems() -> impl Strategy<Value = System> {
                     said_ns: said_us * US,
                     taken_before_ns: 50 * US,
                     late_ns: 20 * US,
+                    bends_ns_s: BENDS_NS_S,
                 },
                 flows: flows.collect(),
                 head_ns: 10 * US,
@@ -85,8 +87,7 @@ fn played(system: &System, seeds: u64) -> Vec<u64> {
     for window in &supply.windows {
         for seed in 0..seeds {
             // Of the streams each is once the last of those that come at once.
-            let from_ns = supply.repeats_ns + window.begin_ns - supply.taken_before_ns + 1;
-            let play = Play { from_ns, seed, looks_again: seed % 2 == 1, rounds };
+            let play = Play { from_ns: window.begin_ns, seed, looks_again: seed % 2 == 1, rounds };
             for turn in 0..if seed == 0 { system.flows.len() } else { 1 } {
                 let mut turned = system.clone();
                 turned.flows.rotate_left(turn);
@@ -136,7 +137,7 @@ proptest! {
     ) {
         let windows = vec![Window { begin_ns: 50 * US, sends_ns: sends_us * US, slot: 0 }];
         let (repeats_ns, said_ns) = (repeats_ms * MS, 20 * US);
-        let supply = Supply { windows, repeats_ns, said_ns, taken_before_ns: 50 * US, late_ns: 20 * US };
+        let supply = Supply { windows, repeats_ns, said_ns, taken_before_ns: 50 * US, late_ns: 20 * US, bends_ns_s: BENDS_NS_S };
         let streams: Vec<_> = streams
             .into_iter()
             .map(|(period_ns, takes_ns, datagrams, always)| {

@@ -44,6 +44,7 @@ pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
     }
     if reader.is_content() {
         judge.quotas();
+        judge.mailboxes();
     }
 }
 

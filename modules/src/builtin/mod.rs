@@ -51,6 +51,12 @@ pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
     Some((Builtin::find(name)?.run)(start))
 }
 
+/// The built-in module that is called so or offers the interface of a class; none if nothing is built in for it.
+pub fn of_class(class: &str) -> Option<&'static str> {
+    let all = ["sim", "carmen", "mapper", "pilot", "output", ROUTER, TCP_CLIENT, TCP_ROUTER];
+    all.into_iter().find(|builtin| *builtin == class || description(builtin, class).is_some())
+}
+
 /// What a built-in module offers under the name of a class, its own or a face's; none if it knows no such class.
 pub fn description(builtin: &str, class: &str) -> Option<Description> {
     // The programs of these are not here: this crate knows no network.

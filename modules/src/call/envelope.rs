@@ -32,7 +32,7 @@ pub struct ReplyEnvelope {
     pub sequence: u32,
 }
 
-/// A time as envelopes carry it; longer ones are cut to 71 minutes.
+/// A time as envelopes carry it; longer ones are cut to 71 minutes. (A server counts a minute of it at most.)
 pub(crate) fn micros(time: Duration) -> u32 {
     u32::try_from(time.as_micros()).unwrap_or(u32::MAX)
 }

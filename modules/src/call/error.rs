@@ -2,20 +2,21 @@
 
 use super::{CallEnvelope, ReplyEnvelope};
 use crate::interface::append;
+use crate::output::plain::line;
 use postcard_schema::Schema;
 use rohrpost_mailbox::{Name, SendError};
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 use std::time::Duration;
 
-/// Why the server did not run a command; the body of a reply with the option `error`.
+/// Why the server did not run a command; the body of a reply with the option `error`. Shown, what others wrote in it stays in its line.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, Schema, thiserror::Error)]
 pub enum Fault {
     /// The module is switched off.
     #[error("the module is off; switch it on first")]
     ModuleOff,
     /// The module has stopped working; it takes no commands until it is switched off and on.
-    #[error("the module is in error: {0}")]
+    #[error("the module is in error: {}", line(.0))]
     ModuleError(String),
     /// It may have been run, or not: the server was restarted in between.
     #[error("interrupted, outcome unknown: the server was restarted while it had this command")]
@@ -33,13 +34,18 @@ pub enum Fault {
     #[error("the module has no function or data with number {0}; `describe` lists what it has")]
     Unknown(u16),
     /// The arguments are not what the function takes.
-    #[error("the arguments cannot be read: {0}")]
+    #[error("the arguments cannot be read: {}", line(.0))]
     Arguments(String),
     /// The command was too old when its turn came. It was not run.
-    #[error("the command was older than its validity when its turn came")]
+    #[error(
+        "the command was older than its validity, or than the minute for which a server runs it, when its turn came"
+    )]
     Expired,
-    /// Too many callers are being remembered, or there are too many subscriptions. It was not run.
-    #[error("the server has no room for more callers or subscriptions; try again later, or end some")]
+    /// There is no place for another caller or subscription of whoever sent it. It was not run.
+    #[error(
+        "the server has no place for another caller or subscription from there: its share is used up, or all are taken; end some, try again \
+         later, or name the server in the caller's `calls`, which keeps places for it"
+    )]
     Busy,
     /// The module has no such data yet.
     #[error("no such data has been made yet")]
@@ -63,7 +69,8 @@ pub enum Fault {
     NoRoute,
     /// A router: nothing has come from the module's node for a while.
     #[error(
-        "node {node} is silent; is it on, does its router run, and is it reached at its address? (`rohrpost net`, on both)"
+        "node {} is silent; is it on, does its router run, and is it reached at its address? (`rohrpost net`, on both)",
+        line(.node)
     )]
     NodeSilent {
         /// The node.
@@ -71,15 +78,16 @@ pub enum Fault {
     },
     /// A router: the module's node is heard, but says that it does not hear this one.
     #[error(
-        "node {node} is heard, but does not hear this one; is a firewall in between, or a cable half broken? (`rohrpost \
-         net`, on both)"
+        "node {} is heard, but does not hear this one; is a firewall in between, or a cable half broken? (`rohrpost \
+         net`, on both)",
+        line(.node)
     )]
     NodeDeaf {
         /// The node.
         node: String,
     },
     /// A router: the module's node takes nothing from the caller's.
-    #[error("node {node} takes nothing from this one: {why}")]
+    #[error("node {} takes nothing from this one: {}", line(.node), line(.why))]
     NodeRefuses {
         /// The node.
         node: String,
@@ -95,9 +103,10 @@ pub enum Fault {
     /// A router: the package has been under way for too long, and was dropped.
     #[error("it waited too long for the network; more important packages used up its rate (`rohrpost net`)")]
     Delayed,
-    /// A router: the caller's class may not command this one from another node.
+    /// A router or the module itself: the caller's class may not command this one.
     #[error(
-        "node {node} refuses it: {rule}, [access], lists the classes that may command this one, and the caller's is not among them"
+        "node {} refuses it: {}, [access], lists the classes that may command this one, and the caller's is not among them",
+        line(.node), line(.rule)
     )]
     NotAllowed {
         /// The module's node.
@@ -105,6 +114,13 @@ pub enum Fault {
         /// File and line of the rule.
         rule: String,
     },
+    /// A later incarnation of the caller has called this server, so this command is of one that is over, or seems so. This try was not run.
+    #[error(
+        "a later incarnation of this caller has called it already: two programs have this name, or the computer's clock was set back \
+         before the node was launched; this passes {} s after the later one's last call was over",
+        super::once::TRANSIT_MAX.as_secs()
+    )]
+    EarlierIncarnation,
 }
 
 impl Fault {
@@ -134,7 +150,8 @@ impl Fault {
             | Self::NodeRefuses { .. }
             | Self::RouterFull
             | Self::Delayed
-            | Self::NotAllowed { .. } => true,
+            | Self::NotAllowed { .. }
+            | Self::EarlierIncarnation => true,
             Self::ModuleOff
             | Self::ModuleError(_)
             | Self::Interrupted

@@ -3,14 +3,15 @@
 use super::absent::Absent;
 use super::envelope::micros;
 use super::tally::{Ending, Tallies, Tally};
-use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope};
+use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope, VALIDITY_MAX};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A command whose answer does not come is sent again after this share of its time: three tries in all.
+/// A command whose answer does not come is sent again after this share of its time, or of the time for which a server may run it: three
+/// tries in all that can be run.
 const REPEATS: u32 = 3;
 /// Calls under way at a time, to all servers together.
 pub const CALLS_MAX: usize = 64;
@@ -56,7 +57,7 @@ struct Call {
 }
 
 /// Whether who answers was called: itself, or that name in all systems, of which the first that answers counts.
-fn is_to(to: Name, from: Name) -> bool {
+pub(crate) fn is_to(to: Name, from: Name) -> bool {
     let (to, from) = (to.module(), from.module());
     to == from || to == Name::new(ALL_SYSTEMS, from.class().0, from.instance(), 0)
 }
@@ -84,6 +85,11 @@ impl Link {
     /// The module that sends.
     pub fn me(&self) -> Name {
         self.me
+    }
+
+    /// Tells this life of the module from others that had or will have its name.
+    pub fn incarnation(&self) -> u32 {
+        self.incarnation
     }
 
     /// Whose bell wakes it.
@@ -196,7 +202,7 @@ impl Link {
         }
         let began = Instant::now();
         let kind = Type::command(function);
-        let repeat_at = began + timeout / REPEATS;
+        let repeat_at = began + repeat_after(timeout);
         let label = self.label(kind, sequence, options);
         let call = Call { sequence, to, body, label, began, timeout, repeat_at, repeated: false, answer: None };
         match self.send(to, &label, &[&call.body]) {
@@ -341,7 +347,7 @@ impl Link {
 
     fn repeat(&mut self, at: usize, now: Instant) {
         let call = &mut self.calls[at];
-        call.repeat_at = now + call.timeout / REPEATS;
+        call.repeat_at = now + repeat_after(call.timeout);
         call.repeated = true;
         // Age 0 means a first try, so a repeat is at least 1 µs old.
         let age_us = micros(now - call.began).max(1);
@@ -353,6 +359,10 @@ impl Link {
         self.calls[at].body = body;
         self.tallies.repeated(to);
     }
+}
+
+fn repeat_after(timeout: Duration) -> Duration {
+    timeout.min(VALIDITY_MAX) / REPEATS
 }
 
 fn is_of_one_try(fault: &[u8]) -> bool {

@@ -12,6 +12,7 @@ mod tally;
 pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope};
 pub use error::{CallError, Fault};
+pub(crate) use link::is_to;
 pub use link::{CALLS_MAX, Caller, Link, Pending};
-pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, TRANSIT_MAX, Verdict, WINDOW};
+pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, TRANSIT_MAX, VALIDITY_MAX, Verdict, WINDOW};
 pub use tally::Tally;

@@ -5,17 +5,25 @@
 //! server that was restarted remembers nothing; it can tell, though, that a command was first tried before its own start,
 //! and then says that the outcome is unknown, unless the function is idempotent.
 //!
+//! Whom it remembers is bounded, and shared out by principal: callers that configuration names always find a place, and nobody else takes all
+//! of the others. A caller is remembered as long as its command is valid, at most [`VALIDITY_MAX`], whatever the caller says.
+//!
 //! A command's age counts its wait with the caller and in the server's mailbox, but not its way in between. So whoever
 //! carries packages drops those that were under way for longer than [`TRANSIT_MAX`], and drops copies. One thing nobody can
 //! tell: a first try that is overtaken by its own repeat, and is on the wire while the server runs that repeat and is
 //! restarted, looks new to the next server.
 
 use super::Fault;
+use crate::places::Places;
+use rohrpost_config::Principal;
 use rohrpost_mailbox::Name;
 use std::time::Duration;
 
-/// Callers remembered at a time.
+/// Callers remembered at a time, besides one of each principal that always finds a place.
 pub const CALLERS_MAX: usize = 64;
+/// A caller's word for longer ones is not taken: a command that is older does not run.
+pub const VALIDITY_MAX: Duration = Duration::from_secs(60);
+const VALIDITY_MAX_NS: u64 = VALIDITY_MAX.as_nanos() as u64;
 /// Answers remembered of each; a caller has at most so many calls under way to one server.
 pub const REPLIES_KEPT: usize = 8;
 /// Numbers of each caller of which it is known whether they were run. More than answers, since a caller counts all its
@@ -31,11 +39,13 @@ const _: () = assert!(WINDOW as usize > REPLIES_KEPT, "an answer that is kept be
 pub struct Request {
     /// Reply mailbox of the caller.
     pub from: Name,
+    /// Whose share of places it uses.
+    pub principal: Principal,
     /// The caller's incarnation.
     pub incarnation: u32,
     /// The call's number in it.
     pub sequence: u32,
-    /// Validity, counted from the first try, ns.
+    /// Validity, counted from the first try, ns; of a longer one [`VALIDITY_MAX`] counts.
     pub valid_for_ns: u64,
     /// Time since the first try, waiting in mailboxes included, ns; 0 for a first try that did not wait.
     pub age_ns: u64,
@@ -62,6 +72,7 @@ pub enum Verdict<'a> {
 
 struct Memory {
     from: Name,
+    principal: Principal,
     incarnation: u32,
     /// Highest sequence number that was run.
     last: u32,
@@ -80,7 +91,9 @@ enum Place {
     WasRun,
     /// It was not run by this server.
     New,
-    /// Of an earlier life of the caller, or older than what is remembered.
+    /// Of an earlier incarnation of the caller. If that still waits, it is to know why it is not served.
+    Earlier,
+    /// Older than what is remembered.
     Before,
 }
 
@@ -96,12 +109,14 @@ struct Answer {
 pub struct Once {
     started_ns: u64,
     callers: Vec<Memory>,
+    places: Places,
 }
 
 impl Once {
-    /// For a server that started now.
-    pub fn new(started_ns: u64) -> Self {
-        Self { started_ns, callers: Vec::with_capacity(CALLERS_MAX) }
+    /// For a server that started now. One caller of each of these principals always finds a place.
+    pub fn new(started_ns: u64, named: &[Principal]) -> Self {
+        let places = Places::new(named, 1, CALLERS_MAX);
+        Self { started_ns, callers: Vec::with_capacity(places.total()), places }
     }
 
     /// Decides on a command. `now_ns` is the monotonic clock.
@@ -110,10 +125,13 @@ impl Once {
         if let Some(at) = known {
             match self.callers[at].place(request) {
                 Place::WasRun => return self.callers[at].again(request.sequence),
+                Place::Earlier if now_ns <= self.callers[at].until_ns => {
+                    return Verdict::Refuse(Fault::EarlierIncarnation);
+                }
                 Place::Before if now_ns <= self.callers[at].until_ns => return Verdict::Ignore,
                 // Nothing of what is remembered can be repeated any more: the caller's numbers have begun anew (its computer's
                 // clock was reset), or have gone half way round since it last called.
-                Place::Before | Place::New => {}
+                Place::Earlier | Place::Before | Place::New => {}
             }
         }
         // First tried before this server lived, or in the hands of one that died.
@@ -122,12 +140,14 @@ impl Once {
         if (before_us || request.redelivered) && !request.idempotent {
             return Verdict::Refuse(Fault::Interrupted);
         }
-        if request.age_ns > request.valid_for_ns {
+        if request.age_ns > request.validity_ns() {
             // To say `Expired` is to say that it was not run. Of a repeat that is unknown, and nobody waits for it any more.
             let first = !request.repeat && !request.redelivered;
             return if first { Verdict::Refuse(Fault::Expired) } else { Verdict::Ignore };
         }
-        if known.is_none() && !self.make_room(now_ns) {
+        // One that is remembered, but need not be, holds no place: others may have taken all.
+        let has_place = known.is_some_and(|at| self.callers[at].until_ns >= now_ns);
+        if !has_place && !self.make_room(request.principal, now_ns) {
             return Verdict::Refuse(Fault::Busy);
         }
         Verdict::Run
@@ -142,24 +162,29 @@ impl Once {
                 self.callers.len() - 1
             }
         };
-        let left_ns = request.valid_for_ns.saturating_sub(request.age_ns).saturating_add(TRANSIT_MAX_NS);
+        let left_ns = request.validity_ns().saturating_sub(request.age_ns).saturating_add(TRANSIT_MAX_NS);
         self.callers[at].note(request, error, body, now_ns.saturating_add(left_ns));
     }
 
-    /// Forgets a caller of whom no repeat can come any more, if there is no room for another. Never one of whom it can:
-    /// then a repeat would run twice.
-    fn make_room(&mut self, now_ns: u64) -> bool {
-        if self.callers.len() < CALLERS_MAX {
-            return true;
+    /// Whether there is room for another caller of this principal. Forgets one of whom no repeat can come any more, if that is what it
+    /// takes; never one of whom it can: then a repeat would run twice.
+    fn make_room(&mut self, principal: Principal, now_ns: u64) -> bool {
+        let held = self.callers.iter().filter(|caller| caller.until_ns >= now_ns).map(|caller| caller.principal);
+        if !self.places.allows(principal, held) {
+            return false;
         }
-        let oldest = self.callers.iter().enumerate().min_by_key(|(_, caller)| caller.until_ns);
-        match oldest {
-            Some((at, caller)) if caller.until_ns < now_ns => {
-                self.callers.swap_remove(at);
-                true
-            }
-            _ => false,
+        if self.callers.len() >= self.places.total() {
+            let oldest = self.callers.iter().enumerate().min_by_key(|(_, caller)| caller.until_ns);
+            // Of those that count fewer are there than places, so this one does not.
+            oldest.map(|(at, _)| at).map(|at| self.callers.swap_remove(at));
         }
+        true
+    }
+}
+
+impl Request {
+    fn validity_ns(&self) -> u64 {
+        self.valid_for_ns.min(VALIDITY_MAX_NS)
     }
 }
 
@@ -167,6 +192,7 @@ impl Memory {
     fn new(request: &Request) -> Self {
         let mut memory = Self {
             from: request.from,
+            principal: request.principal,
             incarnation: request.incarnation,
             last: 0,
             run: 0,
@@ -189,7 +215,7 @@ impl Memory {
     /// Incarnations and numbers count upwards and wrap.
     fn place(&self, request: &Request) -> Place {
         match request.incarnation.wrapping_sub(self.incarnation) as i32 {
-            ..0 => return Place::Before,
+            ..0 => return Place::Earlier,
             1.. => return Place::New,
             0 => {}
         }
@@ -203,7 +229,7 @@ impl Memory {
 
     /// Remembers that a command was run.
     fn note(&mut self, request: &Request, error: bool, body: &[u8], until_ns: u64) {
-        if request.incarnation != self.incarnation || matches!(self.place(request), Place::Before) {
+        if request.incarnation != self.incarnation || matches!(self.place(request), Place::Earlier | Place::Before) {
             self.begin(request);
         }
         self.until_ns = self.until_ns.max(until_ns);
@@ -240,6 +266,9 @@ impl Memory {
 #[cfg(test)]
 #[path = "once_simulation.rs"]
 mod simulation;
+#[cfg(test)]
+#[path = "once_simulation_places.rs"]
+mod simulation_places;
 #[cfg(test)]
 #[path = "once_tests.rs"]
 mod tests;

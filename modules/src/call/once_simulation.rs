@@ -1,7 +1,7 @@
 //! Callers, a network that loses, copies, delays and reorders, and a server that dies at any step. Virtual time; all chance
 //! comes from a seed.
 
-use super::{CALLERS_MAX, Fault, Name, Once, Request, TRANSIT_MAX_NS, Verdict, WINDOW};
+use super::{CALLERS_MAX, Fault, Once, Principal, Request, TRANSIT_MAX_NS, VALIDITY_MAX_NS, Verdict, WINDOW};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 
@@ -14,7 +14,22 @@ pub(super) enum Broken {
     Forgets,
     NoBeforeStart,
     RunsRedelivered,
+    /// Nobody has a place of its own.
+    NamesNobody,
+    /// Each caller has a share for itself, whosever it is.
+    SharesByCaller,
+    /// All share one share.
+    SharesNothing,
+    /// A caller is remembered for as long as it says.
+    BelievesValidity,
+    /// One that was remembered takes its place again without being asked whose share that is.
+    TakesItsPlaceAgain,
 }
+
+/// Callers whose principals always find a place.
+pub(super) const NAMED: usize = 2;
+/// As long as an envelope can tell.
+const VALID_LONG_NS: u64 = u32::MAX as u64 * 1000;
 
 struct Rng(u64);
 
@@ -86,7 +101,7 @@ pub(super) struct Call {
 pub(super) struct World {
     rng: Rng,
     broken: Broken,
-    now_ns: u64,
+    pub(super) now_ns: u64,
     events: BinaryHeap<Reverse<(u64, u64, Event)>>,
     ticket: u64,
     pub(super) delay_max_ns: u64,
@@ -94,19 +109,23 @@ pub(super) struct World {
     copy_percent: u64,
     pub(super) death_percent: u64,
     pub(super) callers: Vec<(u32, u32)>,
+    /// Those that are not named belong to so many principals.
+    pub(super) principals: usize,
+    /// Whether some of them say that what they call is valid for long.
+    greedy: bool,
     pub(super) calls: Vec<Call>,
     runs: usize,
     // The server.
     life: usize,
     alive: bool,
     started_ns: u64,
-    once: Once,
+    pub(super) once: Once,
     mailbox: VecDeque<Package>,
     pub(super) problems: Vec<String>,
     pub(super) seen: BTreeMap<&'static str, u64>,
 }
 
-pub(super) const CALLS: usize = 120;
+const CALLS: usize = 120;
 
 impl World {
     pub(super) fn new(seed: u64, broken: Broken) -> Self {
@@ -118,6 +137,9 @@ impl World {
         let callers = if rng.percent(20) { CALLS } else { 1 + rng.below(4) as usize };
         // Incarnations and numbers wrap early.
         let callers = (0..callers).map(|n| (u32::MAX - n as u32 % 3, u32::MAX - rng.below(20) as u32)).collect();
+        // A few that may hold much, or so many that each holds one place and none is left.
+        let principals = if rng.percent(30) { CALLS } else { 1 + rng.below(6) as usize };
+        let greedy = rng.percent(50);
         let started_ns = 5000 * MS;
         let mut world = Self {
             broken,
@@ -129,22 +151,24 @@ impl World {
             copy_percent,
             death_percent,
             callers,
+            principals,
+            greedy,
             calls: Vec::new(),
             runs: 0,
             life: 0,
             alive: true,
             started_ns,
-            once: Once::new(started_ns),
+            once: Self::once(started_ns),
             mailbox: VecDeque::new(),
             problems: Vec::new(),
             seen: BTreeMap::new(),
             rng,
         };
-        for n in 0..CALLS {
-            // Many callers at once, so that memory is full at times.
-            let crowded = world.callers.len() > CALLERS_MAX;
-            let caller = if crowded { n } else { world.rng.below(world.callers.len() as u64) as usize };
-            let span_ms = if crowded { 3000 } else { 20_000 };
+        // Many callers at once, so that memory is full at times.
+        let crowded = world.callers.len() > CALLERS_MAX;
+        let (calls, span_ms) = if crowded { (3 * CALLS, 10_000) } else { (CALLS, 20_000) };
+        for _ in 0..calls {
+            let caller = world.rng.below(world.callers.len() as u64) as usize;
             let after_ns = world.rng.below(span_ms * MS);
             world.at(after_ns, Event::Begin(caller));
         }
@@ -167,9 +191,7 @@ impl World {
                 Event::Start => self.start(),
                 Event::Answered { call, incarnation, answer } => self.answered(call, incarnation, answer),
             }
-            if self.once.callers.len() > CALLERS_MAX {
-                self.problems.push("remembers more callers than it may".into());
-            }
+            self.judge_places();
         }
         self.judge_all();
         self
@@ -185,7 +207,8 @@ impl World {
         // Calls to others come in between.
         let step = if self.rng.percent(10) { 1 + self.rng.below(2 * u64::from(WINDOW)) as u32 } else { 1 };
         self.callers[caller].1 = sequence.wrapping_add(step);
-        let valid_for_ns = (10 + self.rng.below(3000)) * MS;
+        let is_greedy = self.greedy && caller >= NAMED && caller.is_multiple_of(3);
+        let valid_for_ns = if is_greedy { VALID_LONG_NS } else { (10 + self.rng.below(3000)) * MS };
         let idempotent = self.rng.percent(20);
         self.calls.push(Call {
             caller,
@@ -227,7 +250,7 @@ impl World {
             published_ns: 0,
             redelivered: false,
         };
-        let wait_ns = call.valid_for_ns / 3;
+        let wait_ns = call.valid_for_ns.min(VALIDITY_MAX_NS) / 3;
         self.calls[index].tries += 1;
         self.carry(Event::Arrive(package));
         self.at(wait_ns, Event::Try(index));
@@ -257,8 +280,14 @@ impl World {
         }
         let Some(package) = self.mailbox.pop_front() else { return };
         let call = &self.calls[package.call];
+        let principal = match self.broken {
+            Broken::SharesByCaller => Self::named(package.caller),
+            Broken::SharesNothing => Principal::Unknown,
+            _ => self.principal(package.caller),
+        };
         let mut request = Request {
-            from: Name::new(1, 9, package.caller as u8, 1),
+            from: Self::name(package.caller),
+            principal,
             incarnation: package.incarnation,
             sequence: package.sequence,
             valid_for_ns: call.valid_for_ns,
@@ -268,11 +297,17 @@ impl World {
             idempotent: call.idempotent,
         };
         match self.broken {
-            Broken::Forgets => self.once = Once::new(self.started_ns),
+            Broken::Forgets => self.once = Self::once(self.started_ns),
+            Broken::NamesNobody if self.once.callers.is_empty() => self.once = Once::new(self.started_ns, &[]),
             Broken::NoBeforeStart => self.once.started_ns = 0,
             Broken::RunsRedelivered => request.redelivered = false,
-            Broken::Nothing => {}
+            Broken::TakesItsPlaceAgain => {
+                let known = self.once.callers.iter_mut().filter(|caller| caller.from == request.from);
+                known.for_each(|caller| caller.until_ns = caller.until_ns.max(self.now_ns));
+            }
+            _ => {}
         }
+        let knows = self.knows(package.caller);
         // Death may come before, between or after.
         if self.dies(package) {
             return;
@@ -284,16 +319,26 @@ impl World {
             }
             Verdict::Refuse(Fault::Interrupted) => ("interrupted", Some(Answer::Interrupted)),
             Verdict::Refuse(Fault::Expired) => ("expired", Some(Answer::NotRun)),
-            Verdict::Refuse(_) => ("busy", Some(Answer::NotRun)),
+            Verdict::Refuse(Fault::Busy) => ("busy", Some(Answer::NotRun)),
+            // To an incarnation that is over: nobody waits for it.
+            Verdict::Refuse(Fault::EarlierIncarnation) => ("earlier incarnation", None),
+            Verdict::Refuse(other) => panic!("{other}"),
             Verdict::Run => ("run", Some(Answer::Ran(self.runs))),
         };
         *self.seen.entry(said).or_default() += 1;
+        if said == "busy" {
+            self.judge_refusal(package.caller, knows);
+        }
         if said == "run" {
             self.execute(package);
             if self.dies(package) {
                 return;
             }
             self.once.done(&request, self.now_ns, false, &(self.runs as u32 - 1).to_be_bytes());
+            if self.broken == Broken::BelievesValidity {
+                let until_ns = self.now_ns + self.calls[package.call].valid_for_ns;
+                self.once.callers.iter_mut().filter(|c| c.from == request.from).for_each(|c| c.until_ns = until_ns);
+            }
         }
         if let Some(answer) = answer {
             self.carry(Event::Answered { call: package.call, incarnation: package.incarnation, answer });
@@ -330,7 +375,7 @@ impl World {
         self.life += 1;
         self.alive = true;
         self.started_ns = self.now_ns;
-        self.once = Once::new(self.now_ns);
+        self.once = Self::once(self.now_ns);
         for _ in 0..self.mailbox.len() {
             let busy_ns = self.rng.below(20 * MS);
             self.at(busy_ns, Event::Serve);
@@ -368,5 +413,6 @@ impl World {
         self.seen.insert("answered", count(|call| matches!(call.outcome, Some(Answer::Ran(_)))));
         self.seen.insert("unknowable", count(|call| call.unknowable && !call.idempotent));
         self.seen.insert("lives", self.life as u64);
+        self.seen.insert("calls", self.calls.len() as u64);
     }
 }

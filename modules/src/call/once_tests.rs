@@ -1,7 +1,7 @@
 //! Single rules as tables, then all of them together in the simulation.
 
-use super::simulation::{Broken, CALLS, Call, World};
-use super::{CALLERS_MAX, Fault, Name, Once, Request, Verdict};
+use super::simulation::{Broken, Call, World};
+use super::{CALLERS_MAX, Fault, Name, Once, Principal, Request, VALIDITY_MAX, Verdict};
 use std::collections::BTreeMap;
 
 const MS: u64 = 1_000_000;
@@ -10,6 +10,7 @@ const CALLER: Name = Name::new(1, 9, 0, 1);
 fn request(sequence: u32) -> Request {
     Request {
         from: CALLER,
+        principal: Principal::Unknown,
         incarnation: 7,
         sequence,
         valid_for_ns: 1000 * MS,
@@ -29,6 +30,7 @@ fn serve(once: &mut Once, request: &Request, now_ns: u64) -> &'static str {
         Verdict::Refuse(Fault::Interrupted) => "interrupted",
         Verdict::Refuse(Fault::Expired) => "expired",
         Verdict::Refuse(Fault::Busy) => "busy",
+        Verdict::Refuse(Fault::EarlierIncarnation) => "earlier incarnation",
         Verdict::Refuse(other) => panic!("{other}"),
     };
     if said == "run" {
@@ -40,7 +42,7 @@ fn serve(once: &mut Once, request: &Request, now_ns: u64) -> &'static str {
 #[test]
 fn what_was_run_is_not_run_again_whatever_its_order() {
     for first in [1, u32::MAX - 100] {
-        let mut once = Once::new(0);
+        let mut once = Once::new(0, &[]);
         // Backwards, then on: the answers that are kept are no longer those with the highest numbers.
         let backwards = (0..8).rev().map(|n| first.wrapping_add(n));
         let onwards = (8..300).map(|n| first.wrapping_add(n));
@@ -63,7 +65,7 @@ fn numbers_that_come_round_are_new_and_get_their_own_answers() {
         other => panic!("{sequence}: {other:?}"),
     };
     for step in [1 << 31, 3 << 29] {
-        let mut once = Once::new(0);
+        let mut once = Once::new(0, &[]);
         for round in 0..4_u32 {
             let sequence = 7_u32.wrapping_add(round.wrapping_mul(step));
             // Half way round, both sides are equally far: what follows is new.
@@ -92,17 +94,17 @@ fn each_rule_decides_as_it_says() {
         (Request { redelivered: true, idempotent: true, ..base }, day, "run", "does no harm"),
         (Request { age_ns: u64::MAX, valid_for_ns: u64::MAX, repeat: true, ..base }, day, "interrupted", "no overflow"),
     ] {
-        assert_eq!(serve(&mut Once::new(0), &change, now_ns), says, "{why}");
+        assert_eq!(serve(&mut Once::new(0, &[]), &change, now_ns), says, "{why}");
     }
 }
 
 #[test]
-fn an_earlier_life_is_ignored_until_it_cannot_matter_any_more() {
-    let mut once = Once::new(0);
+fn an_earlier_incarnation_is_refused_until_it_cannot_matter_any_more() {
+    let mut once = Once::new(0, &[]);
     let newer = Request { incarnation: 8, ..request(1) };
     assert_eq!(serve(&mut once, &request(1), 0), "run");
     assert_eq!(serve(&mut once, &newer, 0), "run", "numbers begin anew in a new life");
-    assert_eq!(serve(&mut once, &request(2), 3000 * MS), "ignore", "from the life before");
+    assert_eq!(serve(&mut once, &request(2), 3000 * MS), "earlier incarnation");
     assert_eq!(serve(&mut once, &request(2), 3001 * MS), "run", "the caller's clock was reset: its lives begin anew");
     let far = request(3 + (1 << 31));
     assert_eq!(serve(&mut once, &far, 6000 * MS), "ignore", "looks old");
@@ -110,9 +112,28 @@ fn an_earlier_life_is_ignored_until_it_cannot_matter_any_more() {
 }
 
 #[test]
+fn a_command_is_valid_for_a_minute_whatever_its_caller_says() {
+    let base = Request { valid_for_ns: u64::MAX, ..request(1) };
+    let valid_ns = VALIDITY_MAX.as_nanos() as u64;
+    for (age_ns, says) in [(valid_ns, "run"), (valid_ns + 1, "expired")] {
+        assert_eq!(serve(&mut Once::new(0, &[]), &Request { age_ns, ..base }, 0), says, "after {age_ns} ns");
+    }
+    // Nor is it remembered for longer: one principal takes its share of places, and loses them again.
+    let mut once = Once::new(0, &[]);
+    let caller = |n: usize| Request { from: Name::new(1, 16, n as u8, 1), ..base };
+    let ran = (0..CALLERS_MAX).filter(|n| serve(&mut once, &caller(*n), 0) == "run").count();
+    assert_eq!(ran, CALLERS_MAX / 2);
+    let over_ns = valid_ns + 2000 * MS;
+    assert_eq!(serve(&mut once, &caller(100), over_ns), "busy");
+    assert_eq!(serve(&mut once, &caller(100), over_ns + 1), "run");
+}
+
+#[test]
 fn memory_is_bounded_and_never_given_to_another_too_early() {
-    let mut once = Once::new(0);
-    let caller = |n: usize| Request { from: Name::new(1, 1, n as u8, 1), ..request(1) };
+    let mut once = Once::new(0, &[]);
+    // Each is of a principal of its own, but that nobody could fill all places else.
+    let principal = |n: usize| Principal::Tools(n);
+    let caller = |n: usize| Request { from: Name::new(1, 1, n as u8, 1), principal: principal(n), ..request(1) };
     for n in 0..CALLERS_MAX {
         assert_eq!(serve(&mut once, &caller(n), n as u64), "run");
     }
@@ -144,7 +165,7 @@ fn at_most_once_whatever_the_network_and_death_do() {
         for what in ["run", "again", "interrupted", "expired", "busy", "ignored", "lives"] {
             assert!(seen.get(what).is_some_and(|count| *count > 500), "too few of `{what}` to prove much: {seen:?}");
         }
-        let (calls, answered) = (2000 * CALLS as u64, seen["answered"]);
+        let (calls, answered) = (seen["calls"], seen["answered"]);
         assert!(answered * 3 > calls, "{answered} of {calls} answered: it refuses what it should run: {seen:?}");
         assert!(seen["unknowable"] * 200 < calls, "the one thing nobody can tell is not that rare: {seen:?}");
     }
@@ -152,7 +173,16 @@ fn at_most_once_whatever_the_network_and_death_do() {
 
 #[test]
 fn the_simulation_notices_what_is_left_out() {
-    for broken in [Broken::Forgets, Broken::NoBeforeStart, Broken::RunsRedelivered] {
+    for broken in [
+        Broken::Forgets,
+        Broken::NoBeforeStart,
+        Broken::RunsRedelivered,
+        Broken::NamesNobody,
+        Broken::SharesByCaller,
+        Broken::SharesNothing,
+        Broken::BelievesValidity,
+        Broken::TakesItsPlaceAgain,
+    ] {
         let noticed = (0..500).find(|seed| !World::new(*seed, broken).run().problems.is_empty());
         assert!(noticed.is_some(), "{broken:?} went unnoticed");
     }

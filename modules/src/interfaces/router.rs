@@ -135,7 +135,7 @@ pub struct Links {
     pub waiting_bytes: u64,
     /// Classes that did something, the most urgent first.
     pub classes: Vec<ClassCarried>,
-    /// Datagrams from addresses of no node, or that are nothing of Rohrpost's.
+    /// Datagrams from addresses of no node, for which the router's socket had no room, or that are nothing of Rohrpost's.
     pub foreign: u64,
     /// What this computer said when it was to send a datagram, and how often.
     pub failures: Vec<SocketFailure>,

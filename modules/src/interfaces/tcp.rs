@@ -107,8 +107,24 @@ pub struct BeyondClient {
     pub age_ms: u64,
     /// Time since something came from it, ms.
     pub heard_ms: u64,
+    /// Packages lost in queues since it sent more than its part of them; with what others lost that connect with the
+    /// same certificate, or without one from the same address.
+    pub lost: u64,
     /// Bytes of memory that it takes up, with what waits for it.
     pub bytes: u64,
+}
+
+/// How often somebody wanted more than its part of what all share, and others were served before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct BeyondCrowded {
+    /// Connections before their hello that gave way to others.
+    pub greetings: u64,
+    /// Clients that gave way to those of others, or were not let in.
+    pub clients: u64,
+    /// Registrations of too many ranges.
+    pub ranges: u64,
+    /// Packages lost in queues.
+    pub packages: u64,
 }
 
 /// The TCP router. Counts are since it began, and only grow.
@@ -128,6 +144,8 @@ pub struct BeyondClients {
     pub refused: u64,
     /// Who was the last of them, and why; empty without one.
     pub refusal: String,
+    /// What went beyond the part of one certificate, or one address.
+    pub crowded: BeyondCrowded,
     /// Registrations that a later one of the same client took the place of before they were looked at.
     pub overtaken: u64,
     /// Lines of output that were not said one by one, since there were too many of their cause.

@@ -1,15 +1,19 @@
 //! One module's process: started, watched, started again, stopped. Nothing here waits: each step looks, and says when to
 //! look again.
 
+mod ending;
+
+pub(super) use ending::Then;
+
 use super::control::{ChildState, Phase};
-use super::leftovers::KILL_TIME;
+use super::health::Health;
 use super::policy::{Next, Policy};
 use super::printed::Printed;
 use super::program::Program;
 use crate::output::Relay;
 use crate::runtime::StartError;
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
+use ending::Ending;
+use nix::sys::signal::Signal;
 use rohrpost_config::{Installation, Module, Restart, Start};
 use rohrpost_mailbox::{ModuleState, Name, Node};
 use std::io;
@@ -27,39 +31,6 @@ const LOOK_KEPT: Duration = Duration::from_millis(100);
 /// Bytes of a text that are told to tools.
 const TOLD_MAX: usize = 1000;
 
-/// What becomes of a module that is told to end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Then {
-    /// It stays ended until somebody starts it.
-    Stay,
-    /// It is started again.
-    Start,
-    /// It is launch that ends.
-    End,
-}
-
-/// A process on its way to its end.
-struct Ending {
-    then: Then,
-    /// When it was told.
-    since: Instant,
-    /// When it was killed, since it did not obey.
-    killed: Option<Instant>,
-    /// Not even that helped.
-    left_behind: bool,
-}
-
-impl Ending {
-    /// When there is something to do about it, if it has not ended by then.
-    fn press_at(&self, stop_within: Duration) -> Option<Instant> {
-        match self.killed {
-            _ if self.left_behind => None,
-            Some(at) => Some(at + KILL_TIME),
-            None => Some(self.since + stop_within),
-        }
-    }
-}
-
 /// Where a module's mailboxes are. They outlive its process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mailboxes {
@@ -74,6 +45,8 @@ enum Mailboxes {
 pub(super) struct Child {
     name: Name,
     text: String,
+    /// Its name and its faces.
+    names: Vec<Name>,
     program: Program,
     policy: Policy,
     /// Whether it is switched on when it is ready: as configured, or as somebody has switched it since.
@@ -81,6 +54,8 @@ pub(super) struct Child {
     /// This process was on, or was in error on its way there: if it is off now, somebody wants it so.
     was_on: bool,
     configured_on: bool,
+    /// Without it the node does not start.
+    required: bool,
     ready_within: Duration,
     stop_within: Duration,
     phase: Phase,
@@ -97,6 +72,7 @@ pub(super) struct Child {
     restarts: u32,
     /// How it ended, and what it had printed; empty if it never did.
     last_end: String,
+    health: Health,
     printed: Printed,
     /// Launch ends: nothing is started any more.
     last_life: bool,
@@ -108,11 +84,13 @@ impl Child {
         Self {
             name: module.name,
             text: installation.classes.format(module.name),
+            names: module.names().collect(),
             program,
             policy: Policy::new(module.restart),
             turn_on: configured_on,
             was_on: false,
             configured_on,
+            required: module.required,
             ready_within: module.ready_within,
             stop_within: module.stop_within,
             phase: Phase::Waiting,
@@ -124,6 +102,7 @@ impl Child {
             lives: 0,
             restarts: 0,
             last_end: String::new(),
+            health: Health::new(module.busy_after, Instant::now()),
             printed: Printed::new(relay.voice(installation, module.name)),
             last_life: false,
         }
@@ -161,6 +140,21 @@ impl Child {
         &self.last_end
     }
 
+    /// Its process, while there is one.
+    pub(super) fn pid(&self) -> Option<u32> {
+        self.process.as_ref().map(std::process::Child::id)
+    }
+
+    /// Why it is in error now, if it is.
+    pub(super) fn present_error(&self) -> Option<&str> {
+        self.health.present_error()
+    }
+
+    /// Whether its node does not start without it.
+    pub(super) fn is_required(&self) -> bool {
+        self.required
+    }
+
     pub(super) fn wants_on(&self) -> bool {
         self.turn_on
     }
@@ -177,11 +171,14 @@ impl Child {
         ChildState {
             module: self.text.clone(),
             phase: self.phase,
-            pid: self.process.as_ref().map(std::process::Child::id),
+            pid: self.pid(),
             lives: self.lives,
             restarts: self.restarts,
+            attempt: self.policy.counted(),
+            attempts_max: self.policy.restart().at_most,
             starts_in_ms: waits.then(|| self.since.saturating_duration_since(now).as_millis() as u32),
             last_end: cut(&self.last_end),
+            error: cut(self.health.error()),
             printed: cut(&self.printed.last()),
         }
     }
@@ -203,6 +200,7 @@ impl Child {
             }
             // Killed, since it did not get ready.
             Phase::Waiting if self.process.is_some() => Some(LOOK_KEPT),
+            Phase::Ready | Phase::Running => Some(self.health.look_at().saturating_duration_since(now)),
             Phase::Waiting if !self.last_life => Some(self.since.saturating_duration_since(now)),
             _ => None,
         }
@@ -271,6 +269,7 @@ impl Child {
             }
             Phase::Waiting if self.may_spawn(now) => return self.spawn(now),
             Phase::Stopping => return self.press(now),
+            Phase::Ready | Phase::Running => return self.note_busy(node, now),
             _ => {}
         }
         None
@@ -279,6 +278,29 @@ impl Child {
     /// What its process says of itself in the node's table.
     fn state_of(&self, node: &Node) -> Option<ModuleState> {
         node.state_of(self.name, self.process.as_ref()?.id())
+    }
+
+    /// Whether it says that it is in error, and why is not known yet.
+    pub(super) fn asks_why(&mut self, node: &Node) -> bool {
+        let in_error = self.state_of(node) == Some(ModuleState::Error);
+        self.health.asks_why(in_error)
+    }
+
+    /// What went wrong with it, and what it is stuck in.
+    pub(super) fn health(&mut self) -> &mut Health {
+        &mut self.health
+    }
+
+    /// Looks whether a part of its own code has not come back for long.
+    fn note_busy(&mut self, node: &Node, now: Instant) -> Option<String> {
+        let word = node.last_word_of(self.name, self.process.as_ref()?.id())?;
+        let working = self.health.look(word.in_hand, now)?;
+        let told = format!(
+            "is busy: {}; until that comes back it hears nobody, and what is sent to it waits or is lost",
+            working.told(node, &self.names)
+        );
+        self.printed.warn(&told);
+        Some(format!("{} {told}", self.text))
     }
 
     fn may_spawn(&self, now: Instant) -> bool {
@@ -342,8 +364,9 @@ impl Child {
                 format!("{how}; starts again in {pause:?}")
             }
         };
+        self.health.ended((!success).then_some(&self.last_end));
         self.printed.pass_on((!success).then_some(&told));
-        format!("{} {told}{printed}", self.text)
+        format!("{} {told}{printed}{}", self.text, self.printed.trace_below())
     }
 
     /// It is not started again unless somebody asks for it, and then finds empty mailboxes: what was meant for this run must
@@ -363,96 +386,6 @@ impl Child {
     /// They are.
     pub(super) fn mailboxes_are_gone(&mut self) {
         self.mailboxes = Mailboxes::None;
-    }
-
-    fn ended_as_told(&mut self, ending: &Ending, how: &str, now: Instant) -> Option<String> {
-        let obeyed = if ending.killed.is_some() { "since it did not stop when told to" } else { "when told to" };
-        self.last_end = format!("{how} {obeyed}");
-        match ending.then {
-            Then::End => {
-                self.rest(Phase::Ended);
-                None
-            }
-            Then::Stay => {
-                self.rest(Phase::Stopped);
-                Some(format!("{} is stopped, as asked", self.text))
-            }
-            Then::Start => {
-                self.phase = Phase::Waiting;
-                self.since = now;
-                Some(format!("{} is started again, as asked", self.text))
-            }
-        }
-    }
-
-    /// Tells its process to end; `step` sees to it that it does. A later wish replaces an earlier one.
-    pub(super) fn tell_to_end(&mut self, then: Then, node: &Node, now: Instant) {
-        self.last_life |= then == Then::End;
-        if then == Then::Start {
-            self.policy.begin_anew();
-        }
-        if let Some(ending) = &mut self.ending {
-            ending.then = then;
-            return;
-        }
-        self.note_switch(node);
-        if self.phase.is_over() {
-            self.turn_on = self.configured_on;
-        }
-        if self.process.is_some() || self.over.is_some() {
-            self.kill(Signal::SIGTERM);
-            self.phase = Phase::Stopping;
-            self.ending = Some(Ending { then, since: now, killed: None, left_behind: false });
-        } else if then == Then::Start {
-            (self.phase, self.since) = (Phase::Waiting, now);
-        } else if !self.phase.is_over() {
-            self.rest(if then == Then::Stay { Phase::Stopped } else { Phase::Ended });
-        }
-    }
-
-    /// Sees to it that a process that was told to end does.
-    fn press(&mut self, now: Instant) -> Option<String> {
-        let (within, pid) = (self.stop_within, self.process.as_ref()?.id());
-        let ending = self.ending.as_mut()?;
-        match ending.killed {
-            None if now >= ending.press_at(within)? => {
-                self.force(now);
-                Some(format!("{} did not stop within {within:?}; killed", self.text))
-            }
-            Some(_) if now >= ending.press_at(within)? => {
-                // It waits for broken hardware, say. The others still have to be looked after.
-                ending.left_behind = true;
-                Some(format!("{} (process {pid}) cannot even be killed; left behind", self.text))
-            }
-            _ => None,
-        }
-    }
-
-    /// Kills a process that was told to end; false when there is none, or it was killed before.
-    pub(super) fn force(&mut self, now: Instant) -> bool {
-        let Some(ending) = self.ending.as_mut().filter(|ending| ending.killed.is_none()) else { return false };
-        ending.killed = Some(now);
-        // A stopped process obeys this one too.
-        self.kill(Signal::SIGKILL);
-        true
-    }
-
-    /// Whether it was told to end and did not within its time.
-    pub(super) fn overran(&self) -> bool {
-        self.ending.as_ref().is_some_and(|ending| ending.killed.is_some())
-    }
-
-    /// Whether there is nothing more to wait for.
-    pub(super) fn is_gone(&self) -> bool {
-        let left_behind = self.ending.as_ref().is_some_and(|ending| ending.left_behind);
-        left_behind || self.process.is_none() && self.over.is_none()
-    }
-
-    fn kill(&self, signal: Signal) {
-        if let Some(process) = &self.process {
-            // Not reaped yet, so the number still is this child's.
-            let _ = kill(Pid::from_raw(process.id() as i32), signal);
-        }
     }
 
     /// Launch ends: whatever happens, it is not started any more.

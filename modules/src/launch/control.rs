@@ -67,10 +67,16 @@ pub struct ChildState {
     pub lives: u32,
     /// How often its restart policy has started it again.
     pub restarts: u32,
+    /// How many of these count against its restart policy now,
+    pub attempt: u32,
+    /// and at how many it is given up.
+    pub attempts_max: u32,
     /// When it will be started again, ms from now.
     pub starts_in_ms: Option<u32>,
     /// How it ended the last time, or why it failed; empty if it never ended. With what it printed, as far as it fits.
     pub last_end: String,
+    /// The last that went wrong with it: why it is or was in error, or how it failed; empty if nothing did.
+    pub error: String,
     /// The last line that it printed; empty if it printed none.
     pub printed: String,
 }
@@ -192,17 +198,6 @@ impl ToolLink {
     /// See [`CallError`] and [`ControlError`].
     pub fn start(&mut self, launcher: Name, module: &str) -> Result<u32, CallError<ControlError>> {
         self.order(launcher, START, module)
-    }
-
-    /// Begins to ask for the states of the modules from this one on, and returns at once; [`Link::poll_as`] has the
-    /// answer, a [`Children`].
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    ///
-    /// [`Link::poll_as`]: crate::call::Link::poll_as
-    pub fn begin_children(&mut self, launcher: Name, first: u16) -> Result<u32, CallError> {
-        self.begin_asking(launcher, CHILDREN, &(first,))
     }
 
     /// Begins to have a module restarted, and returns at once; [`Link::poll_as`] has the answer, a `Result` of what

@@ -70,17 +70,14 @@ impl Looks {
     /// Looks, keeps what was seen, and returns its first page.
     pub(super) fn take(
         &mut self,
-        what: Look,
         form: u32,
         bytes_max: u16,
-        node: &Node,
-        installation: &Installation,
-        node_name: &str,
+        see: impl FnOnce() -> Result<Seen, LookError>,
     ) -> Result<LookPage, LookError> {
         if form != Seen::format() {
             return Err(LookError::Form(Seen::format()));
         }
-        let bytes = see(what, node, installation, node_name)?.to_bytes();
+        let bytes = see()?.to_bytes();
         if bytes.len() > LOOK_BYTES_MAX {
             return Err(LookError::TooLarge(bytes.len() as u32));
         }
@@ -101,7 +98,7 @@ impl Looks {
     }
 }
 
-fn see(what: Look, node: &Node, installation: &Installation, node_name: &str) -> Result<Seen, LookError> {
+pub(super) fn see(what: Look, node: &Node, installation: &Installation, node_name: &str) -> Result<Seen, LookError> {
     match what {
         Look::Survey(scope) => {
             let survey = Survey::within(scope, node, installation, node_name);

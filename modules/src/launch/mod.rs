@@ -20,38 +20,40 @@ mod control;
 mod end;
 mod error;
 mod events;
+mod health;
+mod known;
 mod leftovers;
 mod look;
 mod policy;
 mod printed;
 mod program;
 mod serve;
+mod start;
 
 pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase, launcher_of};
 pub(crate) use control::{LOOK, LOOK_ON};
 pub use error::LaunchError;
 pub use events::{Event, events};
+pub(crate) use known::read as known_children;
 pub use leftovers::CONFIG_FILE;
 pub use look::{LOOK_BYTES_MAX, Look, LookError, LookPage};
 
-use crate::call::CallError;
-use crate::output::Relay;
+use crate::output::{Relay, plain};
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
 use end::Ending;
 use events::Bell;
+use known::Known;
 use look::Looks;
 use program::Program;
-use rohrpost_config::{
-    Installation, Module, Node as NodeConfig, Program as Configured, Reach, TCP_CLIENT, TCP_ROUTER,
-    TimeSource as ConfiguredTime,
-};
+use rohrpost_config::{Installation, Module, Node as NodeConfig, Reach, TimeSource as ConfiguredTime};
 use rohrpost_mailbox::{
     LaunchLock, Name, Node, NodeError, TimeKeeper, TimeSource, node_directory, realtime_ns, remove_base_if_empty,
     wait_any,
 };
 use serve::{Counter, Orders};
+use start::UnderWay;
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::os::fd::OwnedFd;
@@ -71,9 +73,6 @@ const LET_GO: Duration = Duration::from_secs(1);
 /// Notes that are kept for who asks; the oldest go first.
 const NOTES_MAX: usize = 1000;
 
-/// A router that was started again so often, and is not ready, is not going to be.
-const ROUTER_RESTARTS_MAX: u32 = 8;
-
 /// A node that somebody else removes just now is taken at the next try, or the next but one.
 const TAKE_MAX: usize = 20;
 
@@ -84,12 +83,14 @@ pub struct Launch {
     node_name: String,
     node: Arc<Node>,
     children: Vec<Child>,
-    /// Of each child: the call that switches it on, while it is under way.
-    switching: Vec<Option<u32>>,
+    /// Of each child.
+    calls: Vec<UnderWay>,
     tool: ToolLink,
     counter: Counter,
     /// What it saw for tools on other nodes.
     looks: Looks,
+    /// What it knows of its modules, for tools on this node.
+    known: Known,
     bell: Bell,
     lock: LaunchLock,
     _time: TimeKeeper,
@@ -152,9 +153,9 @@ impl Launch {
         let time = begin_time(&node, &installation, node_name)?;
         leftovers::note_config(&node, &installation, node_name)?;
         let tool = ToolLink::join_as_launch(&installation, &node, node_name, PATIENCE)?;
-        let counter = Counter::open(&tool.link).map_err(ClientError::from)?;
+        let counter = Counter::open(&tool.link, &installation).map_err(ClientError::from)?;
         let bell = Bell::listen(events, tool.link.participant())?;
-        let relay = Relay::new(tool.link.participant());
+        let relay = Relay::new(tool.link.participant(), tool.link.me());
         let children: Vec<Child> = installation
             .modules_on(node_name)
             .filter(|module| missing.iter().all(|program| program.module != module.name))
@@ -166,17 +167,18 @@ impl Launch {
         // It holds launch's place on the node, which is to be given back if the start fails.
         drop(relay);
         let node_name = node_name.to_owned();
-        let switching = vec![None; children.len()];
-        let looks = Looks::default();
+        let calls = vec![UnderWay::default(); children.len()];
+        let (looks, known) = (Looks::default(), Known::default());
         let mut launch = Self {
             installation,
             node_name,
             node,
             children,
-            switching,
+            calls,
             tool,
             counter,
             looks,
+            known,
             bell,
             lock,
             _time: time,
@@ -186,76 +188,6 @@ impl Launch {
             Ok(()) => Ok(launch),
             Err(error) => Err(error.with(launch.stop())),
         }
-    }
-
-    fn start_all(&mut self) -> Result<(), LaunchError> {
-        for index in 0..self.children.len() {
-            // Unless somebody wants it stopped already.
-            if self.children[index].phase() == Phase::Waiting {
-                let note = self.children[index].spawn(Instant::now());
-                self.note(note);
-            }
-            // Looked at before each sleep: nothing may be left that would end it.
-            loop {
-                let child = &self.children[index];
-                match child.phase() {
-                    Phase::Failed => return Err(not_ready(child, child.last_end())),
-                    _ if self.can_do_without(child) => {
-                        let note = format!(
-                            "{} does not start yet; the others go on without it, and it is tried again",
-                            child.text()
-                        );
-                        self.note(Some(note));
-                        break;
-                    }
-                    _ if self.never_ready(child) => return Err(not_ready(child, child.last_end())),
-                    Phase::Starting | Phase::Waiting | Phase::Stopping => {}
-                    Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => break,
-                }
-                self.turn(0..index + 1, Duration::MAX, index)?;
-            }
-            // At once: switched off, the collector would drop what the others say while they start.
-            if Some(self.children[index].name().class()) == self.installation.classes.id(crate::output::CLASS) {
-                self.switch_on(index);
-            }
-        }
-        // One after the other, so that each finds those on that it needs.
-        for index in 0..self.children.len() {
-            self.switch_on(index);
-            while self.switching[index].is_some() {
-                let turned = self.turn(0..self.children.len(), Duration::MAX, index);
-                self.switch_on(index);
-                // Who is told to stop when the last answer has come has started, and stops as such.
-                if self.switching[index].is_some() {
-                    turned?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// What goes beyond the LAN is no reason to keep a robot from starting: its certificates may be missing, or its link not be there yet.
-    fn can_do_without(&self, child: &Child) -> bool {
-        let is_beyond = |module: &Module| matches!(&module.program, Configured::Builtin(name) if [TCP_CLIENT, TCP_ROUTER].contains(&name.as_str()));
-        child.restarts() > 0 && self.installation.module(child.name()).is_some_and(is_beyond)
-    }
-
-    /// A router is never given up, but a node on which it never was ready has not started: perhaps another one has its port.
-    fn never_ready(&self, child: &Child) -> bool {
-        let is_router = self.installation.module(child.name()).is_some_and(|module| !module.is_in_file());
-        is_router && child.restarts() > ROUTER_RESTARTS_MAX
-    }
-
-    /// Sleeps until something happens, then looks after those children that were started, and answers tools.
-    fn turn(&mut self, started: Range<usize>, period: Duration, index: usize) -> Result<(), LaunchError> {
-        self.sleep(started.clone(), period);
-        if self.bell.words() > 0 {
-            return Err(not_ready(&self.children[index], "told to stop"));
-        }
-        // Those that were started before may end meanwhile.
-        started.for_each(|index| self.step(index));
-        self.serve(false);
-        Ok(())
     }
 
     /// Moves one module on.
@@ -271,6 +203,8 @@ impl Launch {
         if !ending {
             (0..self.children.len()).for_each(|index| self.remove_left_mailboxes(index));
         }
+        let now = Instant::now();
+        self.known.write(&self.node, self.children.iter().map(|child| child.state(now)).collect());
         let (children, installation, node) = (&mut self.children[..], &*self.installation, &*self.node);
         let orders =
             Orders { children, installation, node, node_name: &self.node_name, looks: &mut self.looks, ending };
@@ -299,44 +233,13 @@ impl Launch {
         self.notes.drain(..excess);
     }
 
-    /// Switches a module on that is ready, or looks how far that is. Never waits: one that hangs must not keep the others
-    /// from being watched.
-    fn switch_on(&mut self, index: usize) {
-        let child = &mut self.children[index];
-        let call = self.switching[index].take();
-        if child.phase() != Phase::Ready {
-            // It ended meanwhile.
-            call.into_iter().for_each(|call| self.tool.link.forget(call));
-            return;
-        }
-        let answer = match call {
-            None if !child.wants_on() => Some(Ok(())),
-            None => match self.tool.begin_switch(child.name(), true) {
-                Ok(call) => return self.switching[index] = Some(call),
-                Err(error) => Some(Err(error)),
-            },
-            Some(call) => {
-                self.tool.link.collect();
-                let answer = self.tool.link.poll(call);
-                self.switching[index] = answer.is_none().then_some(call);
-                answer
-            }
-        };
-        let Some(answer) = answer else { return };
-        child.runs(answer.is_ok());
-        // The lower layers know numbers only.
-        let told = |error: CallError| error.to_string().replace(&child.name().to_string(), child.text());
-        let note = answer.err().map(|error| format!("{} could not be switched on: {}", child.text(), told(error)));
-        self.note(note);
-    }
-
     /// Sleeps until there is something to do for launch or for one of these children, at most for `period`.
     fn sleep(&mut self, children: Range<usize>, period: Duration) {
         // Late answers must not wait for ever in front of its sleep.
         self.tool.link.collect();
         let now = Instant::now();
         let looks = self.children[children].iter().filter_map(|child| child.look_again(now));
-        let switching = self.switching.iter().any(Option::is_some).then_some(LOOK_SWITCHING);
+        let switching = self.calls.iter().any(|calls| calls.switch.is_some()).then_some(LOOK_SWITCHING);
         let period = looks.chain(switching).fold(period, Duration::min);
         let mailboxes = &mut [self.counter.commands(), self.tool.link.replies()];
         wait_any(mailboxes, now.checked_add(period), || self.bell.was_rung());
@@ -348,6 +251,7 @@ impl Launch {
         for index in 0..self.children.len() {
             self.step(index);
             self.switch_on(index);
+            self.ask_why(index);
         }
         self.serve(false);
         self.bell.words() == 0
@@ -358,10 +262,13 @@ impl Launch {
         std::mem::take(&mut self.notes)
     }
 
-    /// Modules that failed for good, and why.
-    pub fn failures(&self) -> Vec<(String, String)> {
-        let failed = self.children.iter().filter(|child| child.phase() == Phase::Failed);
-        failed.map(|child| (child.text().to_owned(), child.last_end().to_owned())).collect()
+    /// Modules that failed for good or are in error, and why.
+    pub fn failures(&self) -> Vec<String> {
+        let failure = |child: &Child| match child.phase() {
+            Phase::Failed => Some(format!("{} failed for good: {}", child.text(), child.last_end())),
+            _ => child.present_error().map(|why| format!("{} is in error: {}", child.text(), plain::line(why))),
+        };
+        self.children.iter().filter_map(failure).collect()
     }
 
     /// Where launch stands with a module.
@@ -384,7 +291,9 @@ impl Launch {
     /// # Errors
     /// When its directory cannot be read.
     pub fn survey(&self) -> Result<Survey, NodeError> {
-        Survey::new(&self.node, &self.installation, &self.node_name)
+        let mut survey = Survey::new(&self.node, &self.installation, &self.node_name)?;
+        survey.ask_kernel();
+        Ok(survey)
     }
 
     /// Launch's own link, for calls.
@@ -436,10 +345,6 @@ impl Launch {
         }
         notes
     }
-}
-
-fn not_ready(child: &Child, why: &str) -> LaunchError {
-    LaunchError::NotReady { module: child.text().into(), why: why.into(), notes: Vec::new() }
 }
 
 /// Makes a node and becomes its launch.

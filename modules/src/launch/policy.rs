@@ -4,8 +4,10 @@ use rohrpost_config::{Restart, RestartPolicy};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Longest pause before a restart, unless the configured one is longer.
+/// Longest pause before a restart, unless the configured one is longer, or the time in which restarts are counted is shorter.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
+/// Without an end for so long, and for the time in which restarts are counted, the next begins with the short pause again.
+const STEADY: Duration = Duration::from_secs(10);
 
 /// What follows an end.
 #[derive(Debug, PartialEq, Eq)]
@@ -23,16 +25,22 @@ pub(super) struct Policy {
     restart: Restart,
     /// When it ended, of the times it was to be started again; the last of them, in which restarts are counted.
     ends: VecDeque<Instant>,
+    last_end: Option<Instant>,
     backoff: Duration,
 }
 
 impl Policy {
     pub(super) fn new(restart: Restart) -> Self {
-        Self { restart, ends: VecDeque::new(), backoff: restart.backoff }
+        Self { restart, ends: VecDeque::new(), last_end: None, backoff: restart.backoff }
     }
 
     pub(super) fn restart(&self) -> Restart {
         self.restart
+    }
+
+    /// Restarts that count now.
+    pub(super) fn counted(&self) -> u32 {
+        self.ends.len() as u32
     }
 
     /// A process has ended by itself.
@@ -50,18 +58,20 @@ impl Policy {
         if self.ends.len() > self.restart.at_most as usize {
             return Next::GivenUp;
         }
-        // Alone for a while, it begins with the short pause again.
-        if self.ends.len() == 1 {
+        let steady = self.restart.within.max(STEADY);
+        if self.last_end.replace(now).is_none_or(|last| now - last > steady) {
             self.backoff = self.restart.backoff;
         }
         let pause = self.backoff;
-        self.backoff = (self.backoff * 2).min(BACKOFF_MAX.max(self.restart.backoff));
+        let longest = BACKOFF_MAX.min(self.restart.within).max(self.restart.backoff);
+        self.backoff = (self.backoff * 2).min(longest);
         Next::Again(pause)
     }
 
     /// A person has started it: what was before counts no more.
     pub(super) fn begin_anew(&mut self) {
         self.ends.clear();
+        self.last_end = None;
     }
 }
 
@@ -92,6 +102,27 @@ mod tests {
         let mut policy = Policy::new(Restart { backoff: minute, within: minute * 10, ..restart });
         for at_s in [0, 61, 122] {
             assert_eq!(policy.ended(false, start + Duration::from_secs(at_s)), Next::Again(minute), "never shorter");
+        }
+    }
+
+    /// A router is never given up; the pauses bound how often it is tried, and how much is said of it, however long each life is.
+    #[test]
+    fn a_crash_loop_that_never_ends_is_slow() {
+        let (ms, second) = (Duration::from_millis, Duration::from_secs(1));
+        let restart = Restart { policy: RestartPolicy::Always, backoff: ms(10), at_most: 1000, within: second };
+        for life in [ms(0), ms(5), ms(300), ms(1200), ms(9000)] {
+            let mut policy = Policy::new(restart);
+            let mut now = Instant::now();
+            let mut pauses = Vec::new();
+            for _ in 0..20 {
+                now += life;
+                let Next::Again(pause) = policy.ended(false, now) else { panic!("a router is never given up") };
+                pauses.push(pause);
+                now += pause;
+            }
+            assert_eq!(pauses[0], ms(10));
+            assert!(pauses.is_sorted() && pauses[7..].iter().all(|pause| *pause == second), "{life:?}: {pauses:?}");
+            assert_eq!(policy.ended(false, now + STEADY + second * 2), Next::Again(ms(10)), "it worked for long");
         }
     }
 }

@@ -6,17 +6,18 @@
 //! ```
 //!
 //! The threads never wait for launch or the collector, so a module that prints is never kept from it. What is too much is
-//! suppressed and counted like what a module says. Lines that the module has sent itself are marked, and only remembered.
+//! suppressed and counted like what a module says. Lines that the module has sent itself are marked, and only remembered; so are those
+//! that say where a panic came from, which launch tells once and not again as long as they stay the same.
 
 use crate::common::OutputLevel;
-use crate::output::{SENT, Voice, Whisper};
+use crate::output::{SENT, TRACE_LINES_MAX, TRACED, Voice, Whisper};
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeReader, PipeWriter};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Lines that are kept to be told when it ends: a panic and its back trace.
+/// Lines that are kept to be told when it ends.
 const LINES_MAX: usize = 64;
 /// Longest line, bytes; the rest of a longer one is the next line.
 const LINE_BYTES_MAX: u64 = 4096;
@@ -29,11 +30,15 @@ pub(super) struct Printed {
     lines: Arc<Mutex<Lines>>,
     readers: Vec<JoinHandle<()>>,
     voice: Option<Voice>,
+    /// Where the panic came from that was told last.
+    told: Vec<String>,
 }
 
 #[derive(Default)]
 struct Lines {
     last: VecDeque<String>,
+    /// Where its panic came from.
+    trace: Vec<String>,
     held: VecDeque<Held>,
 }
 
@@ -48,7 +53,7 @@ struct Held {
 impl Printed {
     /// Of a module; `voice` speaks for it, if anybody listens.
     pub(super) fn new(voice: Option<Voice>) -> Self {
-        Self { lines: Arc::default(), readers: Vec::new(), voice }
+        Self { lines: Arc::default(), readers: Vec::new(), voice, told: Vec::new() }
     }
 
     /// Where the next process prints to: its standard output and standard error. What the one before said is forgotten.
@@ -77,12 +82,30 @@ impl Printed {
 
     /// All that is kept, each line on one of its own below what was said before.
     pub(super) fn below(&self) -> String {
-        lock(&self.lines).last.iter().map(|line| format!("\n    {line}")).collect()
+        below(&lock(&self.lines).last)
+    }
+
+    /// Where its panic came from, likewise; nothing, if that was told of an earlier one.
+    pub(super) fn trace_below(&mut self) -> String {
+        let trace = std::mem::take(&mut lock(&self.lines).trace);
+        if trace.is_empty() || trace == self.told {
+            return String::new();
+        }
+        let text = below(&trace);
+        self.told = trace;
+        text
     }
 
     /// The last line, empty if there is none.
     pub(super) fn last(&self) -> String {
         lock(&self.lines).last.back().cloned().unwrap_or_default()
+    }
+
+    /// Says of the module what launch has seen.
+    pub(super) fn warn(&self, text: &str) {
+        if let Some(voice) = &self.voice {
+            voice.say(OutputLevel::Warn, voice.now_ns(), text.to_owned());
+        }
     }
 
     /// Passes lines on that were held long enough.
@@ -120,6 +143,10 @@ impl Printed {
     }
 }
 
+fn below<'a>(lines: impl IntoIterator<Item = &'a String>) -> String {
+    lines.into_iter().map(|line| format!("\n    {line}")).collect()
+}
+
 fn lock(lines: &Mutex<Lines>) -> MutexGuard<'_, Lines> {
     lines.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -131,6 +158,13 @@ fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<Lines>, whisper: Opt
     while let Ok(1..) = io::Read::take(&mut pipe, LINE_BYTES_MAX).read_until(b'\n', &mut line) {
         let text = String::from_utf8_lossy(&line).trim_end().to_owned();
         line.clear();
+        if let Some(text) = text.strip_prefix(TRACED) {
+            let trace = &mut lock(lines).trace;
+            if trace.len() < TRACE_LINES_MAX {
+                trace.push(text.to_owned());
+            }
+            continue;
+        }
         let (text, sent) = match text.strip_prefix(SENT) {
             Some(text) => (text.to_owned(), true),
             None => (text, false),

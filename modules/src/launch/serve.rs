@@ -2,14 +2,15 @@
 
 use super::child::{Child, Then};
 use super::control::{Children, ControlError, Launcher, LauncherInterface};
-use super::look::{Look, LookError, LookPage, Looks};
+use super::look::{Look, LookError, LookPage, Looks, see};
 use crate::call::{Fault, Link};
 use crate::common;
 use crate::description::Description;
 use crate::interface::{Interface, Serve};
-use crate::runtime::server::{Call, Desk, Servant};
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{CreateError, Label, Name, Node, Receiver, SendError, Shape};
+use crate::runtime::refusals::{Cause, Refusals};
+use crate::runtime::server::{Call, Desk, Servant, admit};
+use rohrpost_config::{Installation, Principal};
+use rohrpost_mailbox::{CreateError, Head, Label, Name, Node, Receiver, SendError, Shape};
 use std::time::Instant;
 
 /// Commands taken in one go: a flood of them must not keep launch from its modules.
@@ -23,15 +24,21 @@ pub(super) struct Counter {
     description: Description,
     /// Postcard of it.
     bytes: Vec<u8>,
+    refusals: Refusals,
 }
 
 impl Counter {
-    pub(super) fn open(link: &Link) -> Result<Self, CreateError> {
+    pub(super) fn open(link: &Link, installation: &Installation) -> Result<Self, CreateError> {
         let commands = link.participant().clone().receiver(link.me(), Shape::default())?;
         let description = LauncherInterface::description();
         // Writing to a growing vector does not fail.
         let bytes = postcard::to_stdvec(&description).unwrap_or_default();
-        Ok(Self { desk: Desk::new(commands), description, bytes })
+        Ok(Self {
+            desk: Desk::new(commands, &installation.callers(link.me())),
+            description,
+            bytes,
+            refusals: Refusals::default(),
+        })
     }
 
     /// To wait on.
@@ -41,7 +48,8 @@ impl Counter {
 
     /// Answers those who have asked.
     pub(super) fn serve(&mut self, orders: Orders<'_>, link: &mut Link) {
-        let mut clerk = Clerk { orders, link, description: &self.description, bytes: &self.bytes };
+        let Self { description, bytes, refusals, .. } = self;
+        let mut clerk = Clerk { orders, link, description, bytes, refusals };
         for _ in 0..BURST {
             if !self.desk.handle(&mut clerk) {
                 return;
@@ -70,6 +78,7 @@ struct Clerk<'a> {
     link: &'a mut Link,
     description: &'a Description,
     bytes: &'a [u8],
+    refusals: &'a mut Refusals,
 }
 
 impl Servant for Clerk<'_> {
@@ -84,6 +93,14 @@ impl Servant for Clerk<'_> {
             number if number < common::FIRST_OWN => Err(Fault::Unknown(number)),
             number => LauncherInterface::serve(&mut self.orders, number, call.arguments, reply),
         }
+    }
+
+    fn admit(&self, head: &Head) -> Result<Principal, Fault> {
+        admit(self.orders.installation, head)
+    }
+
+    fn refuse(&mut self, cause: Cause, from: Name) {
+        self.refusals.note(cause, from);
     }
 
     fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
@@ -110,7 +127,7 @@ impl Launcher for Orders<'_> {
         let mut states = Vec::new();
         for child in self.children.iter().skip(first.into()) {
             let state = child.state(now);
-            bytes += 40 + state.module.len() + state.last_end.len() + state.printed.len();
+            bytes += 50 + state.module.len() + state.last_end.len() + state.error.len() + state.printed.len();
             if bytes > PAGE_BYTES {
                 break;
             }
@@ -150,7 +167,7 @@ impl Launcher for Orders<'_> {
     }
 
     fn look(&mut self, what: Look, form: u32, bytes_max: u16) -> Result<LookPage, LookError> {
-        self.looks.take(what, form, bytes_max, self.node, self.installation, self.node_name)
+        self.looks.take(form, bytes_max, || see(what, self.node, self.installation, self.node_name))
     }
 
     fn look_on(&mut self, look: u32, from: u32, bytes_max: u16) -> Result<LookPage, LookError> {

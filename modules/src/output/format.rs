@@ -1,6 +1,6 @@
 //! How a line is written: for people, in a terminal or a file, and for programs.
 
-use super::OutputLine;
+use super::{OutputLine, plain};
 use rohrpost_config::{Installation, TimeSource};
 use serde::Serialize;
 use std::fmt::Write;
@@ -102,15 +102,14 @@ pub fn iso(time_ns: u64) -> String {
     humantime::format_rfc3339_micros(UNIX_EPOCH + Duration::from_nanos(time_ns)).to_string()
 }
 
-/// A text of several lines goes on behind a tab: only what begins a line of output begins a line of the file. Other control
-/// characters are written out: what a module says must not move a terminal's cursor.
+/// A text of several lines goes on behind a tab: only what begins a line of output begins a line of the file. What else a terminal
+/// would obey is written out.
 fn escape(text: &str, into: &mut String) {
     for c in text.chars() {
         match c {
             '\n' => into.push_str("\n\t"),
             '\t' => into.push('\t'),
-            c if c.is_control() => into.extend(c.escape_default()),
-            c => into.push(c),
+            c => plain::put(c, into),
         }
     }
 }
@@ -190,9 +189,9 @@ optional = true
     fn only_a_line_of_output_begins_a_line() {
         let installation = Installation::parse(CONFIG, Path::new("said.toml")).unwrap();
         let format = Format::new(&installation);
-        let said = "panicked at a.rs:1:2:\nred \x1b[31m\r\nand\ttab";
+        let said = "panicked at a.rs:1:2:\nred \x1b[31m\u{202e}\r\nand\ttab";
         let text = format.short(&line(Name::new(1, 200, 0, 0), said));
-        let shown = "panicked at a.rs:1:2:\n\tred \\u{1b}[31m\\r\n\tand\ttab";
+        let shown = "panicked at a.rs:1:2:\n\tred \\u001b[31m\\u202e\\r\n\tand\ttab";
         assert_eq!(text, format!("00:00:05.006 warn  base/motor.0: {shown}"));
         let json = format.json(&line(Name::new(1, 200, 0, 0), said));
         assert!(!json.contains('\n'));

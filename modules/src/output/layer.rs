@@ -1,7 +1,8 @@
 //! From `tracing` events to lines.
 
+use super::print::Print;
 use super::way::Lane;
-use super::{TEXT_MAX, way};
+use super::{TEXT_MAX, trace, way};
 use crate::common::OutputLevel;
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::fmt::{self, Write};
@@ -11,28 +12,29 @@ use tracing::subscriber::Interest;
 use tracing::{Event, Metadata, Subscriber};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt};
 
-/// Lines of a back trace that are printed: what lies further out is how the program began. Launch keeps 64 lines to tell when
-/// a process has ended, and the panic itself is to be among them.
-const TRACE_LINES_MAX: usize = 40;
-
-/// Makes this process's events and panics lines.
+/// Makes this process's events lines.
 pub(super) fn listen() {
     let subscriber = tracing_subscriber::registry().with(OutputLayer);
     // Fails only if the program set one of its own; then that one has the lines.
     let _ = tracing::subscriber::set_global_default(subscriber);
-    std::panic::set_hook(Box::new(|panic| {
-        if let Some(output) = way::installed() {
-            // Its own words are: panicked at FILE:LINE:COLUMN, and below them the reason.
-            let text = match std::thread::current().name() {
-                None | Some("main") => panic.to_string(),
-                Some(thread) => format!("thread `{thread}` {panic}"),
-            };
-            output.panicked(cut(text));
-            let trace = Backtrace::capture();
-            if trace.status() == BacktraceStatus::Captured {
-                // Asked for by RUST_BACKTRACE; too long for a line.
-                trace.to_string().lines().take(TRACE_LINES_MAX).for_each(|line| super::print(&line));
-            }
+}
+
+/// Makes its panics lines, and prints where they came from, if RUST_BACKTRACE asks for that.
+pub(super) fn listen_for_panics(how: Print) {
+    std::panic::set_hook(Box::new(move |panic| {
+        // Its own words are: panicked at FILE:LINE:COLUMN, and below them the reason.
+        let text = match std::thread::current().name() {
+            None | Some("main") => panic.to_string(),
+            Some(thread) => format!("thread `{thread}` {panic}"),
+        };
+        match way::installed() {
+            Some(output) => output.panicked(cut(text)),
+            None => super::print(&text),
+        }
+        let trace = Backtrace::capture();
+        if trace.status() == BacktraceStatus::Captured {
+            let all = std::env::var("RUST_BACKTRACE").is_ok_and(|wanted| wanted == "full");
+            trace::lines(&trace.to_string(), all).into_iter().for_each(|line| how.traced(line));
         }
     }));
 }
@@ -91,7 +93,7 @@ fn level_of_event(level: &tracing::Level) -> OutputLevel {
 }
 
 /// What is too long ends with a `…`, never inside a character.
-pub(super) fn cut(mut text: String) -> String {
+pub(crate) fn cut(mut text: String) -> String {
     if text.len() > TEXT_MAX {
         let end = (0..=TEXT_MAX - 4).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
         text.truncate(end);

@@ -14,16 +14,21 @@ mod allowance;
 mod format;
 mod layer;
 mod out;
+pub mod plain;
 mod print;
 mod relay;
+mod trace;
 mod way;
 
 #[cfg(feature = "builtin")]
 pub use format::{Format, iso};
 pub(crate) use print::print;
 pub(crate) use relay::{Relay, Voice, Whisper};
+pub(crate) use trace::LINES_MAX as TRACE_LINES_MAX;
 pub(crate) use way::is_installed;
 pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
+#[cfg(feature = "builtin")]
+pub(crate) use {allowance::Bucket, layer::cut, way::LANES, way::WAITING_LINES};
 
 use crate::common::OutputLevel;
 use postcard_schema::Schema;
@@ -39,13 +44,15 @@ pub const TEXT_MAX: usize = 900;
 
 /// Begins each line that a launched module prints although it has sent it, too: launch repeats it, and does not send it again.
 pub(crate) const SENT: char = '\u{1e}';
+/// Begins each line that says where a panic came from, of a launched module: launch tells it once, and does not send it.
+pub(crate) const TRACED: char = '\u{1d}';
 
 /// One line of output.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct OutputLine {
     /// System time at which it was said, ns since 1970.
     pub time_ns: u64,
-    /// Module that said it: the 32 bits of its name.
+    /// Module that said it: the 32 bits of its name, which is the sender's; or a module of whose node the sender is launch.
     pub module: u32,
     /// How important it is.
     pub level: OutputLevel,

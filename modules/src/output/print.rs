@@ -1,7 +1,7 @@
 //! What this process writes to its standard error: whoever reads it may be gone, or stopped, and neither is a reason to panic or
 //! to wait.
 
-use super::SENT;
+use super::{SENT, TRACED};
 use crate::common::OutputLevel;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use std::fmt::Display;
@@ -44,6 +44,15 @@ impl Print {
     pub(super) fn lost(self, level: OutputLevel, text: &str) {
         if self.repeats(level) {
             print(&format_args!("{:5} {text}", level.name()));
+        }
+    }
+
+    /// A line of where a panic came from: for the terminal, once, and no line of output.
+    pub(super) fn traced(self, line: &str) {
+        match self {
+            Self::All => print(&line),
+            Self::Errors => print(&format_args!("{TRACED}{line}")),
+            Self::Nothing => {}
         }
     }
 

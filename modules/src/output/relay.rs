@@ -13,6 +13,8 @@ use std::time::Instant;
 /// The way to the collector, shared by all for whom this process speaks.
 pub(crate) struct Relay {
     participant: Arc<Participant>,
+    /// Launch's own name, under which it sends.
+    from: Name,
     out: Arc<Out>,
 }
 
@@ -23,13 +25,13 @@ pub(crate) struct Voice(Arc<Output>);
 pub(crate) struct Whisper(Weak<Output>);
 
 impl Relay {
-    pub(crate) fn new(participant: &Arc<Participant>) -> Self {
-        Self { participant: participant.clone(), out: Arc::default() }
+    pub(crate) fn new(participant: &Arc<Participant>, from: Name) -> Self {
+        Self { participant: participant.clone(), from, out: Arc::default() }
     }
 
     /// None: the configuration knows no collector.
     pub(crate) fn voice(&self, installation: &Installation, module: Name) -> Option<Voice> {
-        let output = Output::new(&self.participant, installation, module, self.out.clone(), Print::Nothing)?;
+        let output = Output::new(&self.participant, installation, module, self.from, self.out.clone(), Print::Nothing)?;
         Some(Voice(Arc::new(output)))
     }
 }

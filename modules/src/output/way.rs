@@ -15,6 +15,12 @@ use std::time::{Duration, Instant};
 
 /// Lines that wait in this process while the collector is not there or has no room: panics, errors, others.
 const WAITING_MAX: [usize; 3] = [16, 64, 256];
+/// All of these.
+#[cfg(feature = "builtin")]
+pub(crate) const WAITING_LINES: u64 = (WAITING_MAX[0] + WAITING_MAX[1] + WAITING_MAX[2]) as u64;
+/// Each has the allowance of configuration.
+#[cfg(feature = "builtin")]
+pub(crate) const LANES: u64 = Lane::ALL.len() as u64;
 /// How soon one that had no room is tried again.
 const RETRY_FULL: Duration = Duration::from_millis(20);
 /// How long a process that ends gives its last lines to find the collector.
@@ -63,6 +69,8 @@ struct Waiting {
 /// What is said in the name of one module: by its own process, or by launch for what it printed.
 pub(super) struct Output {
     me: Name,
+    /// Under whose name its packages go: the module's, or launch's.
+    from: Name,
     to: Name,
     priority: Priority,
     /// An [`OutputLevel`] as a number.
@@ -86,10 +94,12 @@ pub(super) struct Output {
 pub fn install(participant: &Arc<Participant>, installation: &Installation, me: Name, launched: bool) {
     // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard error.
     let print = if launched { Print::Errors } else { Print::All };
-    let Some(output) = Output::new(participant, installation, me, Arc::default(), print) else { return };
-    if OUTPUT.set(output).is_ok() {
+    if let Some(output) = Output::new(participant, installation, me, me, Arc::default(), print)
+        && OUTPUT.set(output).is_ok()
+    {
         layer::listen();
     }
+    layer::listen_for_panics(print);
 }
 
 impl Output {
@@ -98,6 +108,7 @@ impl Output {
         participant: &Arc<Participant>,
         installation: &Installation,
         me: Name,
+        from: Name,
         out: Arc<Out>,
         print: Print,
     ) -> Option<Self> {
@@ -106,6 +117,7 @@ impl Output {
         let to = Name::new(me.system(), class.0, 0, LINES);
         Some(Self {
             me,
+            from,
             to,
             priority: class.priority(),
             level: AtomicU8::new(level_of(installation.output_level(me)) as u8),
@@ -375,17 +387,13 @@ impl Output {
         // The line that was held back may be that of another for whom this process speaks.
         let own = line.module() == self.me;
         line.lost = if own { self.lost_now.swap(0, Ordering::Relaxed) } else { 0 };
-        let label = Label {
-            from: line.module(),
-            kind: Type::data(1),
-            id: 0,
-            priority: self.priority,
-            options: Options::STAMPED,
-        };
+        let label =
+            Label { from: self.from, kind: Type::data(1), id: 0, priority: self.priority, options: Options::STAMPED };
         way.bytes.clear();
         // A line can be written: text and numbers.
         let _ = crate::interface::append(&mut way.bytes, &line);
-        let head = DataHead { stamp_ns: line.time_ns, sequence: way.sequence, missed: line.lost };
+        let (stamp_ns, sequence, missed) = (line.time_ns, way.sequence, line.lost);
+        let head = DataHead { stamp_ns, sequence, missed, incarnation: 0 };
         let Some(sender) = &mut way.sender else { return false };
         let sent = sender.send(&label, &[&head.to_bytes(), &way.bytes]);
         self.out.held.store(false, Ordering::Relaxed);

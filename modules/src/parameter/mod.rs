@@ -50,6 +50,7 @@ pub use declared::{Declared, put_parameter};
 pub use kinds::ParameterType;
 pub use words::{from_file, from_word, toml_text, value_text};
 
+use crate::output::plain::line;
 use crate::value::{Value, WalkError, decode};
 use postcard_schema::Schema;
 use postcard_schema::schema::owned::OwnedNamedType;
@@ -128,7 +129,7 @@ pub enum Refusal {
     #[error("the module has no parameters")]
     NoParameters,
     /// It has others.
-    #[error("there is no parameter `{name}`; there are {known}")]
+    #[error("there is no parameter `{}`; there are {}", line(.name), line(.known))]
     Unknown {
         /// As it was asked for.
         name: String,
@@ -136,10 +137,10 @@ pub enum Refusal {
         known: String,
     },
     /// Which value is meant?
-    #[error("`{0}` is given twice")]
+    #[error("`{}` is given twice", line(.0))]
     Twice(String),
     /// A value of another type.
-    #[error("`{name}`: {text}")]
+    #[error("`{}`: {}", line(.name), line(.text))]
     Type {
         /// The parameter.
         name: String,
@@ -147,7 +148,7 @@ pub enum Refusal {
         text: String,
     },
     /// A value too small or too large.
-    #[error("`{name}` is {value}, out of range: {range}")]
+    #[error("`{}` is {}, out of range: {}", line(.name), line(.value), line(.range))]
     Range {
         /// The parameter.
         name: String,
@@ -157,7 +158,7 @@ pub enum Refusal {
         range: String,
     },
     /// The module itself does not want it.
-    #[error("the module refuses: {0}")]
+    #[error("the module refuses: {}", line(.0))]
     Module(String),
 }
 

@@ -1,14 +1,16 @@
 //! What a module can ask of its runtime.
 
+use super::face::Face;
 use super::follow::{Followings, Rate, Subscription};
+use super::refusals::Refusals;
 use crate::call::{Caller, Link};
 use crate::common::DataHead;
 use crate::interface::{DataPort, Proxy, append};
 use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
-use rohrpost_config::{ClassTable, Installation, NameTextError};
+use rohrpost_config::{ClassTable, Installation, NameTextError, Principal};
 use rohrpost_mailbox::{
-    CreateError, Full, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock,
+    CreateError, Full, Head, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock,
     SystemTime, Type, Watch, Watches, local,
 };
 use std::cell::RefCell;
@@ -42,9 +44,25 @@ pub enum ContextError {
     /// A subscription into a mailbox that this module has not opened.
     #[error("this module has no mailbox {0} for data; make it with `open_mailbox` before it is subscribed into")]
     NoMailbox(u8),
+    /// More subscriptions than have ids.
+    #[error("this module has 65536 subscriptions, and no id for another")]
+    TooMany,
     /// Data that no face of this module publishes.
     #[error("this module has no face of class `{0}`; add one to `faces` in the configuration, or to its `Interfaces`")]
     NoFace(&'static str),
+    /// Data of an interface that the program does not serve under the name that has its class.
+    #[error(
+        "data `{data}` of an interface of class `{class}` cannot be published as `{module}`: its program does not serve that \
+         interface there, so nobody could subscribe to it; add it to the module's `Interfaces`"
+    )]
+    Undeclared {
+        /// The data.
+        data: &'static str,
+        /// Class of its interface.
+        class: &'static str,
+        /// The module or face.
+        module: String,
+    },
     /// The value cannot be written as postcard.
     #[error("data `{0}` cannot be written: {1}")]
     Encode(&'static str, postcard::Error),
@@ -56,16 +74,23 @@ pub struct Context {
     pub(crate) installation: Arc<Installation>,
     pub(crate) link: Caller,
     pub(crate) faces: Vec<Name>,
+    /// Of each face, the hash of the interface that the module serves there, if it serves one.
+    served: Vec<Option<u32>>,
+    /// Numbers and names of the functions of all of them.
+    pub(crate) functions: Vec<(u16, String)>,
     pub(crate) newest: Vec<Newest>,
     /// Counts what is published.
     publications: Publications,
     pub(crate) subscriptions: Subscriptions,
     pub(crate) followings: Followings,
+    pub(crate) refusals: Refusals,
     pub(crate) clock: SystemClock,
     /// Mailboxes of the module's own, besides commands, replies and data.
     pub(crate) own: Vec<Receiver>,
-    /// Mailboxes that take data, by local id, and whether only the newest counts there.
+    /// Mailboxes that take subscribed data, by local id, and whether only the newest counts there.
     taking: Vec<(u8, bool)>,
+    /// Mailboxes that take data from all.
+    open: Vec<u8>,
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
     pub(crate) period: Option<Duration>,
@@ -83,23 +108,36 @@ impl Context {
         data: &Shape,
     ) -> Self {
         let publications = Publications::new(link.participant());
+        let followings = Followings::of(link.incarnation());
+        let named: Vec<Principal> = faces.iter().flat_map(|face| installation.callers(*face)).collect();
+        let subscriptions = Subscriptions::new(&named);
         Self {
             me,
             installation,
             link: Rc::new(RefCell::new(link)),
             faces,
+            served: Vec::new(),
+            functions: Vec::new(),
             newest: Vec::new(),
             publications,
-            subscriptions: Subscriptions::default(),
-            followings: Followings::default(),
+            subscriptions,
+            followings,
+            refusals: Refusals::default(),
             clock,
             own: Vec::new(),
             taking: vec![(local::DATA, data.full == Full::Latest)],
+            open: Vec::new(),
             watches: None,
             period: None,
             next_tick: None,
             scratch: Vec::new(),
         }
+    }
+
+    /// Under its names the module serves these interfaces.
+    pub(super) fn serves<M>(&mut self, faces: &[Face<M>]) {
+        self.served = faces.iter().map(|face| face.offer.serve.map(|_| face.offer.hash)).collect();
+        self.functions = faces.iter().flat_map(|face| face.offer.functions.iter().cloned()).collect();
     }
 
     /// The module's own name.
@@ -203,19 +241,46 @@ impl Context {
     ) -> Result<Subscription<T>, ContextError> {
         let known = self.taking.iter().copied().find(|(local, _)| *local == mailbox);
         let (mailbox, latest) = known.ok_or(ContextError::NoMailbox(mailbox))?;
-        Ok(Subscription::new(self.followings.follow((mailbox, latest), from, number, interface, rate), mailbox))
+        let followed = self.followings.follow((mailbox, latest), from, number, interface, rate);
+        Ok(Subscription::new(followed.ok_or(ContextError::TooMany)?, mailbox))
     }
 
-    /// Makes a mailbox of the module's own, local id 3 or more. What it brings comes to [`crate::Module::received`]: data that
-    /// were subscribed to with [`Context::subscribe_in`], and packages of others whose bodies begin as those of data do.
+    /// Makes a mailbox of the module's own, local id 3 or more, for [`Context::subscribe_in`]. It takes what the module has subscribed
+    /// to, and nothing else.
     ///
     /// # Errors
     /// When it cannot be made.
     pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
-        let participant = self.link.borrow().participant().clone();
-        self.own.push(participant.receiver(self.me.with_local(local), shape)?);
+        self.make_mailbox(local, shape)?;
         self.taking.push((local, shape.full == Full::Latest));
         Ok(())
+    }
+
+    /// Makes a mailbox of the module's own, local id 3 or more, that takes data from all: what comes to it comes to
+    /// [`crate::Module::received`], whoever sent it, if it begins as data do. Whose word counts is for the module to judge.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn open_mailbox_to_all(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
+        self.make_mailbox(local, shape)?;
+        self.open.push(local);
+        Ok(())
+    }
+
+    fn make_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
+        let participant = self.link.borrow().participant().clone();
+        self.own.push(participant.receiver(self.me.with_local(local), shape)?);
+        Ok(())
+    }
+
+    /// Whether data may go on to the module: they come to a mailbox that takes them from all, or belong to a subscription. What may not is
+    /// counted.
+    pub(crate) fn admits(&mut self, (mailbox, latest): (u8, bool), head: &Head, number: u16, data: &DataHead) -> bool {
+        if self.open.contains(&mailbox) {
+            return true;
+        }
+        let judged = self.followings.admit((mailbox, latest), head, number, data);
+        judged.map_err(|cause| self.refusals.note(cause, head.from)).is_ok()
     }
 
     /// Waits for a file descriptor too: a serial port, a socket, a pipe, anything that `poll` knows. When there is something to do
@@ -262,14 +327,14 @@ impl Context {
     /// A subscriber whose mailbox is full misses it, and sees that it did.
     ///
     /// # Errors
-    /// [`ContextError::NoFace`] or [`ContextError::Encode`].
+    /// [`ContextError::NoFace`], [`ContextError::Undeclared`] or [`ContextError::Encode`].
     pub fn publish<T: Data>(&mut self, port: DataPort<T>, stamp_ns: u64, value: &T) -> Result<(), ContextError> {
         let class = self.installation.classes.id(port.class);
         let face = self.faces.iter().position(|face| Some(face.class()) == class);
         let face = face.ok_or(ContextError::NoFace(port.class))?;
         self.scratch.clear();
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
-        let at = self.newest_at(face, port.number);
+        let at = self.newest_at(face, &port)?;
         let newest = &mut self.newest[at];
         (newest.name, newest.stamp_ns) = (port.name, stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);
@@ -289,14 +354,18 @@ impl Context {
         self.publish(port, self.now().ns, value)
     }
 
-    fn newest_at(&mut self, face: usize, number: u16) -> usize {
-        match self.newest.iter().position(|newest| (newest.face, newest.number) == (face, number)) {
-            Some(at) => at,
-            None => {
-                self.newest.push(Newest { face, number, ..Newest::default() });
-                self.newest.len() - 1
-            }
+    fn newest_at<T>(&mut self, face: usize, port: &DataPort<T>) -> Result<usize, ContextError> {
+        let number = port.number;
+        if let Some(at) = self.newest.iter().position(|newest| (newest.face, newest.number) == (face, number)) {
+            return Ok(at);
         }
+        // Asked once, since what is refused is never the newest.
+        if self.served.get(face).copied().flatten() != Some((port.hash)()) {
+            let module = self.installation.classes.format(self.faces[face]);
+            return Err(ContextError::Undeclared { data: port.name, class: port.class, module });
+        }
+        self.newest.push(Newest { face, number, ..Newest::default() });
+        Ok(self.newest.len() - 1)
     }
 
     /// Delivers periodic data that is due.
@@ -320,20 +389,22 @@ fn deliver(
     newest: &Newest,
     to: &crate::publish::Subscription,
 ) -> Delivery {
-    let head = DataHead { stamp_ns: newest.stamp_ns, sequence: to.sequence, missed: to.missed };
+    let asked = &to.asked;
+    let (stamp_ns, incarnation) = (newest.stamp_ns, asked.incarnation);
+    let head = DataHead { stamp_ns, sequence: to.sequence, missed: to.missed, incarnation };
     let label = Label {
         from: faces[newest.face].with_local(local::COMMANDS),
         kind: Type::data(newest.number),
         id: to.wish.id,
-        priority: to.priority,
-        options: if to.newest { Options::STAMPED.with(Options::NEWEST) } else { Options::STAMPED },
+        priority: asked.priority,
+        options: if asked.newest { Options::STAMPED.with(Options::NEWEST) } else { Options::STAMPED },
     };
-    match link.borrow_mut().send(to.to, &label, &[&head.to_bytes(), &newest.value]) {
+    match link.borrow_mut().send(asked.to, &label, &[&head.to_bytes(), &newest.value]) {
         Ok(()) => Delivery::Sent,
         Err(SendError::NoMailbox(_)) => Delivery::Gone,
         Err(SendError::TooLarge { len, max, .. }) => {
             if !to.told {
-                let (data, subscriber) = (newest.name, classes.format(to.to.module()));
+                let (data, subscriber) = (newest.name, classes.format(asked.to.module()));
                 tracing::error!(
                     "`{data}` cannot be delivered to {subscriber}: it has {len} bytes, and the data mailbox there takes \
                      {max}; raise `size` in [module.mailbox.data] of {subscriber}"
@@ -342,48 +413,5 @@ fn deliver(
             Delivery::TooLarge
         }
         Err(_) => Delivery::Full,
-    }
-}
-
-/// Data that a subscription brought.
-pub struct Received<'a> {
-    /// The module that published it.
-    pub from: Name,
-    /// Data number in its interface.
-    pub number: u16,
-    /// Mailbox it came to.
-    pub mailbox: u8,
-    /// Which subscription.
-    pub(crate) id: u16,
-    /// Time, number, misses.
-    pub head: DataHead,
-    /// The value, postcard.
-    pub value: &'a [u8],
-}
-
-impl Received<'_> {
-    /// The value, if it belongs to this subscription and can be read. What cannot be read is told as a warning.
-    pub fn read<T: Data>(&self, subscription: &Subscription<T>) -> Option<T> {
-        if self.is_of(subscription) { self.decode() } else { None }
-    }
-
-    /// The value, if it came to this mailbox of the module's own and can be read.
-    pub fn read_from<T: Data>(&self, mailbox: u8) -> Option<T> {
-        if self.mailbox == mailbox { self.decode() } else { None }
-    }
-
-    fn decode<T: Data>(&self) -> Option<T> {
-        match postcard::from_bytes(self.value) {
-            Ok(value) => Some(value),
-            Err(error) => {
-                tracing::warn!("data {} of {} cannot be read: {error}", self.number, self.from);
-                None
-            }
-        }
-    }
-
-    /// Whether it belongs to this subscription.
-    pub fn is_of<T>(&self, subscription: &Subscription<T>) -> bool {
-        (self.mailbox, self.id) == (subscription.mailbox, subscription.id)
     }
 }

@@ -4,6 +4,7 @@ use super::server::Desk;
 use crate::call::Fault;
 use crate::description::Description;
 use crate::interface::{ServeFunction, Served};
+use rohrpost_config::Principal;
 use rohrpost_mailbox::{Name, Receiver};
 
 /// One face. A module without further faces has this one.
@@ -22,18 +23,28 @@ pub(crate) struct Offer<M> {
     /// None: the module serves no interface under this name, only the common functions.
     pub(crate) serve: Option<ServeFunction<M>>,
     pub(crate) hash: u32,
+    /// Numbers of its functions, and what they are called.
+    pub(crate) functions: Vec<(u16, String)>,
     /// Postcard of the description.
     pub(crate) description: Vec<u8>,
 }
 
 impl<M> Face<M> {
-    pub(crate) fn new(name: Name, class: &str, commands: Receiver, served: Option<Served<M>>) -> Self {
+    /// `named`: who always finds a place as its caller.
+    pub(crate) fn new(
+        name: Name,
+        class: &str,
+        commands: Receiver,
+        named: &[Principal],
+        served: Option<Served<M>>,
+    ) -> Self {
         let (serve, description) = match served {
             Some(Served { description, serve, .. }) => (Some(serve), description),
             None => (None, bare(class)),
         };
         let hash = description.hash();
         let idempotent = description.functions.iter().filter(|f| f.idempotent).map(|f| f.number).collect();
+        let functions = description.functions.iter().map(|f| (f.number, f.name.clone())).collect();
         let data = description.data.iter().map(|item| item.number).collect();
         // Writing to a growing vector does not fail.
         let description = postcard::to_stdvec(&description).unwrap_or_default();
@@ -42,8 +53,8 @@ impl<M> Face<M> {
             // On a full /dev/shm, say: a module that could take its mailboxes over goes on all the same.
             tracing::warn!("{name}: tools cannot describe it: {error}");
         }
-        let offer = Offer { idempotent, data, serve, hash, description };
-        Self { name, desk: Desk::new(commands), offer }
+        let offer = Offer { idempotent, data, serve, hash, functions, description };
+        Self { name, desk: Desk::new(commands, named), offer }
     }
 }
 

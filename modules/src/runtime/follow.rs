@@ -1,9 +1,10 @@
 //! The subscribing side of continuous data: asks, renews, and sees gaps.
 
-use crate::call::{CallError, Fault, Link};
+use super::refusals::Cause;
+use crate::call::{CallError, Fault, Link, is_to};
 use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use crate::interface::append;
-use rohrpost_mailbox::{Name, Options};
+use rohrpost_mailbox::{Head, Name, Options};
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};
 
@@ -74,14 +75,21 @@ struct Followed {
 }
 
 /// All that a module follows.
-#[derive(Default)]
 pub(crate) struct Followings {
+    /// A subscription's id is its place here; none is used twice in a life.
     list: Vec<Followed>,
+    /// Of this life of the module, as its requests carry it.
+    incarnation: u32,
 }
 
 impl Followings {
-    /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id. `latest`: there only the newest
-    /// counts, and on the way as well.
+    /// Of a module whose link has this incarnation: nothing yet.
+    pub(crate) fn of(incarnation: u32) -> Self {
+        Self { list: Vec::new(), incarnation }
+    }
+
+    /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id, if one is left. `latest`: there
+    /// only the newest counts, and on the way as well.
     pub(crate) fn follow(
         &mut self,
         (mailbox, latest): (u8, bool),
@@ -89,8 +97,8 @@ impl Followings {
         number: u16,
         interface: u32,
         rate: Rate,
-    ) -> u16 {
-        let id = self.list.len() as u16;
+    ) -> Option<u16> {
+        let id = u16::try_from(self.list.len()).ok()?;
         let period_us = match rate {
             Rate::Each => 0,
             Rate::Every(period) => crate::call::micros(period).max(1),
@@ -111,7 +119,7 @@ impl Followings {
             lost: 0,
             refusal: None,
         });
-        id
+        Some(id)
     }
 
     /// Packages that should have come and did not.
@@ -155,19 +163,32 @@ impl Followings {
         self.list.iter().map(|followed| followed.next).min()
     }
 
-    /// Notes the number of a package that came to `mailbox`. `latest`: a gap there is what newer ones replaced, there or on the way, and no loss.
-    pub(crate) fn note(&mut self, mailbox: u8, latest: bool, from: Name, id: u16, head: &DataHead) {
-        let its = |followed: &&mut Followed| (followed.from, followed.wish.mailbox) == (from.module(), mailbox);
-        let Some(followed) = self.list.get_mut(usize::from(id)).filter(its) else { return };
-        followed.came += 1;
-        if let Some(expected) = followed.expected {
-            // A publisher that was restarted begins at 0 again; that is no gap.
-            let gap = head.sequence.wrapping_sub(expected);
-            if head.sequence != 0 && gap < u32::MAX / 2 && !latest {
-                followed.lost += u64::from(gap);
-            }
+    /// Whether data that came to `mailbox` are what was subscribed to; if so, notes their number. `latest`: a gap there is what newer ones
+    /// replaced, there or on the way, and no loss.
+    ///
+    /// A subscription is told by its id and by the incarnation of this life, which nothing before it has had: so whoever still sends what an
+    /// earlier life asked for, in whatever order that subscribed, is not taken for another. The publisher and the number are compared
+    /// besides, since both numbers are no secret; a router lets nobody send in the name of another node's module.
+    pub(crate) fn admit(
+        &mut self,
+        (mailbox, latest): (u8, bool),
+        head: &Head,
+        number: u16,
+        data: &DataHead,
+    ) -> Result<(), Cause> {
+        let its = |followed: &&mut Followed| followed.wish.mailbox == mailbox;
+        let followed = self.list.get_mut(usize::from(head.id)).filter(its).ok_or(Cause::Unasked)?;
+        if !is_to(followed.from, head.from) {
+            return Err(Cause::OtherPublisher);
         }
-        followed.expected = Some(head.sequence.wrapping_add(1));
+        if number != followed.wish.number {
+            return Err(Cause::OtherNumber);
+        }
+        if data.incarnation != self.incarnation {
+            return Err(Cause::EarlierLife);
+        }
+        followed.note(latest, data.sequence);
+        Ok(())
     }
 
     /// Tells all publishers that nothing is wanted any more; does not wait for an answer.
@@ -183,6 +204,18 @@ impl Followings {
 }
 
 impl Followed {
+    fn note(&mut self, latest: bool, sequence: u32) {
+        self.came += 1;
+        if let Some(expected) = self.expected {
+            // A publisher that was restarted begins at 0 again; that is no gap.
+            let gap = sequence.wrapping_sub(expected);
+            if sequence != 0 && gap < u32::MAX / 2 && !latest {
+                self.lost += u64::from(gap);
+            }
+        }
+        self.expected = Some(sequence.wrapping_add(1));
+    }
+
     fn answered(&mut self, answer: Result<(), CallError>, now: Instant) {
         match answer {
             Ok(()) => self.refusal = None,
@@ -206,5 +239,46 @@ impl Followed {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LASER: Name = Name::new(1, 150, 0, 0);
+    const WHEELS: Name = Name::new(1, 160, 0, 0);
+    const LIFE: u32 = 1_234_567_890;
+
+    #[test]
+    fn only_what_was_asked_for_in_this_life_is_taken() {
+        let mut followings = Followings::of(LIFE);
+        for (mailbox, from, number) in [(2, LASER, 1), (3, LASER, 1), (2, WHEELS, 1), (2, LASER, 2)] {
+            followings.follow((mailbox, false), from, number, 77, Rate::Each).unwrap();
+        }
+        let mut followed = 0;
+        for (id, mailbox, from, number, incarnation, taken, why) in [
+            (0, 2, LASER, 1, LIFE, Ok(()), "as asked for"),
+            (0, 2, LASER.with_local(1), 1, LIFE, Ok(()), "whichever of the publisher's mailboxes stands in the head"),
+            (1, 3, LASER, 1, LIFE, Ok(()), "the same data in another mailbox"),
+            (0, 3, LASER, 1, LIFE, Err(Cause::Unasked), "that is another subscription's mailbox"),
+            (4, 2, LASER, 1, LIFE, Err(Cause::Unasked), "no such id"),
+            (u16::MAX, 2, LASER, 1, LIFE, Err(Cause::Unasked), "nor this one"),
+            (0, 2, WHEELS, 1, LIFE, Err(Cause::OtherPublisher), "as if subscribed in another order"),
+            (0, 2, Name::new(2, 150, 0, 0), 1, LIFE, Err(Cause::OtherPublisher), "a robot that visits"),
+            (0, 2, Name::new(1, 150, 1, 0), 1, LIFE, Err(Cause::OtherPublisher), "another scanner"),
+            (0, 2, LASER, 2, LIFE, Err(Cause::OtherNumber), "as if subscribed in another order"),
+            (3, 2, LASER, 1, LIFE, Err(Cause::OtherNumber), "and the other way round"),
+            (0, 2, LASER, 1, LIFE - 1, Err(Cause::EarlierLife), "what the life before asked for"),
+            (0, 2, LASER, 1, 0, Err(Cause::EarlierLife), "what nobody asked for"),
+        ] {
+            let head = Head { from, id, ..Head::default() };
+            let data = DataHead { stamp_ns: 0, sequence: followed, missed: 0, incarnation };
+            assert_eq!(followings.admit((mailbox, false), &head, number, &data), taken, "{why}");
+            followed += u32::from(taken.is_ok());
+        }
+        // What was dropped counts nowhere.
+        let came: Vec<u64> = followings.tallies().map(|(_, _, came, _)| came).collect();
+        assert_eq!((came, followings.lost()), (vec![2, 1, 0, 0], 0));
     }
 }

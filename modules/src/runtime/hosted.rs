@@ -4,14 +4,16 @@ use super::context::Context;
 use super::exchange;
 use super::face::Offer;
 use super::parameters;
+use super::refusals::Cause;
 use super::runner::Life;
-use super::server::{Call, Servant, read_arguments, write_result};
+use super::server::{Call, Servant, admit, read_arguments, write_result};
 use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
 use crate::module::Module;
 use crate::output;
 use crate::publish::Asked;
-use rohrpost_mailbox::{Label, Name, Options, SendError, local, monotonic_ns};
+use rohrpost_config::Principal;
+use rohrpost_mailbox::{Head, Label, Name, Options, SendError, Work, local, monotonic_ns};
 
 /// What is needed to run one command.
 pub(super) struct Hosted<'a, M> {
@@ -34,7 +36,16 @@ impl<M: Module> Servant for Hosted<'_, M> {
         }
         self.life.require_on()?;
         let serve = self.offer.serve.ok_or(Fault::Unknown(call.number))?;
-        serve(&mut self.life.module, call.number, call.arguments, reply)
+        let part = |module: &mut M, _: &mut Context| serve(module, call.number, call.arguments, reply);
+        self.life.work(Work::Function(call.number), self.context, part)
+    }
+
+    fn admit(&self, head: &Head) -> Result<Principal, Fault> {
+        admit(&self.context.installation, head)
+    }
+
+    fn refuse(&mut self, cause: Cause, from: Name) {
+        self.context.refusals.note(cause, from);
     }
 
     fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
@@ -45,12 +56,19 @@ impl<M: Module> Servant for Hosted<'_, M> {
 impl<M: Module> Hosted<'_, M> {
     fn common(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         match call.number {
-            common::ON => self.life.turn_on(self.context),
+            common::ON => {
+                let () = read_arguments(call.arguments)?;
+                self.life.turn_on(self.context)
+            }
             common::OFF => {
+                let () = read_arguments(call.arguments)?;
                 self.life.turn_off(self.context);
                 Ok(())
             }
-            common::STATUS => write_result(reply, &self.life.status(self.context)),
+            common::STATUS => {
+                let () = read_arguments(call.arguments)?;
+                write_result(reply, &self.life.status(self.context))
+            }
             common::GET_DATA => self.get_data(call, reply),
             common::SUBSCRIBE => {
                 let (wish,): (Subscribe,) = read_arguments(call.arguments)?;
@@ -58,9 +76,20 @@ impl<M: Module> Hosted<'_, M> {
                 let to = data_mailbox(call, wish.mailbox)?;
                 let now_ns = monotonic_ns();
                 let subscriptions = &mut self.context.subscriptions;
-                let asked = Asked { to, priority: call.head.priority, newest: call.head.options.has(Options::NEWEST) };
+                let asked = Asked {
+                    by: call.head.from,
+                    principal: self.context.installation.principal(call.head.from),
+                    incarnation: call.incarnation,
+                    to,
+                    priority: call.head.priority,
+                    newest: call.head.options.has(Options::NEWEST),
+                };
                 let room = subscriptions.subscribe(self.index, asked, wish, now_ns);
-                if room { Ok(()) } else { Err(Fault::Busy) }
+                if room {
+                    return Ok(());
+                }
+                self.context.refusals.note(Cause::NoPlace, call.head.from);
+                Err(Fault::Busy)
             }
             common::UNSUBSCRIBE => {
                 let (wish,): (Unsubscribe,) = read_arguments(call.arguments)?;
@@ -79,11 +108,15 @@ impl<M: Module> Hosted<'_, M> {
             common::SET_PARAMETERS => {
                 let wish: SetParameters = read_arguments(call.arguments)?;
                 let by = self.context.installation.classes.format(call.head.from.module());
-                let set = parameters::set(&mut self.life.module, self.context, &wish, &by);
+                let part = |module: &mut M, context: &mut Context| parameters::set(module, context, &wish, &by);
+                let set = self.life.work(Work::Parameters, self.context, part);
                 self.life.changes = self.life.changes.wrapping_add(u32::from(set.is_ok() && !wish.only_check));
                 write_result(reply, &set)
             }
-            common::TIME => write_result(reply, &TimeReport::of(&self.context.clock)),
+            common::TIME => {
+                let () = read_arguments(call.arguments)?;
+                write_result(reply, &TimeReport::of(&self.context.clock))
+            }
             common::EXCHANGE => {
                 let (from,): (u16,) = read_arguments(call.arguments)?;
                 write_result(reply, &exchange::page(self.context, from))

@@ -15,13 +15,16 @@ mod follow;
 mod host;
 mod hosted;
 mod parameters;
+mod received;
+pub(crate) mod refusals;
 mod runner;
 pub(crate) mod server;
 mod start;
 
-pub use context::{Context, ContextError, Received};
+pub use context::{Context, ContextError};
 pub use follow::{Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};
+pub use received::Received;
 pub use runner::{exit, run, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;

@@ -1,15 +1,20 @@
 //! The loop of a module's one thread.
 
-use super::context::{Context, Received};
+use super::context::Context;
 use super::face::Face;
 use super::hosted::Hosted;
+use super::received::Received;
+use super::refusals::Cause;
 use super::start::{Start, StartError};
 use crate::call::Fault;
 use crate::common::{DataHead, Status};
 use crate::interface::Interfaces;
 use crate::module::{Module, ModuleError};
 use crate::output;
-use rohrpost_mailbox::{Full, Kind, ModuleState, Participant, Receiver, Waiting, Watches, monotonic_ns, wait_any};
+use crate::survey::in_words;
+use rohrpost_mailbox::{
+    Full, Kind, ModuleState, Participant, Receiver, Waiting, Watches, Work, monotonic_ns, wait_any,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -75,14 +80,32 @@ pub(crate) struct Life<M> {
     state: ModuleState,
     error: String,
     started: Instant,
+    /// A part of the module's code that took so long is told.
+    busy_after: Duration,
 }
 
 impl<M: Module> Life<M> {
-    pub(crate) fn new(module: M, participant: Arc<Participant>) -> Self {
+    pub(crate) fn new(module: M, participant: Arc<Participant>, busy_after: Duration) -> Self {
         let (state, started) = (ModuleState::Starting, Instant::now());
-        let mut life = Self { module, changes: 0, participant, state, error: String::new(), started };
+        let mut life = Self { module, changes: 0, participant, state, error: String::new(), started, busy_after };
         life.enter(ModuleState::Off);
         life
+    }
+
+    /// Runs a part of the module's own code. Whoever looks sees which, and since when; what took long is told.
+    pub(crate) fn work<T>(
+        &mut self,
+        work: Work,
+        context: &mut Context,
+        part: impl FnOnce(&mut M, &mut Context) -> T,
+    ) -> T {
+        self.participant.begin_work(work);
+        let result = part(&mut self.module, context);
+        let lasted = self.participant.end_work();
+        if lasted >= self.busy_after {
+            tracing::warn!("was in {} for {:.1} s", in_words(work, &context.functions), lasted.as_secs_f64());
+        }
+        result
     }
 
     /// What a handler left half done is not to be trusted; but what it drives must be made safe.
@@ -90,7 +113,7 @@ impl<M: Module> Life<M> {
         self.error = format!("panicked: {text}");
         self.enter(ModuleState::Error);
         // Whatever its state: it may have panicked half way on.
-        if catch_unwind(AssertUnwindSafe(|| self.module.off(context))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| self.work(Work::Off, context, M::off))).is_err() {
             tracing::error!("panicked again on the way to its safe state");
         }
     }
@@ -113,7 +136,7 @@ impl<M: Module> Life<M> {
             return Ok(());
         }
         self.error.clear();
-        if let Err(error) = self.module.on(context) {
+        if let Err(error) = self.work(Work::On, context, M::on) {
             self.fail(&error, context);
             return Err(Fault::ModuleError(self.error.clone()));
         }
@@ -127,7 +150,7 @@ impl<M: Module> Life<M> {
 
     pub(crate) fn turn_off(&mut self, context: &mut Context) {
         if self.state == ModuleState::On {
-            self.module.off(context);
+            self.work(Work::Off, context, M::off);
             tracing::info!("is off");
         }
         self.error.clear();
@@ -135,7 +158,7 @@ impl<M: Module> Life<M> {
     }
 
     fn fail(&mut self, error: &ModuleError, context: &mut Context) {
-        self.module.off(context);
+        self.work(Work::Off, context, M::off);
         self.error = error.to_string();
         tracing::error!("{error}");
         self.enter(ModuleState::Error);
@@ -159,6 +182,7 @@ impl<M: Module> Life<M> {
             output_lost: output::lost(),
             output_suppressed: output::suppressed(),
             output_level: output::level(),
+            refused: context.refusals.counts,
         }
     }
 }
@@ -250,7 +274,7 @@ impl<M: Module> Running<M> {
             // Ticks that were slept through are not made up for; the grid stays where it was.
             let passed = (now - due).as_nanos() / period.as_nanos();
             self.context.next_tick = Some(due + period * (u32::try_from(passed).unwrap_or(u32::MAX - 1) + 1));
-            let result = self.life.module.tick(&mut self.context);
+            let result = self.life.work(Work::Tick, &mut self.context, M::tick);
             self.life.check(result, &mut self.context);
         }
     }
@@ -271,7 +295,8 @@ impl<M: Module> Running<M> {
         while self.is_on()
             && let Some(ready) = self.context.watches.as_mut().and_then(Watches::next_ready)
         {
-            let result = self.life.module.ready(&mut self.context, ready);
+            let part = |module: &mut M, context: &mut Context| module.ready(context, ready);
+            let result = self.life.work(Work::Ready, &mut self.context, part);
             self.life.check(result, &mut self.context);
         }
     }
@@ -305,7 +330,7 @@ impl<M: Module> Running<M> {
 
     fn end(mut self) {
         if self.life.state == ModuleState::On {
-            self.life.module.off(&mut self.context);
+            self.life.work(Work::Off, &mut self.context, M::off);
         }
         self.context.followings.end(&mut self.context.link.borrow_mut());
         self.life.enter(ModuleState::Stopping);
@@ -334,13 +359,13 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Life<M>, context: &mut Con
         let Some(package) = mailbox.try_receive() else { return false };
         let head = package.head();
         let (Kind::Data(number), Some((data, value))) = (head.kind.kind(), DataHead::split(package.body())) else {
-            tracing::warn!("{} sent {} a package that is no data ({:?})", head.from, head.to, head.kind.kind());
+            context.refusals.note(Cause::Malformed, head.from);
             return true;
         };
-        context.followings.note(local, latest, head.from, head.id, &data);
-        if life.state == ModuleState::On {
+        if context.admits((local, latest), head, number, &data) && life.state == ModuleState::On {
             let received = Received { from: head.from, number, mailbox: local, id: head.id, head: data, value };
-            let result = life.module.received(context, &received);
+            let part = |module: &mut M, context: &mut Context| module.received(context, &received);
+            let result = life.work(Work::Received(number), context, part);
             life.check(result, context);
         }
         true

@@ -1,8 +1,10 @@
 //! Commands: taken from a mailbox, decided on, run by whoever serves there, answered.
 
+use super::refusals::Cause;
 use crate::call::{CallEnvelope, Fault, Once, ReplyEnvelope, Request, Verdict};
 use crate::common::{self, DescriptionPart};
 use crate::interface::append;
+use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{Head, Kind, Label, Name, Options, Package, Receiver, SendError, Type, local, monotonic_ns};
 
 /// Whoever runs the commands of a mailbox: a module under one of its names, or launch.
@@ -11,6 +13,10 @@ pub(crate) trait Servant {
     fn is_idempotent(&self, number: u16) -> bool;
     /// Runs a command; what it has to say is appended to the reply.
     fn run(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault>;
+    /// Whose share of places a command uses, unless its sender may not command at all.
+    fn admit(&self, head: &Head) -> Result<Principal, Fault>;
+    /// Counts what is not taken.
+    fn refuse(&mut self, cause: Cause, from: Name);
     /// Sends an answer.
     fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError>;
 }
@@ -24,9 +30,9 @@ pub(crate) struct Desk {
 }
 
 impl Desk {
-    /// Whoever had this mailbox before has ended by now, and ran nothing after this.
-    pub(crate) fn new(commands: Receiver) -> Self {
-        Self { commands, once: Once::new(monotonic_ns()), reply: Vec::with_capacity(1024) }
+    /// Whoever had this mailbox before has ended by now, and ran nothing after this. These principals always find a place.
+    pub(crate) fn new(commands: Receiver, named: &[Principal]) -> Self {
+        Self { commands, once: Once::new(monotonic_ns(), named), reply: Vec::with_capacity(1024) }
     }
 
     /// Handles the next command; false when there is none.
@@ -36,21 +42,34 @@ impl Desk {
         let (Kind::Command(number), Ok((envelope, arguments))) =
             (head.kind.kind(), CallEnvelope::split(package.body()))
         else {
-            tracing::warn!("{} sent {} a package that is no command ({:?})", head.from, head.to, head.kind.kind());
+            servant.refuse(Cause::Malformed, head.from);
             return true;
         };
+        let principal = match servant.admit(&head) {
+            Ok(principal) => principal,
+            Err(fault) => {
+                servant.refuse(Cause::NotAllowed, head.from);
+                fill(&mut self.reply, &fault);
+                answer(servant, &head, number, &envelope, true, &self.reply);
+                return true;
+            }
+        };
         let now_ns = monotonic_ns();
-        let request = request(&package, &envelope, servant.is_idempotent(number), now_ns);
+        let request = request(&package, &envelope, principal, servant.is_idempotent(number), now_ns);
         let (error, body): (bool, &[u8]) = match self.once.judge(&request, now_ns) {
             Verdict::Ignore => return true,
             Verdict::Again(error, body) => (error, body),
             Verdict::Refuse(fault) => {
+                if fault == Fault::Busy {
+                    servant.refuse(Cause::NoPlace, head.from);
+                }
                 fill(&mut self.reply, &fault);
                 (true, &self.reply)
             }
             Verdict::Run => {
                 self.reply.clear();
-                let call = Call { number, head, hash: envelope.interface, arguments };
+                let CallEnvelope { interface: hash, incarnation, .. } = envelope;
+                let call = Call { number, head, hash, incarnation, arguments };
                 let error = match servant.run(&call, &mut self.reply) {
                     Ok(()) => false,
                     Err(fault) => {
@@ -67,11 +86,28 @@ impl Desk {
     }
 }
 
-fn request(package: &Package<'_>, envelope: &CallEnvelope, idempotent: bool, now_ns: u64) -> Request {
+/// Judges by `[access]` who sent a command, and says whose share of places it uses. The routers have judged by the same rules what comes
+/// from other nodes; here it holds for what comes from the same one, too.
+pub(crate) fn admit(installation: &Installation, head: &Head) -> Result<Principal, Fault> {
+    let Some(rule) = installation.access_against(head.from, head.to) else {
+        return Ok(installation.principal(head.from));
+    };
+    let node = installation.node_of(head.to).unwrap_or("?").to_owned();
+    Err(Fault::NotAllowed { node, rule: format!("{}:{}", installation.shown.display(), rule.line) })
+}
+
+fn request(
+    package: &Package<'_>,
+    envelope: &CallEnvelope,
+    principal: Principal,
+    idempotent: bool,
+    now_ns: u64,
+) -> Request {
     let head = package.head();
     let waited_ns = now_ns.saturating_sub(package.published_ns());
     Request {
         from: head.from,
+        principal,
         incarnation: envelope.incarnation,
         sequence: envelope.sequence,
         valid_for_ns: u64::from(envelope.valid_for_us) * 1000,
@@ -120,6 +156,8 @@ pub(crate) struct Call<'a> {
     pub(crate) head: Head,
     /// Hash of the interface that the caller knows.
     hash: u32,
+    /// The caller's.
+    pub(crate) incarnation: u32,
     pub(crate) arguments: &'a [u8],
 }
 

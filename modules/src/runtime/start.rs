@@ -12,7 +12,7 @@ use rohrpost_config::{
     Errors, Installation, MailboxSpec, NameTextError, Scheduling, SettingsError, Start as StartState,
 };
 use rohrpost_mailbox::{
-    CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, base_directory, local,
+    CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, Work, base_directory, local,
     node_directory, sys,
 };
 use std::os::fd::{AsFd, OwnedFd};
@@ -70,6 +70,19 @@ pub enum StartError {
     /// A face without an interface.
     #[error("`{0}` is a face of `{1}`, but that program has no interface of class `{2}`")]
     Face(String, String, String),
+    /// An interface without a name that it is reached by.
+    #[error(
+        "the program of `{module}` serves an interface of class `{interface}`, but the module is called {names}: nobody could call \
+         it, and its data could not be published; give the module a name or a face of class `{interface}`, or run another program"
+    )]
+    Interface {
+        /// The module.
+        module: String,
+        /// Its names.
+        names: String,
+        /// Class of the interface.
+        interface: &'static str,
+    },
     /// Launch is gone.
     #[error("launch, process {0}, ended before this module began")]
     Orphan(u32),
@@ -90,9 +103,12 @@ impl StartError {
         match self {
             // As command lines everywhere do.
             Self::Usage(_) => 2,
-            Self::Config(_) | Self::Name(_) | Self::NoModule(..) | Self::Settings(_) | Self::Face(..) => {
-                Self::CONFIGURATION
-            }
+            Self::Config(_)
+            | Self::Name(_)
+            | Self::NoModule(..)
+            | Self::Settings(_)
+            | Self::Face(..)
+            | Self::Interface { .. } => Self::CONFIGURATION,
             Self::Node(_) | Self::Mailbox(_) | Self::Orphan(_) | Self::Module(..) | Self::System(..) => 1,
         }
     }
@@ -182,7 +198,13 @@ impl Start {
                 return Err(StartError::Face(installation.classes.format(name), text, class));
             }
             let commands = receiver(name.with_local(local::COMMANDS), &module.mailboxes.commands)?;
-            faces.push(Face::new(name, &class, commands, at.map(|at| served.swap_remove(at))));
+            let named = installation.callers(name);
+            faces.push(Face::new(name, &class, commands, &named, at.map(|at| served.swap_remove(at))));
+        }
+        if let Some(left) = served.first() {
+            let names: Vec<String> =
+                module.names().map(|name| format!("`{}`", installation.classes.format(name))).collect();
+            return Err(StartError::Interface { module: text, names: names.join(", "), interface: left.class });
         }
         let data = receiver(self.name.with_local(local::DATA), &module.mailboxes.data)?;
         let replies = receiver(self.name.with_local(local::REPLIES), &module.mailboxes.replies)?;
@@ -191,13 +213,16 @@ impl Start {
         let names = faces.iter().map(|face: &Face<M>| face.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock, data.shape());
         let settings = installation.settings_as(module)?;
-        let mut made =
-            M::new(settings, &mut context).map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
+        context.serves(&faces);
+        participant.begin_work(Work::New);
+        let made = M::new(settings, &mut context);
+        participant.end_work();
+        let mut made = made.map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
         let spin = module.spin;
-        let life = Life::new(made, participant);
+        let life = Life::new(made, participant, module.busy_after);
         Ok(Running { life, faces, data, context, stop, turn_on, by_hand, spin, receivers: Vec::new() })
     }
 }

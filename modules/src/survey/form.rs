@@ -8,7 +8,8 @@ mod detail;
 mod tests;
 mod traffic;
 
-use super::{MailboxLook, ModuleSurvey, Survey, Usage};
+use super::{MailboxLook, ModuleSurvey, Survey, Usage, Working};
+use crate::launch::ChildState;
 use detail::{DetailForm, detail, detail_form};
 use postcard_schema::Schema;
 use postcard_schema::schema::owned::OwnedNamedType;
@@ -92,6 +93,14 @@ struct ModuleForm {
     sent: u64,
     bytes_out: u64,
     depth: u32,
+    working: Option<WorkingForm>,
+    child: Option<ChildState>,
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct WorkingForm {
+    part: String,
+    lasts_ms: u64,
 }
 
 #[derive(Serialize, Deserialize, Schema)]
@@ -193,6 +202,11 @@ fn module_form(module: &ModuleSurvey) -> ModuleForm {
         sent: module.sent,
         bytes_out: module.bytes_out,
         depth: module.depth,
+        working: module.working.as_ref().map(|working| WorkingForm {
+            part: working.part.clone(),
+            lasts_ms: u64::try_from(working.lasts.as_millis()).unwrap_or(u64::MAX),
+        }),
+        child: module.child.clone(),
     }
 }
 
@@ -218,6 +232,11 @@ fn module(form: ModuleForm) -> ModuleSurvey {
         sent: form.sent,
         bytes_out: form.bytes_out,
         depth: form.depth,
+        working: form
+            .working
+            .map(|working| Working { part: working.part, lasts: Duration::from_millis(working.lasts_ms) }),
+        child: form.child,
+        error: None,
     }
 }
 
@@ -252,6 +271,8 @@ fn process(form: ProcessForm) -> ParticipantInfo {
         }),
         restarts: form.restarts,
         joined_ns: form.joined_ns,
+        // What lasts long is in the module's own form, with the names of functions.
+        in_hand: None,
     }
 }
 

@@ -11,7 +11,8 @@ const TICKS_PER_S: u64 = 100;
 pub struct Usage {
     /// Time that its threads ran, those that have ended included; in steps of 10 ms.
     pub cpu: Duration,
-    /// Memory that is resident, its mailboxes included.
+    /// Its share of memory: what is resident of it alone, and of what several processes have, mailboxes above all, its part. Where the kernel does
+    /// not tell that, what is resident.
     pub memory_bytes: u64,
 }
 
@@ -19,7 +20,7 @@ impl Usage {
     /// Of this process; none when it has ended.
     pub fn of(pid: u32) -> Option<Self> {
         let read = |file| std::fs::read_to_string(format!("/proc/{pid}/{file}")).ok();
-        Some(Self { cpu: cpu(&read("stat")?)?, memory_bytes: memory_bytes(&read("status")?)? })
+        Some(Self { cpu: cpu(&read("stat")?)?, memory_bytes: memory(read)? })
     }
 }
 
@@ -31,9 +32,15 @@ fn cpu(stat: &str) -> Option<Duration> {
     Some(Duration::from_millis((user + system) * (1000 / TICKS_PER_S)))
 }
 
-/// From `status`, which says kB: `statm` says pages, and how large those are is not in /proc.
-fn memory_bytes(status: &str) -> Option<u64> {
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+fn memory(read: impl Fn(&'static str) -> Option<String>) -> Option<u64> {
+    // A page that is mapped more than once, or by several processes, is resident for each mapping.
+    let share = read("smaps_rollup").and_then(|text| kilobytes(&text, "Pss:"));
+    share.or_else(|| kilobytes(&read("status")?, "VmRSS:"))
+}
+
+/// A line of kB: `statm` says pages, and how large those are is not in /proc.
+fn kilobytes(text: &str, key: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
 }
 
@@ -50,8 +57,14 @@ mod tests {
 
     #[test]
     fn memory_is_told_in_bytes() {
-        assert_eq!(memory_bytes("Name:\tx\nVmRSS:\t    2048 kB\nRssAnon:\t1 kB\n"), Some(2 << 20));
-        assert_eq!(memory_bytes("Name:\tx\n"), None, "a zombie has none");
+        let status = "Name:\tx\nVmRSS:\t    2048 kB\nRssAnon:\t1 kB\n";
+        let rollup = "5630-7ffc ---p 0 00:00 0 [rollup]\nRss:          999424 kB\nPss:             7168 kB\nPss_Dirty:       12 kB\n";
+        let of = |rollup: Option<&str>, status: &str| {
+            memory(|file| if file == "status" { Some(status.into()) } else { rollup.map(str::to_owned) })
+        };
+        assert_eq!(of(Some(rollup), status), Some(7 << 20));
+        assert_eq!(of(None, status), Some(2 << 20), "another user's process, or an old kernel");
+        assert_eq!(of(Some(""), "Name:\tx\n"), None, "a zombie has none");
     }
 
     #[test]

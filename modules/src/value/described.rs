@@ -65,6 +65,12 @@ mod tests {
 
     #[test]
     fn what_nests_without_end_is_refused() {
+        // As much as a program's first thread has, which reads descriptions; a test's has less, and unoptimised code needs much.
+        let read = std::thread::Builder::new().stack_size(8 << 20).spawn(nest).unwrap();
+        read.join().unwrap();
+    }
+
+    fn nest() {
         for (levels, fits) in [(0, true), (1, true), (DEPTH_MAX - 2, true), (DEPTH_MAX, false), (500_000, false)] {
             let read = read_described::<OwnedNamedType>(&nested(levels));
             let problem = read.err().map(|error| error.problem);

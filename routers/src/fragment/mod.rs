@@ -30,6 +30,8 @@ pub struct Whole<'a> {
     pub head: Head,
     /// Sequence of the datagram with its first part: its place in the order.
     pub first: u64,
+    /// Something newer of its flow was delivered before it.
+    pub is_late: bool,
     /// Its body.
     pub body: &'a [u8],
 }
@@ -53,15 +55,19 @@ struct Partial {
     came: [u64; PARTS_MAX as usize / 64],
     missing: u16,
     touched_ns: u64,
+    /// Something newer of its flow was delivered.
+    is_late: bool,
     body: Vec<u8>,
 }
 
 impl Reassembly {
     /// Takes a part; the whole if it was the last that was missing. A part that does not agree with the others of its package is dropped.
+    /// `is_late` is asked when a package begins: whether something newer of its flow was delivered before.
     pub fn take(
         &mut self,
         now_ns: u64,
         part: &Fragment<'_>,
+        is_late: impl FnOnce() -> bool,
         mut tell: impl FnMut(&Head, &[u8], Change),
     ) -> Option<Whole<'_>> {
         let is_its =
@@ -73,7 +79,7 @@ impl Reassembly {
             None => {
                 tell(&part.head, &[], Change::Began);
                 let at = self.room_for(part, &mut tell)?;
-                self.partial[at].begin(part);
+                self.partial[at].begin(part, is_late());
                 at
             }
         };
@@ -82,7 +88,19 @@ impl Reassembly {
             return None;
         }
         partial.is_used = false;
-        Some(Whole { head: partial.head, first: partial.first, body: &partial.body })
+        let Partial { head, first, is_late, .. } = *partial;
+        if !is_late {
+            self.delivers(&head, first);
+        }
+        Some(Whole { head, first, is_late, body: &self.partial[at].body })
+    }
+
+    /// A package of the datagram of this sequence is delivered: what is put together of its flow and began before it is late from now on.
+    pub fn delivers(&mut self, newer: &Head, sequence: u64) {
+        let flow = |head: &Head| (head.to, head.from, head.priority);
+        for older in self.partial.iter_mut().filter(|older| older.is_used && older.first < sequence) {
+            older.is_late |= flow(&older.head) == flow(newer) && !broken!(TakesLate);
+        }
     }
 
     /// Gives up what no part came of for too long.
@@ -161,11 +179,12 @@ impl Partial {
             came: [0; PARTS_MAX as usize / 64],
             missing: 0,
             touched_ns: 0,
+            is_late: false,
             body: Vec::with_capacity(usize::from(u16::MAX)),
         }
     }
 
-    fn begin(&mut self, part: &Fragment<'_>) {
+    fn begin(&mut self, part: &Fragment<'_>, is_late: bool) {
         let Fragment { first, count, head, .. } = *part;
         let mut body = std::mem::take(&mut self.body);
         // What is not overwritten is not handed out: see `Fragment::is_sound`.
@@ -180,6 +199,7 @@ impl Partial {
             came,
             missing: count,
             touched_ns: 0,
+            is_late,
             body,
         };
     }

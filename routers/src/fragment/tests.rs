@@ -36,7 +36,7 @@ impl Cut {
 /// Takes a part; first of the package that is whole now, and what became of others.
 fn take(parts: &mut Reassembly, now_ns: u64, part: &Fragment<'_>) -> (Option<u64>, Vec<(u64, Change)>) {
     let mut changes = Vec::new();
-    let whole = parts.take(now_ns, part, |head, _, change| changes.push((head.priority.0.into(), change)));
+    let whole = parts.take(now_ns, part, || false, |head, _, change| changes.push((head.priority.0.into(), change)));
     (whole.map(|whole| whole.first), changes)
 }
 
@@ -46,7 +46,7 @@ fn check_any_order() {
     for index in [3, 0, 4, 1] {
         assert_eq!(take(&mut parts, 0, &cut.part(index)).0, None);
     }
-    let whole = parts.take(0, &cut.part(2), |_, _, _| unreachable!()).unwrap();
+    let whole = parts.take(0, &cut.part(2), || false, |_, _, _| unreachable!()).unwrap();
     assert_eq!((whole.head, whole.first, whole.body), (cut.head, 5, &cut.body[..]));
     assert!(parts.is_empty());
 }
@@ -64,7 +64,7 @@ fn check_several_at_a_time() {
     }
     assert_eq!(parts.len(), 3);
     for (cut, first) in [(&urgent, 7), (&next, 20), (&slow, 5)] {
-        let whole = parts.take(0, &cut.part(2), |_, _, _| unreachable!()).unwrap();
+        let whole = parts.take(0, &cut.part(2), || false, |_, _, _| unreachable!()).unwrap();
         assert_eq!((whole.first, whole.body), (first, &cut.body[..]));
     }
 }
@@ -162,7 +162,7 @@ proptest! {
                 break;
             }
             let (cut, i) = left.swap_remove(index.index(left.len()));
-            if let Some(made) = parts.take(0, &cut.part(i), |_, _, _| {}) {
+            if let Some(made) = parts.take(0, &cut.part(i), || false, |_, _, _| {}) {
                 prop_assert_eq!(made.body, &cut.body[..]);
                 prop_assert_eq!(made.first, cut.first);
                 whole += 1;

@@ -193,6 +193,14 @@ pub(crate) fn place_of(datagram: &[u8]) -> (NodeIndex, u64) {
     (head[6], long(head, 24))
 }
 
+/// Where a head has the digest.
+pub(crate) const DIGEST_AT: u32 = 8;
+
+/// The first four bytes of a datagram of a kind, of this version.
+pub(crate) fn beginning(kind: Kind) -> [u8; 4] {
+    [MAGIC[0], MAGIC[1], VERSION, kind as u8]
+}
+
 /// Says in a head what the datagram is sealed with.
 pub(crate) fn write_key(key: u8, datagram: &mut [u8]) {
     datagram[7] = key;
@@ -394,6 +402,8 @@ pub enum Reason {
     Stranger = 3,
     /// Who seals is not understood by who does not.
     Sealed = 4,
+    /// Sealed with another key. No refusal says so: each end finds it out by itself.
+    Key = 5,
 }
 
 /// "I take nothing from you, since …"

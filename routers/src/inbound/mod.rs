@@ -5,15 +5,18 @@
 //!              foreign   refused, and told so          old                       copy           └─ part ─▶ Reassembly ┘   late
 //! ```
 
+mod doubt;
 mod order;
 mod peer;
 mod refusing;
 pub(crate) mod window;
 
+pub(crate) use refusing::write_refusal;
 pub use window::{REORDER_MAX, WINDOW};
 
+use crate::admission::capped;
 use crate::broken::broken;
-use crate::frame::{BadFrame, Frame, FrameHead, NodeIndex, Reason, VERSION};
+use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, Reason, VERSION};
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
@@ -165,6 +168,16 @@ impl Inbound {
         mismatch.inspect(|mismatch| self.refuse(now_ns, source, *mismatch, deliver)).is_none()
     }
 
+    /// A peer has shown that it lives, and that it says what time it is by another configuration.
+    pub(crate) fn tells_other(&self, now_ns: u64, head: &FrameHead) {
+        self.stats.peer(head.from).link.tells_other(now_ns, head.digest);
+    }
+
+    /// Whether a head, which was sealed, is one of a peer that goes by another configuration.
+    pub(crate) fn is_of_other(&self, source: IpAddr, head: &FrameHead) -> bool {
+        head.digest != self.settings.digest && self.is_address_of(head.from, source)
+    }
+
     /// Counts what is no datagram of a router, or a damaged one.
     pub(crate) fn bad(&self, source: IpAddr, why: BadFrame) {
         match why {
@@ -213,7 +226,8 @@ impl Inbound {
         let from = head.from;
         let way = Way { from, stats: &self.stats, peer: self.stats.peer(from) };
         let peer = &mut self.peers[usize::from(from)];
-        if !peer.lives(now_ns, head, first, &way, deliver) {
+        let is_other = first.is_none() && self.stats.is_other_life(from, head.incarnation);
+        if is_other || !peer.lives(now_ns, head, first, &way, deliver) {
             return way.peer.received.old.add(1);
         }
         if !peer.is_new(head.sequence, &way) {
@@ -225,34 +239,29 @@ impl Inbound {
         way.peer.received.bytes.add(came.bytes as u64);
         let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS && !broken!(TakesStale);
         let settings = &self.settings;
-        let refused = |package: &Head| if is_old { Some(Cause::Stale) } else { settings.refuses(from, package) };
+        let refused = |head: &Head, body: &[u8]| settings.refuses(from, head, body).or(is_old.then_some(Cause::Stale));
+        let admitted = |head: &Head| if broken!(AdmitsHurry) { *head } else { capped(head) };
         match frame {
             Frame::Packages(packages) => {
                 for (index, (package, body)) in (0..).zip(packages) {
+                    let package = admitted(&package);
                     way.stats.inn.came(package.priority);
-                    way.pass(
-                        refused(&package),
-                        &mut peer.order,
-                        position(head.sequence, index),
-                        &package,
-                        body,
-                        deliver,
-                    );
+                    let position = position(head.sequence, index);
+                    let cause =
+                        refused(&package, body).or_else(|| peer.is_late(&package, position).then_some(Cause::Late));
+                    way.pass(cause, &package, body, deliver);
                 }
             }
             Frame::Fragment(part) => {
                 way.peer.received.fragments.add(1);
-                let whole =
-                    peer.reassembly.take(now_ns, &part, |head, body, change| way.partial(head, body, change, deliver));
-                if let Some(whole) = whole {
-                    way.pass(
-                        refused(&whole.head),
-                        &mut peer.order,
-                        position(whole.first, 0),
-                        &whole.head,
-                        whole.body,
-                        deliver,
-                    );
+                let part = Fragment { head: admitted(&part.head), ..part };
+                let Peer { order, reassembly, .. } = peer;
+                let is_late = || order.is_late(&part.head, position(part.first, 0));
+                let tell = |head: &Head, body: &[u8], change| way.partial(head, body, change, deliver);
+                if let Some(whole) = reassembly.take(now_ns, &part, is_late, tell) {
+                    let refused = refused(&whole.head, whole.body);
+                    let cause = refused.or_else(|| order.is_whole_late(&whole).then_some(Cause::Late));
+                    way.pass(cause, &whole.head, whole.body, deliver);
                 }
             }
             Frame::Alive(alive) => way.hears_of_us(now_ns, self.settings.incarnation, &alive),

@@ -2,8 +2,12 @@
 //!
 //! A table with four places for each value of a hash. What has no place any more is remembered by its group's floor: nothing unknown at
 //! or below it is delivered. So a full table costs packages that were overtaken, never the order.
+//!
+//! A package that comes in parts stands at the place of its first one, which may be far behind the floor by the time the last has come. So
+//! it is judged when it begins, and [`Reassembly`](crate::fragment::Reassembly) notes whether something newer of its flow goes before it.
 
 use crate::broken::broken;
+use crate::fragment::Whole;
 use rohrpost_mailbox::Head;
 
 const GROUPS: usize = 64;
@@ -12,6 +16,11 @@ const PLACES: usize = 4;
 /// Where a package stands among all of its peer's life: sequence of its first datagram, then its place in it.
 pub(super) fn position(sequence: u64, index: u16) -> u64 {
     sequence << 16 | u64::from(index)
+}
+
+/// The sequence in a position.
+pub(super) fn sequence_of(position: u64) -> u64 {
+    position >> 16
 }
 
 /// What was delivered last of each flow, for one peer.
@@ -47,27 +56,56 @@ impl Order {
 
     /// Whether a package may be delivered: nothing newer of its flow was. Then it is the newest.
     pub(super) fn admit(&mut self, head: &Head, position: u64) -> bool {
-        let names = u64::from(head.to.raw()) << 32 | u64::from(head.from.raw());
-        let flow = Flow { names, priority: head.priority.0 };
-        // The golden ratio spreads what names have in common.
-        let spread = (names ^ u64::from(flow.priority) << 24).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let group = &mut self.groups[(spread >> 58) as usize % GROUPS];
-        let mark = position + 1;
-        if let Some((last, _)) = group.places.iter_mut().find(|(last, known)| *last != 0 && *known == flow) {
-            let newer = mark > *last || broken!(TakesLate);
-            *last = mark.max(*last);
-            return newer;
+        let is_late = self.is_late(head, position);
+        if !is_late {
+            self.note(head, position);
         }
-        if mark <= group.floor && !broken!(ForgetsFloor) {
-            return false;
+        !is_late
+    }
+
+    /// Whether a package that came in parts is late; if it is not, it is the newest of its flow.
+    pub(super) fn is_whole_late(&mut self, whole: &Whole<'_>) -> bool {
+        let position = position(whole.first, 0);
+        let is_late = if broken!(ForgetsBegun) { self.is_late(&whole.head, position) } else { whole.is_late };
+        if !is_late {
+            self.note(&whole.head, position);
+        }
+        is_late
+    }
+
+    /// Whether something newer of its flow was delivered, or may have been.
+    pub(super) fn is_late(&self, head: &Head, position: u64) -> bool {
+        let (flow, group) = place(head);
+        let (group, mark) = (&self.groups[group], position + 1);
+        match group.places.iter().find(|(last, known)| *last != 0 && *known == flow) {
+            Some((last, _)) => mark <= *last && !broken!(TakesLate),
+            None => mark <= group.floor && !broken!(ForgetsFloor),
+        }
+    }
+
+    /// It is delivered, and nothing of its flow that is newer was.
+    pub(super) fn note(&mut self, head: &Head, position: u64) {
+        let (flow, group) = place(head);
+        let (group, mark) = (&mut self.groups[group], position + 1);
+        if let Some((last, _)) = group.places.iter_mut().find(|(last, known)| *last != 0 && *known == flow) {
+            *last = mark.max(*last);
+            return;
         }
         // The oldest gives way; an empty place is older than all.
         if let Some(oldest) = group.places.iter_mut().min_by_key(|(last, _)| *last) {
             group.floor = group.floor.max(oldest.0);
             *oldest = (mark, flow);
         }
-        true
     }
+}
+
+/// The flow of a package, and its group.
+fn place(head: &Head) -> (Flow, usize) {
+    let names = u64::from(head.to.raw()) << 32 | u64::from(head.from.raw());
+    let flow = Flow { names, priority: head.priority.0 };
+    // The golden ratio spreads what names have in common.
+    let spread = (names ^ u64::from(flow.priority) << 24).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    (flow, (spread >> 58) as usize % GROUPS)
 }
 
 impl Default for Order {

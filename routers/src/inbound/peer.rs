@@ -1,8 +1,9 @@
 //! One peer as it is heard: which life, which datagrams, and what becomes of the packages in them.
 
-use super::order::Order;
+use super::doubt::Doubt;
+use super::order::{Order, sequence_of};
 use super::refusing::Refusing;
-use super::window::{Arrival, Window};
+use super::window::{Arrival, WINDOW, Window};
 use crate::broken::broken;
 use crate::fragment::{Change, Reassembly};
 use crate::frame::{Alive, FrameHead, NodeIndex, Reason};
@@ -13,6 +14,8 @@ use rohrpost_mailbox::Head;
 
 /// Lives of a peer that are known to be over.
 const OLD_KEPT: usize = 8;
+/// Further lives within this time are counted, not told.
+const RESTARTS_TOLD_NS: u64 = 5_000_000_000;
 /// Datagrams of an old life are on their way for so long at most; after that, its router still runs.
 const OLD_GONE_NS: u64 = 2_000_000_000;
 
@@ -22,6 +25,11 @@ pub(super) struct Peer {
     /// The life that is heard; 0: none yet.
     incarnation: u64,
     began_ns: u64,
+    /// More than one of its datagrams came.
+    is_sure: bool,
+    doubt: Doubt,
+    /// When it was told last that a life began, ns; 0: never.
+    restart_told_ns: u64,
     old: [Old; OLD_KEPT],
     old_next: usize,
     pub(super) window: Window,
@@ -54,7 +62,8 @@ struct Told {
 impl Peer {
     /// Whether a datagram is of the life that is heard. A life that was not known begins; of one that is over nothing is taken, unless
     /// it goes on, and the one that was taken for its successor is silent: then it was the other way round. What it sent before it was
-    /// over says nothing: that may be a copy, which the wire or a stranger kept.
+    /// over says nothing: that may be a copy, which the wire or a stranger kept. What nobody vouches for is taken when another datagram
+    /// says the same: see [`Doubt`].
     /// `first`: where datagrams are sealed, it has shown to be the present life, and to be heard from this sequence on.
     pub(super) fn lives(
         &mut self,
@@ -65,7 +74,7 @@ impl Peer {
         deliver: &mut impl Deliver,
     ) -> bool {
         if head.incarnation == self.incarnation {
-            return true;
+            return first.is_some() || self.is_plausible(now_ns, head);
         }
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
@@ -79,6 +88,11 @@ impl Peer {
             return false;
         }
         let is_first = self.incarnation == 0;
+        let is_vouched_for = first.is_some() || way.stats.is_known_life(way.from, head.incarnation);
+        let is_doubted = !is_vouched_for && was.is_none() && !is_first && !broken!(BelievesLives);
+        if is_doubted && !self.doubt.is_confirmed(now_ns, head) {
+            return false;
+        }
         if !is_first {
             let next = self.window.next();
             self.end_life(way, deliver);
@@ -86,7 +100,10 @@ impl Peer {
             self.old_next += usize::from(was.is_none());
             self.old[place] = Old { incarnation: self.incarnation, next };
             self.told = Told { heard: true, twice: self.told.twice, ..Told::default() };
-            deliver.event(Event::Restarted { peer: way.from });
+            if self.restart_told_ns == 0 || now_ns >= self.restart_told_ns + RESTARTS_TOLD_NS {
+                self.restart_told_ns = now_ns;
+                deliver.event(Event::Restarted { peer: way.from });
+            }
         }
         self.window = match (first, was) {
             // What is missing from there on was sent to this life of ours, and is lost.
@@ -96,10 +113,31 @@ impl Peer {
             (None, None) if is_first => Window::joining(head.sequence),
             (None, None) => Window::default(),
         };
-        (self.incarnation, self.began_ns) = (head.incarnation, now_ns);
+        (self.incarnation, self.began_ns, self.is_sure) = (head.incarnation, now_ns, !is_first);
         way.peer.link.incarnation.set(head.incarnation);
         way.peer.link.begin(now_ns);
         way.peer.link.accept();
+        true
+    }
+
+    /// Whether a datagram of the life that is heard may be where it says. Far ahead is also a peer that was not reached for long; far behind,
+    /// one of which the only datagram that came was no true one.
+    fn is_plausible(&mut self, now_ns: u64, head: &FrameHead) -> bool {
+        let next = self.window.next();
+        let is_ahead = head.sequence >= next + WINDOW;
+        let is_behind = head.sequence + WINDOW < next && !self.is_sure;
+        if !is_ahead && !is_behind || broken!(BelievesJumps) {
+            self.is_sure |= head.sequence + 1 != next;
+            return true;
+        }
+        if !self.doubt.is_confirmed(now_ns, head) {
+            return false;
+        }
+        if is_behind {
+            self.window = Window::joining(head.sequence);
+            self.order.clear();
+        }
+        self.is_sure = true;
         true
     }
 
@@ -108,6 +146,15 @@ impl Peer {
         way.peer.received.restarts.add(1);
         self.reassembly.clear(|head, body, change| way.partial(head, body, change, deliver));
         self.order.clear();
+    }
+
+    /// Whether a package came after a newer one of its flow; if not, it is the newest.
+    pub(super) fn is_late(&mut self, package: &Head, position: u64) -> bool {
+        let is_late = !self.order.admit(package, position);
+        if !is_late {
+            self.reassembly.delivers(package, sequence_of(position));
+        }
+        is_late
     }
 
     /// Notes that it is there, and takes something from us or not.
@@ -190,28 +237,16 @@ pub(super) struct Way<'a> {
 
 impl Way<'_> {
     /// Delivers a package that is there as a whole, unless it is `refused`, or says why not.
-    pub(super) fn pass(
-        &self,
-        refused: Option<Cause>,
-        order: &mut Order,
-        position: u64,
-        head: &Head,
-        body: &[u8],
-        deliver: &mut impl Deliver,
-    ) {
+    pub(super) fn pass(&self, refused: Option<Cause>, head: &Head, body: &[u8], deliver: &mut impl Deliver) {
         self.peer.received.packages.add(1);
         if let Some(cause) = refused {
             return self.lose(head, body, cause, deliver);
-        }
-        if !order.admit(head, position) {
-            return self.lose(head, body, Cause::Late, deliver);
         }
         match deliver.deliver(self.from, head, body) {
             Ok(()) => self.stats.inn.passed(head.priority, head.len),
             Err(NotDelivered::NoMailbox) => self.lose(head, body, Cause::NoMailbox, deliver),
             Err(NotDelivered::MailboxFull) => self.lose(head, body, Cause::MailboxFull, deliver),
             Err(NotDelivered::TooLarge) => self.lose(head, body, Cause::TooLarge, deliver),
-            Err(NotDelivered::NotAllowed) => self.lose(head, body, Cause::NotAllowed, deliver),
         }
     }
 

@@ -71,10 +71,22 @@ impl Inbound {
         }
     }
 
+    /// What cannot be opened comes from a peer's address, which anybody can write on a datagram. So it is believed of a peer alone from which
+    /// nothing comes, to which nothing goes either: its callers learn the likely cause in place of silence, and nothing is lost by it.
+    pub(crate) fn suspect(&self, now_ns: u64, peer: NodeIndex, mismatch: Mismatch) {
+        let is_away = matches!(self.stats.state(peer, now_ns), State::Silent | State::Refused(_));
+        if is_away || broken!(BelievesUnopened) {
+            self.stats.peer(peer).link.refuse(now_ns, mismatch);
+        }
+    }
+
     pub(super) fn refused_by(&mut self, now_ns: u64, source: IpAddr, refusal: &Refusal, deliver: &mut impl Deliver) {
         let Some(peer) = self.peer_at(source) else { return self.stats.foreign.add(1) };
         let mismatch = Mismatch { reason: refusal.reason, version: refusal.version, digest: Some(refusal.digest) };
         self.stats.peer(peer).link.refuse(now_ns, mismatch);
+        if refusal.reason == Reason::Digest {
+            self.stats.peer(peer).link.refuses_us(now_ns, refusal.digest);
+        }
         if self.peers[usize::from(peer)].is_refused_anew(now_ns, mismatch) {
             deliver.event(Event::Refuses { peer, mismatch });
         }
@@ -95,13 +107,18 @@ impl Inbound {
     }
 
     pub(super) fn refusal(&self, to: IpAddr, reason: Reason, datagram: &mut [u8]) -> usize {
-        let Settings { system, own, digest, incarnation, .. } = self.settings;
-        let peer = self.peer_at(to).unwrap_or(NodeIndex::MAX);
-        let head = FrameHead { kind: Kind::Refusal, system, from: own, to: peer, digest, incarnation, sequence: 0 };
-        let said = Refusal { version: frame::VERSION, reason, digest }.to_bytes();
-        let end = frame::HEAD_BYTES + said.len();
-        datagram[..frame::HEAD_BYTES].copy_from_slice(&head.to_bytes(&[&said]));
-        datagram[frame::HEAD_BYTES..end].copy_from_slice(&said);
-        end
+        write_refusal(&self.settings, self.peer_at(to), reason, datagram)
     }
+}
+
+/// Writes that this node takes nothing from another, which is none of ours if it has no number; how many bytes.
+pub(crate) fn write_refusal(settings: &Settings, to: Option<NodeIndex>, reason: Reason, datagram: &mut [u8]) -> usize {
+    let Settings { system, own, digest, incarnation, .. } = *settings;
+    let to = to.unwrap_or(NodeIndex::MAX);
+    let head = FrameHead { kind: Kind::Refusal, system, from: own, to, digest, incarnation, sequence: 0 };
+    let said = Refusal { version: frame::VERSION, reason, digest }.to_bytes();
+    let end = frame::HEAD_BYTES + said.len();
+    datagram[..frame::HEAD_BYTES].copy_from_slice(&head.to_bytes(&[&said]));
+    datagram[frame::HEAD_BYTES..end].copy_from_slice(&said);
+    end
 }

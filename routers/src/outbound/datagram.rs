@@ -34,17 +34,16 @@ impl Outbound {
         bytes
     }
 
-    /// As many whole packages for a peer as fit, level by level; how long the datagram is. The first one fits.
+    /// As many whole packages for a peer as fit, level by level from one to the other; how long the datagram is. The first one fits.
     pub(super) fn pack(
         &mut self,
         now_ns: u64,
-        peer: NodeIndex,
-        from: u8,
+        (peer, from, last): (NodeIndex, u8, u8),
         datagram: &mut [u8],
         report: &mut impl Report,
     ) -> usize {
         let mut end = frame::HEAD_BYTES;
-        let (mut level, last) = (from, self.last_level_of_company(peer));
+        let mut level = from;
         while let Some(next) = self.queue.next_level(peer, level) {
             level = next;
             if level > last {
@@ -134,6 +133,7 @@ impl Outbound {
         let sent = &self.stats.peer(to).sent;
         sent.datagrams.add(1);
         sent.bytes.add((bytes + self.settings.network.security.tag_bytes()) as u64);
+        self.stats.on_wire_bytes.add((bytes + self.pace.overhead_bytes) as u64);
         self.peers[usize::from(to)].quiet_until_ns = now_ns + ALIVE_EVERY_NS;
         self.pace.left(now_ns, bytes, level);
     }
@@ -141,7 +141,7 @@ impl Outbound {
     /// A peer that is to be told that we are still there. If none is, notes when one will be.
     pub(super) fn due(&mut self, now_ns: u64) -> Option<NodeIndex> {
         let when = |peer: &Peer| peer.quiet_until_ns.min(peer.tell_ns);
-        let reached = self.settings.peers().filter(|node| self.reached & 1 << node != 0);
+        let reached = self.settings.peers().filter(|node| self.open() & 1 << node != 0);
         let peers = reached.map(|node| (when(&self.peers[usize::from(node)]), node));
         match peers.min() {
             Some((at_ns, node)) if at_ns <= now_ns => Some(node),

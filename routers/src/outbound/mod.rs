@@ -7,6 +7,7 @@
 //!
 //! Each package that is accepted is sent or lost with a cause; see [`Stats`].
 
+use crate::admission::capped;
 use crate::broken::broken;
 use crate::frame::{self, Fragment, Kind, NodeIndex};
 use crate::link::State;
@@ -100,6 +101,10 @@ pub struct Outbound {
     acquaintances: Option<Arc<Acquaintances>>,
     /// Those to whom it sends, one bit each.
     reached: u64,
+    /// Those whose way has no room just now, one bit each: they are passed over.
+    full: u64,
+    /// What is real time, if this is not: all that leaves leaves at one rate. And how much of it was counted, bytes.
+    shares_with: Option<(Arc<Stats>, u64)>,
     /// It sends in time slots only.
     in_slots: bool,
     /// Nobody is due to be told anything before this, ns.
@@ -133,6 +138,8 @@ impl Outbound {
             aboard: Aboard::new(settings.datagram_bytes()),
             acquaintances: None,
             reached: u64::MAX,
+            full: 0,
+            shares_with: None,
             in_slots: settings.tdma.is_some(),
             alive_ns: 0,
             sweep_ns: 0,
@@ -147,15 +154,24 @@ impl Outbound {
         Self { reached: 0, acquaintances: Some(acquaintances), ..self }
     }
 
-    /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram; nor need one
-    /// so large that no second of its size would fit. Where there are time slots, each waits for one.
-    pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
-        let mut head = package.head;
-        if matches!(head.kind.kind(), rohrpost_mailbox::Kind::Command(_)) {
-            // Nobody makes others hurry more than it may hurry itself.
-            let limit = head.from.class().priority();
-            head.priority = if broken!(Hurries) { head.priority } else { head.priority.at_most(limit) };
+    /// From now on it sends what is not real time: at the rate that is left by what is, which counts here.
+    #[must_use]
+    pub fn behind(self, real_time: &Arc<Stats>) -> Self {
+        Self { shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
+    }
+
+    /// The ways to these peers, one bit each, have no room just now: what is for them waits, and keeps nobody else waiting.
+    pub fn pass_over(&mut self, full: u64) {
+        if full != self.full {
+            (self.full, self.alive_ns) = (full, 0);
         }
+    }
+
+    /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram; nor need one
+    /// so large that no second of its size would fit. Where there are time slots, each waits for one. So does what is for a peer that was not
+    /// told yet that we are there: it doubts the first datagram of a life.
+    pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
+        let head = if broken!(Hurries) { package.head } else { capped(&package.head) };
         self.stats.out.came(head.priority);
         let peer = match self.admit(now_ns, &head, package.published_ns) {
             Ok(peer) => peer,
@@ -166,7 +182,12 @@ impl Outbound {
         };
         let needs_no_company = alone || self.fills_a_datagram(package.body.len());
         let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
-        if needs_no_company && self.reaches(peer) && self.may_leave_at_once(now_ns, level, package.body.len()) {
+        let is_told = self.stats.peer(peer).sent.datagrams.get() > 0;
+        if needs_no_company
+            && is_told
+            && self.reaches(peer)
+            && self.may_leave_at_once(now_ns, level, package.body.len())
+        {
             return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package) };
         }
         let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
@@ -200,9 +221,19 @@ impl Outbound {
         self.queue.used_by(self.sender_of(sender))
     }
 
+    /// The level on which packages of a priority wait.
+    pub(crate) fn level(&self, priority: Priority) -> u8 {
+        self.levels[usize::from(priority.0)]
+    }
+
+    /// The first level on which something waits that may leave.
+    pub(crate) fn first_level(&self) -> Option<u8> {
+        self.queue.first_among(self.open()).map(|place| self.queue.at(place).level)
+    }
+
     /// What waits has at most this priority: only what is above it may leave before what waits.
     pub fn waits_up_to(&self) -> Priority {
-        let level = self.queue.first_among(self.reached).map(|place| self.queue.at(place).level);
+        let level = self.first_level();
         let highest = (0..=u8::MAX).rev().find(|priority| Some(self.levels[usize::from(*priority)]) == level);
         Priority(highest.unwrap_or_default())
     }
@@ -215,6 +246,7 @@ impl Outbound {
         let datagram = &mut datagram[..self.datagram_bytes];
         self.aboard.clear();
         self.look_who_is_known();
+        self.look_what_else_left(now_ns);
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
         }
@@ -224,7 +256,7 @@ impl Outbound {
             return Output::Send { to: peer, bytes: self.alive(now_ns, peer, datagram) };
         }
         let quiet_until_ns = if self.queue.is_empty() { self.alive_ns } else { self.alive_ns.min(self.sweep_ns) };
-        while let Some(place) = self.queue.first_among(self.reached) {
+        while let Some(place) = self.queue.first_among(self.open()) {
             let waiting = *self.queue.at(place);
             if let Err(until_ns) = self.pace.may_leave(now_ns, waiting.level) {
                 return Output::Wait { until_ns: until_ns.min(quiet_until_ns) };
@@ -236,7 +268,7 @@ impl Outbound {
             let bytes = if self.is_large(&waiting) {
                 self.part(now_ns, place, datagram)
             } else {
-                self.pack(now_ns, waiting.peer, waiting.level, datagram, report)
+                self.pack(now_ns, (waiting.peer, waiting.level, LEVELS as u8), datagram, report)
             };
             return Output::Send { to: waiting.peer, bytes };
         }
@@ -304,7 +336,21 @@ impl Outbound {
     }
 
     fn reaches(&self, peer: NodeIndex) -> bool {
-        self.acquaintances.as_ref().is_none_or(|all| all.reached() & 1 << peer != 0)
+        let is_known = self.acquaintances.as_ref().is_none_or(|all| all.reached() & 1 << peer != 0);
+        is_known && self.full & 1 << peer == 0
+    }
+
+    /// Those to whom something may leave now.
+    fn open(&self) -> u64 {
+        if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full }
+    }
+
+    /// What is real time has left besides, at the same rate.
+    fn look_what_else_left(&mut self, now_ns: u64) {
+        let Some((real_time, counted)) = &mut self.shares_with else { return };
+        let bytes = real_time.on_wire_bytes.get();
+        self.pace.takes(now_ns, bytes.wrapping_sub(*counted) as usize);
+        *counted = bytes;
     }
 
     /// Whoever is known since just now is told at once that we are there.

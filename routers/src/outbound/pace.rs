@@ -15,7 +15,8 @@ const FRACTION: u32 = 20;
 pub(super) struct Pace {
     /// Time that a byte takes, in 2^-20 ns.
     byte: u128,
-    overhead_bytes: usize,
+    /// Heads around each datagram.
+    pub(super) overhead_bytes: usize,
     /// What has left is through by then, at the given rate.
     through_ns: u64,
     /// How far that may lie ahead.
@@ -31,7 +32,7 @@ impl Pace {
         let byte = (1_000_000_000 << FRACTION) / u128::from(settings.network.rate_bytes_s.max(1));
         let overhead_bytes = settings.overhead_bytes();
         let mut pace = Self { byte, overhead_bytes, through_ns: 0, ahead_ns: 0, advance_ns: 0, level: 0 };
-        pace.advance_ns = pace.takes_ns(settings.network.datagram_bytes_max);
+        pace.advance_ns = pace.takes_ns(settings.network.datagram_bytes_max + overhead_bytes);
         pace.ahead_ns = BURST_NS.saturating_sub(pace.advance_ns);
         pace
     }
@@ -47,11 +48,18 @@ impl Pace {
     /// A datagram has left; none: without packages.
     pub(super) fn left(&mut self, now_ns: u64, bytes: usize, level: Option<u8>) {
         self.level = level.unwrap_or(self.level);
-        self.through_ns = self.through_ns.max(now_ns).saturating_add(self.takes_ns(bytes));
+        self.takes(now_ns, bytes + self.overhead_bytes);
+    }
+
+    /// So many bytes go over the wire, all heads counted.
+    pub(super) fn takes(&mut self, now_ns: u64, bytes: usize) {
+        if bytes > 0 {
+            self.through_ns = self.through_ns.max(now_ns).saturating_add(self.takes_ns(bytes));
+        }
     }
 
     fn takes_ns(&self, bytes: usize) -> u64 {
-        let ns = ((bytes + self.overhead_bytes) as u128 * self.byte) >> FRACTION;
+        let ns = (bytes as u128 * self.byte) >> FRACTION;
         u64::try_from(ns).unwrap_or(u64::MAX)
     }
 }

@@ -14,18 +14,20 @@ use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
 use crate::queue::Waiting;
 use crate::report::Report;
 use crate::settings::LEVELS;
+use rohrpost_mailbox::Priority;
 
 impl Outbound {
     /// What leaves next in a time slot: for whom, and how many bytes of the buffer; none when nothing is left that may. `room_bytes` is
-    /// how long a datagram may be to be on the wire before the slot's guard begins. `datagram` has room for the largest.
+    /// how long a datagram may be to be on the wire before the slot's guard begins. `datagram` has room for the largest. `behind`: the most
+    /// important of what was not taken yet.
     ///
     /// # Panics
     /// If it has not.
     pub fn poll_slot(
         &mut self,
         now_ns: u64,
-        room_bytes: usize,
-        datagram: &mut [u8],
+        (room_bytes, datagram): (usize, &mut [u8]),
+        behind: Option<Priority>,
         report: &mut impl Report,
     ) -> Option<(NodeIndex, usize)> {
         let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };
@@ -50,11 +52,21 @@ impl Outbound {
             let bytes = if self.is_large(&waiting) {
                 self.part(now_ns, place, datagram)
             } else {
-                self.pack(now_ns, waiting.peer, waiting.level, datagram, report)
+                let last = self.last_level_of_company(waiting.peer, behind).max(waiting.level);
+                self.pack(now_ns, (waiting.peer, waiting.level, last), datagram, report)
             };
             return Some((waiting.peer, bytes));
         }
         None
+    }
+
+    /// Drops what would leave next and cannot, so that it is known what leaves next. To be called before each datagram of a slot.
+    pub fn drop_first(&mut self, now_ns: u64, report: &mut impl Report) {
+        while let Some(place) = self.queue.first_among(self.open()) {
+            let waiting = self.queue.at(place);
+            let Some(cause) = self.why_not(now_ns, waiting.peer, waiting.published_ns) else { return };
+            self.drop_out(place, cause, report);
+        }
     }
 
     /// Looks through what waits for a slot, and drops what waits for too long or for nobody. To be called between slots.
@@ -74,11 +86,14 @@ impl Outbound {
         self.datagram_bytes.min(PART_START + left)
     }
 
-    /// In a slot a datagram carries nothing that is less important than what waits for other peers.
-    pub(super) fn last_level_of_company(&self, peer: NodeIndex) -> u8 {
-        if !self.in_slots || broken!(AnyCompany) {
+    /// In a slot a datagram carries nothing that is less important than what waits for other peers, or in the mailbox: that would be later
+    /// by as much as this takes.
+    fn last_level_of_company(&self, peer: NodeIndex, behind: Option<Priority>) -> u8 {
+        if broken!(AnyCompany) {
             return LEVELS as u8;
         }
-        self.queue.first_level_besides(peer).unwrap_or(LEVELS as u8)
+        let others = self.queue.first_level_besides(peer).unwrap_or(LEVELS as u8);
+        let behind = behind.filter(|_| !broken!(ForgetsMailbox)).map_or(LEVELS as u8, |first| self.level(first));
+        others.min(behind)
     }
 }

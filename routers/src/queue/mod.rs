@@ -7,13 +7,15 @@
 //! ```
 //!
 //! Of data of which only the newest counts, one that waits can be [`replace`](Queue::replace)d by a newer one in its place, if the queue was
-//! made [for that](Queue::of_one).
+//! made [for that](Queue::shared).
 //!
-//! All memory is taken at the start: each sender's quota is there for it alone, so no sender can use up another's.
+//! All memory is taken at the start: each sender's quota is there for it alone, so no sender can use up another's. In a
+//! queue that is [shared](Queue::shared) all use one memory, and whoever has most of it gives way.
 
 mod blocks;
 mod hints;
 mod list;
+mod shares;
 
 use crate::broken::broken;
 use crate::frame::NodeIndex;
@@ -23,6 +25,8 @@ use hints::Hints;
 use list::{List, Lists};
 use rohrpost_config::NODES_MAX;
 use rohrpost_mailbox::{Head, Kind, Options};
+pub use shares::Share;
+use shares::Shares;
 
 const _: () = assert!(NODES_MAX <= 64, "a level's peers are the bits of a word");
 
@@ -37,6 +41,8 @@ pub struct Waiting {
     pub peer: NodeIndex,
     /// Which sender's quota it is counted in.
     pub sender: u16,
+    /// As whom it is counted, in a queue that is shared.
+    pub share: Share,
     /// Its level; 0 goes first.
     pub level: u8,
     /// How often it was handed on, where that counts.
@@ -70,7 +76,9 @@ pub struct Queue {
     peers: Box<[[List; LEVELS]]>,
     /// Levels on which something waits for a peer, one bit each.
     waiting_for: Box<[u32]>,
-    senders: Box<[Sender]>,
+    senders: Vec<Sender>,
+    /// Who the senders are, and what they had of the line; none: each has a quota of its own.
+    shares: Option<Shares>,
     /// Peers with something on a level, one bit each.
     busy: [u64; LEVELS],
     /// Levels with something, one bit each.
@@ -94,6 +102,8 @@ struct Sender {
     levels: [List; LEVELS],
     /// Blocks of what could give way, by level.
     blocks: [u32; LEVELS],
+    /// Levels with something that could give way, one bit each.
+    waiting: u32,
     /// Blocks in all.
     used: u32,
 }
@@ -111,7 +121,8 @@ impl Queue {
             free: List::default(),
             peers: vec![[List::default(); LEVELS]; nodes].into(),
             waiting_for: vec![0; nodes].into(),
-            senders: vec![Sender::default(); senders].into(),
+            senders: vec![Sender::default(); senders],
+            shares: None,
             busy: [0; LEVELS],
             levels: 0,
             hints: None,
@@ -126,10 +137,12 @@ impl Queue {
         queue
     }
 
-    /// For one sender and one peer, and it finds what a newer package replaces.
-    pub fn of_one(quota_bytes: usize) -> Self {
-        let queue = Self::new(1, 1, quota_bytes);
-        Self { hints: Some(Hints::new(queue.entries.len())), ..queue }
+    /// For one peer and any number of senders, which [share](Queue::sender_of) the quota; and it finds what a newer
+    /// package replaces.
+    pub fn shared(quota_bytes: usize) -> Self {
+        let mut queue = Self::new(1, 1, quota_bytes);
+        queue.senders.clear();
+        Self { hints: Some(Hints::new(queue.entries.len())), shares: Some(Shares::default()), ..queue }
     }
 
     /// Whether nothing waits.
@@ -176,7 +189,11 @@ impl Queue {
         self.waiting_for[peer] |= 1 << level;
         self.levels |= 1 << level;
         let sender = &mut self.senders[usize::from(waiting.sender)];
+        if let Some(shares) = self.shares.as_mut().filter(|_| sender.used == 0) {
+            shares.begins(waiting.sender);
+        }
         self.by_sender.append(&mut sender.levels[level], place);
+        sender.waiting |= 1 << level;
         sender.blocks[level] += needed;
         sender.used += needed;
         true
@@ -224,6 +241,9 @@ impl Queue {
     }
 
     fn make_room(&mut self, sender: usize, level: u8, needed: u32, gone: &mut impl FnMut(&Waiting, &[u8])) -> bool {
+        if self.shares.is_some() {
+            return self.make_shared_room(sender, level, needed, gone);
+        }
         let own = &self.senders[sender];
         let lower = usize::from(level) + 1;
         let yielding: u32 = own.blocks[lower..].iter().sum();
@@ -236,14 +256,21 @@ impl Queue {
             return false;
         }
         while self.senders[sender].used + needed > quota {
-            let end = if broken!(DisplacesOldest) { List::first } else { List::last };
-            let last = self.senders[sender].levels[lower..].iter().rev().find_map(end);
             // There is one: what could give way was counted.
-            let Some(last) = last else { return false };
-            let (waiting, beginning) = self.remove(Place(last));
-            if !broken!(ForgetsDisplaced) {
-                gone(&waiting, beginning);
+            if !self.displace(sender, lower, gone) {
+                return false;
             }
+        }
+        true
+    }
+
+    /// The newest of a sender's least important level, from `lower` on, gives way; false: there is none.
+    fn displace(&mut self, sender: usize, lower: usize, gone: &mut impl FnMut(&Waiting, &[u8])) -> bool {
+        let end = if broken!(DisplacesOldest) { List::first } else { List::last };
+        let Some(last) = self.senders[sender].levels[lower..].iter().rev().find_map(end) else { return false };
+        let (waiting, beginning) = self.remove(Place(last));
+        if !broken!(ForgetsDisplaced) {
+            gone(&waiting, beginning);
         }
         true
     }
@@ -310,6 +337,7 @@ impl Queue {
             let sender = &mut self.senders[sender];
             sender.blocks[level] -= entry.body.blocks();
             self.by_sender.remove(&mut sender.levels[level], place.0);
+            sender.emptied(level);
         }
     }
 
@@ -328,15 +356,28 @@ impl Queue {
         let sender = &mut self.senders[usize::from(waiting.sender)];
         if waiting.parts == 0 {
             self.by_sender.remove(&mut sender.levels[level], place.0);
+            sender.emptied(level);
             sender.blocks[level] -= body.blocks();
         }
         sender.used -= body.blocks();
+        if let Some(shares) = self.shares.as_mut().filter(|_| sender.used == 0) {
+            shares.ends(waiting.sender);
+        }
         self.used_blocks -= body.blocks();
         self.len -= 1;
         self.entries[place.0 as usize].body = Chain::default();
         self.blocks.free(body);
         self.by_peer.prepend(&mut self.free, place.0);
         (waiting, self.blocks.beginning(&body, waiting.head.len))
+    }
+}
+
+impl Sender {
+    /// Something was taken from a level.
+    fn emptied(&mut self, level: usize) {
+        if self.levels[level].first().is_none() {
+            self.waiting &= !(1 << level);
+        }
     }
 }
 

@@ -128,6 +128,74 @@ fn levels_of_a_peer_are_found_one_after_the_other() {
     assert_eq!((queue.next_level(1, 0), queue.next_level(2, 0)), (Some(4), None));
 }
 
+/// Lets a package of a party's sender wait in a shared queue; what gave way for it, or itself.
+fn push_shared(queue: &mut Queue, id: u16, (party, sender): (u32, u32), level: u8) -> Vec<u16> {
+    let share = Share { sender, party };
+    let new = Waiting { share, sender: queue.sender_of(share), ..waiting(id, 0, 0, level, 200) };
+    let mut gone = Vec::new();
+    let taken = queue.push(new, &[0; 200], |waiting, _| gone.push(waiting.head.id));
+    gone.extend((!taken).then_some(id));
+    gone
+}
+
+#[test]
+fn of_one_memory_each_sender_has_an_equal_part_whatever_its_level() {
+    let mut queue = Queue::shared(QUOTA);
+    (0..16).for_each(|id| assert_eq!(push_shared(&mut queue, id, (1, 1), 0), [], "alone it has all"));
+    assert_eq!(push_shared(&mut queue, 16, (1, 1), 0), [16]);
+    for (id, sender, gone) in [(20, 2, 15), (21, 2, 14), (22, 3, 13), (23, 2, 12), (24, 3, 11), (25, 4, 10)] {
+        assert_eq!(push_shared(&mut queue, id, (1, sender), 31), [gone], "who has most gives way, to {id}");
+    }
+    for id in 30..34 {
+        push_shared(&mut queue, id, (1, 2), 31);
+    }
+    let [one, two] = [0, 1].map(|sender| queue.used_by(sender) / BLOCK_BYTES as u64);
+    assert!(one.abs_diff(two) <= 1, "{one} and {two}");
+    assert_eq!(push_shared(&mut queue, 40, (1, 2), 31), [40], "beyond its part it is refused");
+    assert_eq!(push_shared(&mut queue, 41, (1, 2), 0), [32], "or displaces what is less important of its own");
+}
+
+#[test]
+fn on_one_line_parties_take_turns_and_within_one_importance_alone_counts() {
+    // Two senders of one party, the first with what is urgent, and another party with what is least important.
+    let served = |parties: [u32; 2], window| {
+        let mut queue = Queue::shared(QUOTA);
+        (0..8).for_each(|id| assert_eq!(push_shared(&mut queue, id, (parties[0], 1), 0), []));
+        (10..14).for_each(|id| assert_eq!(push_shared(&mut queue, id, (parties[1], 2), 31), []));
+        let first = |_| {
+            let place = queue.first_shared(window).unwrap();
+            queue.serve(place).0.head.id
+        };
+        (0..12).map(first).collect::<Vec<_>>()
+    };
+    let by_level = [0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13];
+    assert_eq!(served([1, 1], 0), by_level, "one party");
+    assert_eq!(served([1, 2], 10_000), by_level, "nobody is so far ahead");
+    assert_eq!(served([1, 2], 0), [0, 10, 1, 11, 2, 12, 3, 13, 4, 5, 6, 7], "in turn");
+    assert_eq!(served([1, 2], 300), [0, 1, 10, 2, 11, 3, 12, 4, 13, 5, 6, 7], "a little ahead");
+}
+
+#[test]
+fn who_begins_to_wait_has_saved_up_nothing() {
+    let mut queue = Queue::shared(QUOTA);
+    let serve = |queue: &mut Queue| {
+        let place = queue.first_shared(0).unwrap();
+        queue.serve(place).0.head.id
+    };
+    (0..8).for_each(|id| assert_eq!(push_shared(&mut queue, id, (1, 1), 0), []));
+    (0..4).for_each(|id| assert_eq!(serve(&mut queue), id));
+    // The other had nothing of the line so far, and gets no more than turns from now on.
+    (10..14).for_each(|id| assert_eq!(push_shared(&mut queue, id, (2, 2), 31), []));
+    let order: Vec<u16> = (0..8).map(|_| serve(&mut queue)).collect();
+    assert_eq!(order, [4, 10, 5, 11, 6, 12, 7, 13]);
+    // Places of senders and parties are used again.
+    for id in 0..1000 {
+        assert_eq!(push_shared(&mut queue, id, (id.into(), id.into()), 0), []);
+        serve(&mut queue);
+    }
+    assert!(queue.senders.len() < 5, "{} places", queue.senders.len());
+}
+
 /// What the queue promises, in a slow and simple way.
 #[derive(Default)]
 struct Model {
@@ -212,7 +280,7 @@ proptest! {
     fn what_is_replaced_keeps_its_place_and_the_rest_is_as_without(
         steps in prop::collection::vec((0u16..6, 8u8..10, 0usize..2000, any::<bool>()), 1..200),
     ) {
-        let (mut queue, mut model) = (Queue::of_one(QUOTA), Model::default());
+        let (mut queue, mut model) = (Queue::shared(QUOTA), Model::default());
         for (tag, (state, level, len, take)) in steps.into_iter().enumerate() {
             // Of states from 3 on each value counts.
             let head = Head {
@@ -222,7 +290,8 @@ proptest! {
                 options: if state < 3 { Options::NEWEST } else { Options::default() },
                 ..Head::default()
             };
-            let new = Waiting { head, level, first: tag as u64, ..Waiting::default() };
+            let sender = queue.sender_of(Share::default());
+            let new = Waiting { head, level, sender, first: tag as u64, ..Waiting::default() };
             let body = vec![tag as u8; len];
             let mut gone = Vec::new();
             let tell = |waiting: &Waiting, _: &[u8]| gone.push(waiting.first);

@@ -11,7 +11,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 
-/// Which of a router's two ports: each has keys and sequences of its own.
+/// Which of a router's ports: each has keys and sequences of its own.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(usize)]
 pub enum Port {
@@ -19,15 +19,19 @@ pub enum Port {
     Packages = 0,
     /// Time.
     Time = 1,
+    /// Packages that are not real time.
+    Rest = 2,
 }
 
 impl Port {
-    pub(super) const ALL: [Self; 2] = [Self::Packages, Self::Time];
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Packages, Self::Time, Self::Rest];
 
     pub(super) fn purpose(self) -> Purpose {
         match self {
             Self::Packages => Purpose::Packages,
             Self::Time => Purpose::Time,
+            Self::Rest => Purpose::Rest,
         }
     }
 }
@@ -61,7 +65,7 @@ pub(super) struct Life {
     pub(super) incarnation: u64,
     /// Place of the key that it is sent to with.
     pub(super) key: usize,
-    /// By [`Port`]: what it sent before is not taken.
+    /// Of packages and of time, as [`Port`] counts them: what it sent before is not taken.
     pub(super) next: [u64; 2],
 }
 
@@ -77,7 +81,7 @@ pub struct Acquaintances {
     /// Peers for which a reply waits for a slot, one bit each: nothing is sealed to them before it has left.
     unsaid: AtomicU64,
     /// By [`Port`].
-    rejections: [Arc<Rejections>; 2],
+    rejections: [Arc<Rejections>; Port::ALL.len()],
 }
 
 impl fmt::Debug for Acquaintances {
@@ -99,7 +103,7 @@ struct Peer {
     /// Hellos of this life to it.
     hellos: AtomicU64,
     /// By [`Port`]: the next sequence that may be sealed.
-    sealed: [AtomicU64; 2],
+    sealed: [AtomicU64; Port::ALL.len()],
 }
 
 impl Acquaintances {
@@ -243,9 +247,9 @@ impl Acquaintances {
         Some(self.hello(peer, asked % self.keys.len(), question, datagram))
     }
 
-    /// The sequences that come next, by [`Port`].
+    /// The sequences that come next: of packages, and of time.
     pub(super) fn next(&self, peer: NodeIndex) -> [u64; 2] {
-        self.peer(peer).sealed.each_ref().map(|next| next.load(Ordering::Relaxed))
+        [Port::Packages, Port::Time].map(|port| self.peer(peer).sealed[port as usize].load(Ordering::Relaxed))
     }
 
     /// Writes a hello; how long its datagram is.

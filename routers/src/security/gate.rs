@@ -3,12 +3,12 @@
 
 use super::acquaintances::{Acquaintances, Port};
 use super::greeter::Greeter;
-use super::opening::{NotOpened, Opened, Opening, Rejection};
+use super::opening::{Greeting, NotOpened, Opened, Opening, Rejection};
 use super::tally::Tally;
-use crate::frame::{BadFrame, NodeIndex};
+use crate::frame::{self, BadFrame, FrameHead, NodeIndex};
 use crate::inbound::{Came, Inbound};
 use crate::link::SILENT_AFTER_NS;
-use crate::report::{Deliver, Event};
+use crate::report::{Deliver, Event, Mismatch};
 use crate::stats::Stats;
 use std::sync::Arc;
 
@@ -41,7 +41,8 @@ pub struct Said {
 pub struct Gate {
     all: Arc<Acquaintances>,
     opening: Opening,
-    greeter: Greeter,
+    /// None at a port where nobody is greeted: who lives is found out at that of packages.
+    greeter: Option<Greeter>,
     tally: Tally,
     peers: Box<[Asked]>,
     /// Nobody is to be asked before this, ns.
@@ -61,10 +62,19 @@ struct Asked {
 impl Gate {
     /// `seed` comes from a source of random numbers that is fit for keys; each life has another.
     pub fn new(all: &Arc<Acquaintances>, seed: [u8; 32]) -> Self {
+        Self::of(all, Port::Packages, Some(Greeter::new(all, seed)))
+    }
+
+    /// One at the port of what is not real time, in the thread that receives there.
+    pub fn of_rest(all: &Arc<Acquaintances>) -> Self {
+        Self::of(all, Port::Rest, None)
+    }
+
+    fn of(all: &Arc<Acquaintances>, port: Port, greeter: Option<Greeter>) -> Self {
         Self {
-            opening: Opening::new(all, Port::Packages),
-            greeter: Greeter::new(all, seed),
-            tally: Tally::new(all.rejections(Port::Packages)),
+            opening: Opening::new(all, port),
+            greeter,
+            tally: Tally::new(all.rejections(port)),
             peers: vec![Asked::default(); all.who.nodes.into()].into(),
             all: all.clone(),
             look_ns: 0,
@@ -92,10 +102,15 @@ impl Gate {
                 inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
             }
             Ok(Opened::Hello(head, greeting)) => {
-                if inbound.may_greet(now_ns, came.source, &head, deliver) {
-                    let greeted = self.greeter.greet(now_ns, &head, &greeting, reply);
+                if let Some(greeter) = &mut self.greeter
+                    && inbound.may_greet(now_ns, came.source, &head, deliver)
+                {
+                    let greeted = greeter.greet(now_ns, &head, &greeting, reply);
                     let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: greeted.begins };
                     return greeted.reply_bytes.map(said);
+                }
+                if inbound.is_of_other(came.source, &head) {
+                    return self.greet_other(now_ns, &head, &greeting, inbound, reply);
                 }
             }
             Err(NotOpened::Bad(why @ (BadFrame::Foreign | BadFrame::Damaged(_) | BadFrame::Sealed))) => {
@@ -107,6 +122,23 @@ impl Gate {
             Err(why @ NotOpened::Rejected(rejection)) => self.reject(now_ns, came, rejection, why, inbound, deliver),
         }
         None
+    }
+
+    /// Whoever goes by another configuration is told so by what is sealed: else both would take what they hear of the other for something that
+    /// somebody repeats.
+    fn greet_other(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        greeting: &Greeting,
+        inbound: &Inbound,
+        reply: &mut [u8],
+    ) -> Option<Said> {
+        let greeted = self.greeter.as_mut()?.greet_other(now_ns, head, greeting, reply);
+        if greeted.proves && greeting.hello.next[Port::Time as usize] > 0 {
+            inbound.tells_other(now_ns, head);
+        }
+        greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
     }
 
     /// From which sequence on the present life of a peer is heard; what is missing from there on is lost.
@@ -125,7 +157,7 @@ impl Gate {
 
     /// Lets the life begin that what was taken last has shown to live; whether one does. To be done when the reply has left.
     pub fn begin(&mut self, now_ns: u64) -> bool {
-        let began = self.greeter.begin();
+        let began = self.greeter.as_mut().and_then(Greeter::begin);
         if let Some(peer) = began {
             self.peers[usize::from(peer)].began_ns = now_ns;
         }
@@ -134,7 +166,7 @@ impl Gate {
 
     /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
     pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
-        if now_ns < self.look_ns {
+        if now_ns < self.look_ns || self.greeter.is_none() {
             return None;
         }
         let mut peers = 0..self.all.who.nodes;
@@ -144,7 +176,7 @@ impl Gate {
         };
         self.peers[usize::from(to)].at_ns = Some(now_ns);
         self.all.doubted(to);
-        self.greeter.refresh(now_ns, to);
+        self.greeter.as_mut()?.refresh(now_ns, to);
         self.all.ask(to, datagram).map(|bytes| Said { to, bytes, is_reply: false, begins: false })
     }
 
@@ -174,6 +206,10 @@ impl Gate {
         deliver: &mut impl Deliver,
     ) {
         let (source, peer) = (came.source, inbound.peer_at(came.source));
+        if let Some((peer, reason)) = peer.zip(rejection.reason()) {
+            let version = if let NotOpened::Bad(BadFrame::Version(version)) = why { version } else { frame::VERSION };
+            inbound.suspect(now_ns, peer, Mismatch { reason, version, digest: None });
+        }
         if let Some(datagrams) = self.tally.note(now_ns, peer, rejection) {
             deliver.event(Event::Rejected { source, peer, why, datagrams });
         }

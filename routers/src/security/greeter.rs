@@ -49,6 +49,8 @@ struct Questions {
 /// What a hello brought about.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Greeted {
+    /// The peer has shown that it lives.
+    pub proves: bool,
     /// A life of the peer begins, with [`Greeter::begin`].
     pub begins: bool,
     /// Bytes of the hello to send back, in the buffer.
@@ -67,11 +69,28 @@ impl Greeter {
     /// Takes a hello that was opened, if all else in its head is as it must be. `datagram` has room for a hello of
     /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If a life begins by it, [`Self::begin`] when the reply has left.
     pub fn greet(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
+        self.take(now_ns, head, greeting, true, datagram)
+    }
+
+    /// The same of one whose digest is another: no life begins by it. A question is answered, so that its sender knows that this node lives, and by
+    /// which configuration.
+    pub fn greet_other(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
+        self.take(now_ns, head, greeting, false, datagram)
+    }
+
+    fn take(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        greeting: &Greeting,
+        may_begin: bool,
+        datagram: &mut [u8],
+    ) -> Greeted {
         self.begin();
         let (peer, Greeting { hello, key }) = (head.from, *greeting);
         self.refresh(now_ns, peer);
         let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);
-        let begins = proves && self.all.incarnation(peer) != Some(head.incarnation);
+        let begins = may_begin && proves && self.all.incarnation(peer) != Some(head.incarnation);
         if proves {
             // Each challenge serves once: what else was answered to it, or will be, proves nothing any more.
             self.draw(now_ns, peer);
@@ -86,7 +105,7 @@ impl Greeter {
         // Who has shown that it lives is told that we do, and that is the last word; who has not must show it first.
         let challenge = if is_question { self.all.challenge(peer) } else { 0 };
         let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
-        Greeted { begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
+        Greeted { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
 
     /// Lets the life begin that has shown that it lives, if one has; of which peer. The reply was handed to the network before: it says from

@@ -106,6 +106,8 @@ pub(super) enum Purpose {
     Packages = 2,
     /// Time.
     Time = 3,
+    /// Packages that are not real time.
+    Rest = 4,
 }
 
 /// One end of a direction.

@@ -7,7 +7,7 @@ use super::keys::End;
 use super::overheard::Overheard;
 use super::seal::{self, Seal};
 use crate::broken::broken;
-use crate::frame::{BadFrame, FrameHead, Kind, NodeIndex};
+use crate::frame::{BadFrame, FrameHead, Kind, NodeIndex, Reason};
 use crate::inbound::window::{Arrival, Window};
 use std::sync::Arc;
 
@@ -37,7 +37,9 @@ pub enum Rejection {
     #[error("it is not sealed; does that node's configuration say `security = \"keys\"`?")]
     Unsealed,
     /// Sealed with a key that is not ours.
-    #[error("it is sealed with a key of an id that we have not; all nodes need the same key file")]
+    #[error(
+        "it is sealed with a key of an id that we have not; all nodes need the same key file: copy it from the first computer"
+    )]
     OtherKey,
     /// Not from another node of ours to this one.
     #[error("it is not from one of our nodes to this one")]
@@ -49,7 +51,9 @@ pub enum Rejection {
     #[error("it came before")]
     Replay,
     /// Its seal is not right: made with another key, or altered.
-    #[error("its seal is not right: another key with this id, or someone altered it; all nodes need the same key file")]
+    #[error(
+        "its seal is not right: another key with this id, or someone altered it; all nodes need the same key file: copy it from the first computer"
+    )]
     Forged,
     /// It comes from another address than the node has that it says it is from.
     #[error("it comes from another address than its node has in our configuration")]
@@ -71,6 +75,16 @@ impl Rejection {
         Self::Address,
         Self::Version,
     ];
+
+    /// What it tells of a peer from which nothing else comes, if it is of that: anybody can write a peer's address on a datagram.
+    pub const fn reason(self) -> Option<Reason> {
+        match self {
+            Self::Unsealed => Some(Reason::Sealed),
+            Self::OtherKey | Self::Forged => Some(Reason::Key),
+            Self::Version => Some(Reason::Version),
+            Self::NotOurs | Self::OtherLife | Self::Replay | Self::Address => None,
+        }
+    }
 
     /// A word for people and programs.
     pub const fn word(self) -> &'static str {
@@ -105,6 +119,18 @@ pub struct Opening {
     peers: Box<[Known<Heard>]>,
     /// By node: lives of it that are not known to live.
     overheard: Box<[Overheard]>,
+    /// By node; the one that was heard last stands first.
+    past: Box<[[Past; PAST]]>,
+}
+
+/// Lives of a peer that took turns: of so many it is remembered what was opened of them at the port of what is not real time.
+const PAST: usize = 4;
+
+/// A life that was heard at that port, and from which sequence on it is heard when it is taken for the present one again.
+#[derive(Clone, Copy, Default)]
+struct Past {
+    incarnation: u64,
+    next: u64,
 }
 
 /// A peer's present life as it is heard.
@@ -112,8 +138,8 @@ struct Heard {
     incarnation: u64,
     /// By the place of the key: which of two the peer seals with is its choice.
     seals: Vec<Seal>,
-    /// From this sequence on it is heard.
-    first: u64,
+    /// From this sequence on it is heard. At the port of what is not real time no hello says it: then it is that of what is opened first.
+    first: Option<u64>,
     window: Window,
 }
 
@@ -122,7 +148,8 @@ impl Opening {
     pub fn new(all: &Arc<Acquaintances>, port: Port) -> Self {
         let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
         let overheard = (0..all.who.nodes).map(|_| Overheard::default()).collect();
-        Self { peers, overheard, all: all.clone(), port }
+        let past = vec![<[Past; PAST]>::default(); all.who.nodes.into()].into();
+        Self { peers, overheard, past, all: all.clone(), port }
     }
 
     /// Opens a datagram where it lies. Its head can be believed then, but not before.
@@ -157,7 +184,8 @@ impl Opening {
         if head.kind == Kind::Hello {
             return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));
         }
-        let heard = Self::heard(&mut self.peers, &self.overheard, all, self.port, head.from);
+        let past = &mut self.past[usize::from(head.from)];
+        let heard = Self::heard(&mut self.peers, &self.overheard, past, all, self.port, head.from);
         let heard = heard.filter(|heard| heard.incarnation == head.incarnation).ok_or_else(|| {
             all.doubt(head.from);
             Rejection::OtherLife
@@ -169,6 +197,10 @@ impl Opening {
         // What the network lost is another's to count.
         let arrival = heard.window.arrive(head.sequence, &mut 0);
         debug_assert!(arrival != Arrival::Copy || broken!(OpensTwice));
+        heard.first.get_or_insert(head.sequence);
+        if self.port == Port::Rest {
+            past[0].next = heard.window.next();
+        }
         Ok(Opened::Frame(head, text))
     }
 
@@ -177,8 +209,8 @@ impl Opening {
         let Ok((head, _)) = FrameHead::read(datagram) else { return false };
         let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != Kind::Hello;
         let heard = |opening: &mut Self| {
-            let Self { peers, overheard, all, port } = opening;
-            let heard = Self::heard(peers, overheard, all, *port, head.from);
+            let Self { peers, overheard, past, all, port } = opening;
+            let heard = Self::heard(peers, overheard, &mut past[usize::from(head.from)], all, *port, head.from);
             heard.is_some_and(|heard| heard.incarnation == head.incarnation)
         };
         is_theirs && !heard(self)
@@ -230,7 +262,7 @@ impl Opening {
 
     /// From which sequence on the life of a peer is heard that was opened last; what is missing from there on is lost.
     pub(super) fn first(&self, peer: NodeIndex) -> u64 {
-        self.peers[usize::from(peer)].made.as_ref().map_or(0, |heard| heard.first)
+        self.peers[usize::from(peer)].made.as_ref().and_then(|heard| heard.first).unwrap_or(0)
     }
 
     fn hello(&self, head: &FrameHead, key: usize, datagram: &mut [u8]) -> Result<Greeting, Rejection> {
@@ -249,20 +281,38 @@ impl Opening {
     fn heard<'a>(
         peers: &'a mut [Known<Heard>],
         overheard: &[Overheard],
+        past: &mut [Past; PAST],
         all: &Acquaintances,
         port: Port,
         from: NodeIndex,
     ) -> Option<&'a mut Heard> {
         peers[usize::from(from)].of(all, from, |life| {
             let peer = End { node: from, incarnation: life.incarnation };
-            // What was overheard is not proven a second time.
-            let first = life.next[port as usize].max(overheard[usize::from(from)].next(life.incarnation));
+            let from = match port {
+                // What is sealed there is sealed to this life of ours: all of it may be opened, and once.
+                Port::Rest => remembered(past, life.incarnation),
+                // What was overheard is not proven a second time.
+                Port::Packages | Port::Time => {
+                    life.next[port as usize].max(overheard[usize::from(from)].next(life.incarnation))
+                }
+            };
             Heard {
                 incarnation: life.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
-                first,
-                window: Window::going_on(first),
+                first: (port != Port::Rest).then_some(from),
+                window: Window::going_on(from),
             }
         })
     }
+}
+
+/// From which sequence on a life is heard that becomes the present one, and has it stand first among those that are remembered. Of a life
+/// that is forgotten again and again nothing is opened twice as long as no more than [`PAST`] routers of one node live at once.
+fn remembered(past: &mut [Past; PAST], incarnation: u64) -> u64 {
+    let at = past.iter().position(|past| past.incarnation == incarnation);
+    past[..=at.unwrap_or(PAST - 1)].rotate_right(1);
+    if at.is_none() {
+        past[0] = Past { incarnation, next: 0 };
+    }
+    past[0].next
 }

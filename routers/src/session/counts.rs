@@ -12,6 +12,8 @@ pub enum Cause {
     NoRoute,
     /// Too much waited, and this was the least important and newest.
     Full,
+    /// Too much waited, of its sender more than of others.
+    Share,
     /// It was under way for too long.
     Stale,
     /// It waited for a client that has gone.
@@ -30,13 +32,16 @@ pub enum Cause {
     TooLarge,
     /// Who sent it may not command it.
     NotAllowed,
+    /// It is from or for a mailbox by which routers carry packages, or for a router of another system.
+    RoutersOwn,
 }
 
 impl Cause {
     /// All, in their order.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::NoRoute,
         Self::Full,
+        Self::Share,
         Self::Stale,
         Self::Gone,
         Self::Offline,
@@ -46,6 +51,7 @@ impl Cause {
         Self::MailboxFull,
         Self::TooLarge,
         Self::NotAllowed,
+        Self::RoutersOwn,
     ];
 
     /// A word for people and programs.
@@ -53,6 +59,7 @@ impl Cause {
         match self {
             Self::NoRoute => "no-route",
             Self::Full => "full",
+            Self::Share => "share",
             Self::Stale => "stale",
             Self::Gone => "gone",
             Self::Offline => "offline",
@@ -62,6 +69,7 @@ impl Cause {
             Self::MailboxFull => "mailbox-full",
             Self::TooLarge => "too-large",
             Self::NotAllowed => "not-allowed",
+            Self::RoutersOwn => "routers-own",
         }
     }
 
@@ -69,7 +77,7 @@ impl Cause {
     pub const fn told(self) -> Option<stats::Cause> {
         Some(match self {
             Self::NoRoute | Self::Hops => stats::Cause::NoRoute,
-            Self::Full => stats::Cause::Quota,
+            Self::Full | Self::Share => stats::Cause::Quota,
             Self::Stale => stats::Cause::Stale,
             Self::Gone | Self::Offline => stats::Cause::Silent,
             Self::Foreign => return None,
@@ -77,6 +85,7 @@ impl Cause {
             Self::MailboxFull => stats::Cause::MailboxFull,
             Self::TooLarge => stats::Cause::TooLarge,
             Self::NotAllowed => stats::Cause::NotAllowed,
+            Self::RoutersOwn => stats::Cause::RoutersOwn,
         })
     }
 }
@@ -87,7 +96,6 @@ impl From<NotDelivered> for Cause {
             NotDelivered::NoMailbox => Self::NoMailbox,
             NotDelivered::MailboxFull => Self::MailboxFull,
             NotDelivered::TooLarge => Self::TooLarge,
-            NotDelivered::NotAllowed => Self::NotAllowed,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::counts::{Cause, Counts};
 use super::outgoing::Fates;
+use super::server::Principals;
 use super::{Answers, answer_to};
 use rohrpost_mailbox::Head;
 
@@ -11,12 +12,19 @@ pub(super) struct Ledger<'a, H> {
     host: &'a mut H,
     /// The client for which they are, where that is known.
     holder: Option<&'a str>,
+    /// Who takes part, where losses are counted by that.
+    principals: Option<&'a mut Principals>,
     answers: Vec<(Head, Vec<u8>)>,
 }
 
 impl<'a, H> Ledger<'a, H> {
     pub(super) fn new(counts: &'a Counts, host: &'a mut H, holder: Option<&'a str>) -> Self {
-        Self { counts, host, holder, answers: Vec::new() }
+        Self { counts, host, holder, principals: None, answers: Vec::new() }
+    }
+
+    /// It counts whose packages are lost for lack of room, too.
+    pub(super) fn by_principal(self, principals: &'a mut Principals) -> Self {
+        Self { principals: Some(principals), ..self }
     }
 
     /// What the senders of lost commands are to be told.
@@ -37,5 +45,11 @@ impl<H: Answers> Fates for Ledger<'_, H> {
     fn lost(&mut self, head: &Head, body: &[u8], cause: Cause) {
         self.counts.lost(head.priority, cause);
         self.answers.extend(answer_to(head, body, cause, self.holder, self.host));
+    }
+
+    fn crowded(&mut self, sender: u32) {
+        if let Some(uses) = self.principals.as_mut().and_then(|principals| principals.uses_mut(sender)) {
+            uses.lost += 1;
+        }
     }
 }

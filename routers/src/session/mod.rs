@@ -10,7 +10,8 @@
 //! TLS it is the decrypted stream.
 //!
 //! What holds: a package is handed to a stream once, and never again; what a connection takes along when it breaks is lost. Packages of one
-//! sender, receiver and priority stay in their order. No client can make the server wait, or use more than its share of memory.
+//! sender, receiver and priority stay in their order. No client can make the server wait, and nobody can use
+//! more than its share of places, ranges, memory or line by connecting more often: shares go by principal.
 
 pub mod client;
 mod counts;
@@ -80,13 +81,6 @@ fn answer_to(
     let len = u16::try_from(body.len()).ok()?;
     let kind = Type::reply(number);
     Some((Head { to: head.from, from: head.to, len, kind, options: Options::ERROR, ..*head }, body))
-}
-
-/// A command hurries no more than its sender.
-fn without_hurry(head: &Head) -> Head {
-    let limit = head.from.class().priority();
-    let is_command = matches!(head.kind.kind(), Kind::Command(_));
-    Head { priority: if is_command { head.priority.at_most(limit) } else { head.priority }, ..*head }
 }
 
 /// The same mailbox in another system.

@@ -1,4 +1,5 @@
-//! What leaves by one connection: most important first, in bounded memory, so that a connection that stands still costs nobody else.
+//! What leaves by one connection: most important first, in bounded memory, so that a connection that stands still costs
+//! nobody else. Who sends by it has an equal part of memory and line, if others want some too.
 //!
 //! ```text
 //!  package ─┬─ nothing waits ──────────────────────▶ ready: bytes for the stream, a batch at most, in their final order
@@ -11,7 +12,7 @@ use super::WAIT_MAX_NS;
 use super::counts::Cause;
 use super::frame::{Carried, HEAD_BYTES, Message};
 use crate::broken::broken;
-use crate::queue::{Place, Queue, Waiting, counts_newest};
+use crate::queue::{Place, Queue, Share, Waiting, counts_newest};
 use crate::settings::LEVELS;
 use rohrpost_mailbox::Head;
 
@@ -30,6 +31,8 @@ pub(super) struct Parcel<'a> {
     pub(super) hops: u8,
     /// 0 goes first.
     pub(super) level: u8,
+    /// In whose part of memory and line it is counted.
+    pub(super) share: Share,
 }
 
 /// Learns what becomes of packages.
@@ -40,6 +43,8 @@ pub(super) trait Fates {
     fn replaced(&mut self, head: &Head);
     /// Lost; with it the beginning of its body.
     fn lost(&mut self, head: &Head, body: &[u8], cause: Cause);
+    /// What is lost, is so since too much waited of this sender.
+    fn crowded(&mut self, _sender: u32) {}
 }
 
 /// Of one connection, or of the one that comes next.
@@ -147,16 +152,18 @@ impl Outgoing {
         if let Some(shift_ns) = shift_ns.filter(|_| !self.has_waiting() && self.ready().len() < self.batch_bytes) {
             return self.make_ready(shift_ns, parcel, fates);
         }
-        let Parcel { head, body, published_ns, hops, level } = *parcel;
-        let waiting = Waiting { head: *head, published_ns, hops, level, ..Waiting::default() };
+        let Parcel { head, body, published_ns, hops, level, share } = *parcel;
         let quota_bytes = self.quota_bytes;
-        let queue = self.queue.get_or_insert_with(|| Box::new(Queue::of_one(quota_bytes)));
+        let queue = self.queue.get_or_insert_with(|| Box::new(Queue::shared(quota_bytes)));
+        let sender = queue.sender_of(share);
+        let waiting = Waiting { head: *head, published_ns, hops, level, sender, share, ..Waiting::default() };
         let is_taken = match queue.older(&waiting) {
             Some(older) => replace(queue, older, waiting, body, fates),
-            None => queue.push(waiting, body, gives_way(fates)),
+            None => queue.push(waiting, body, gives_way(sender, fates)),
         };
         if !is_taken {
-            fates.lost(head, body, Cause::Full);
+            let others_wait = queue.others_wait(sender);
+            lose(&waiting, body, others_wait, fates);
         }
     }
 
@@ -164,9 +171,9 @@ impl Outgoing {
     pub(super) fn refill(&mut self, now_ns: u64, shift_ns: i64, fates: &mut impl Fates) {
         let Some(mut queue) = self.queue.take() else { return };
         while self.ready().len() < self.batch_bytes
-            && let Some(place) = queue.first()
+            && let Some(place) = queue.first_shared(self.batch_bytes as u64)
         {
-            let Waiting { head, published_ns, hops, .. } = *queue.at(place);
+            let Waiting { head, published_ns, hops, share, .. } = *queue.at(place);
             if is_stale(now_ns, published_ns) {
                 let (waiting, beginning) = queue.remove(place);
                 fates.lost(&waiting.head, beginning, Cause::Stale);
@@ -174,13 +181,13 @@ impl Outgoing {
             }
             self.forget_taken();
             let start = self.ready.len();
-            self.make_ready(shift_ns, &Parcel { head: &head, body: &[], published_ns, hops, level: 0 }, fates);
+            self.make_ready(shift_ns, &Parcel { head: &head, body: &[], published_ns, hops, level: 0, share }, fates);
             let body = self.ready.len();
             self.ready.resize(body + usize::from(head.len), 0);
             queue.read(place, &mut self.ready[body..]);
             let length = (self.ready.len() - start - HEAD_BYTES) as u32;
             self.ready[start..start + 4].copy_from_slice(&length.to_le_bytes());
-            queue.remove(place);
+            queue.serve(place);
         }
         self.queue = Some(queue);
     }
@@ -251,9 +258,9 @@ fn replace(queue: &mut Queue, older: Place, newer: Waiting, body: &[u8], fates: 
     let head = queue.at(older).head;
     let is_taken = if broken!(LosesItsPlace) {
         queue.remove(older);
-        queue.push(newer, body, gives_way(fates))
+        queue.push(newer, body, gives_way(newer.sender, fates))
     } else {
-        queue.replace(older, newer, body, gives_way(fates))
+        queue.replace(older, newer, body, gives_way(newer.sender, fates))
     };
     if is_taken && !broken!(ForgetsReplaced) {
         fates.replaced(&head);
@@ -261,9 +268,15 @@ fn replace(queue: &mut Queue, older: Place, newer: Waiting, body: &[u8], fates: 
     is_taken
 }
 
-/// What becomes of those that give way.
-fn gives_way(fates: &mut impl Fates) -> impl FnMut(&Waiting, &[u8]) {
-    |gone, beginning| fates.lost(&gone.head, beginning, Cause::Full)
+/// What becomes of those that give way to a package of this sender.
+fn gives_way(sender: u16, fates: &mut impl Fates) -> impl FnMut(&Waiting, &[u8]) {
+    move |gone, beginning| lose(gone, beginning, gone.sender != sender, fates)
+}
+
+/// Lost for lack of room. `for_others`: since it would be more than its sender's part of it.
+fn lose(waiting: &Waiting, body: &[u8], for_others: bool, fates: &mut impl Fates) {
+    fates.crowded(waiting.share.sender);
+    fates.lost(&waiting.head, body, if for_others { Cause::Share } else { Cause::Full });
 }
 
 pub(super) fn is_stale(now_ns: u64, published_ns: u64) -> bool {

@@ -55,6 +55,14 @@ impl Sample {
     }
 }
 
+impl Sample {
+    /// The server's session clock by this exchange, ns.
+    fn session_ns(&self, now_ns: u64) -> u64 {
+        let heard_ns = self.answer.left_ns.saturating_add(self.ways_ns / 2);
+        heard_ns.saturating_add(now_ns.saturating_sub(self.heard_ns))
+    }
+}
+
 impl Reckoning {
     /// An answer was read. False: it answers nothing that was asked before.
     pub fn heard(&mut self, now_ns: u64, answer: &TimeAnswer) -> bool {
@@ -62,10 +70,27 @@ impl Reckoning {
         let Some(ways_ns) = now_ns.checked_sub(answer.asked_ns) else { return false };
         // Clocks of different pace may make the way seem shorter than nothing.
         let sample = Sample { answer: *answer, heard_ns: now_ns, ways_ns: ways_ns.saturating_sub(there_ns) };
+        if self.contradicts(now_ns, &sample) && !broken!(TakesSmallest) {
+            self.forget();
+        }
         self.kept[self.next] = Some(sample);
         self.next = (self.next + 1) % KEPT;
         self.answers += 1;
         true
+    }
+
+    /// What was heard does not count any more: a clock did what bounds exclude.
+    pub fn forget(&mut self) {
+        self.kept = [None; KEPT];
+    }
+
+    /// Whether one that is kept and this one cannot both be true: one of both ends slept, or was slewed.
+    fn contradicts(&self, now_ns: u64, sample: &Sample) -> bool {
+        let mut kept = self.kept.iter().flatten();
+        kept.any(|other| {
+            let apart_ns = other.session_ns(now_ns).abs_diff(sample.session_ns(now_ns));
+            apart_ns > other.error_ns(now_ns).saturating_add(sample.error_ns(now_ns))
+        })
     }
 
     /// How many answers were read.
@@ -81,9 +106,7 @@ impl Reckoning {
     /// The server's session clock.
     pub fn session(&self, now_ns: u64) -> Option<Bounded> {
         let best = self.kept.iter().flatten().min_by_key(|sample| sample.error_ns(now_ns))?;
-        let heard_ns = best.answer.left_ns.saturating_add(best.ways_ns / 2);
-        let ns = heard_ns.saturating_add(now_ns.saturating_sub(best.heard_ns));
-        Some(Bounded { ns, error_ns: best.error_ns(now_ns) })
+        Some(Bounded { ns: best.session_ns(now_ns), error_ns: best.error_ns(now_ns) })
     }
 
     /// System time as the server has it, as of the best exchange: of the latest epoch. None if it does not know it.
@@ -145,6 +168,25 @@ mod tests {
         reckoning.heard(heard_ns, &answer);
         let error_ns = reckoning.session(heard_ns).unwrap().error_ns;
         assert!((400_000..402_000).contains(&error_ns), "clocks drift 5 ms in 20 s: {error_ns}");
+    }
+
+    #[test]
+    fn what_cannot_all_be_true_is_a_contradiction_and_the_latest_counts() {
+        let mut reckoning = Reckoning::default();
+        for asked_ns in [0, 1_000_000_000] {
+            let (heard_ns, answer) = exchange(asked_ns, 10_000, 10_000);
+            reckoning.heard(heard_ns, &answer);
+        }
+        // This computer slept for an hour, and its clock stood still; the way there is a slow one now.
+        let (heard_ns, mut answer) = exchange(2_000_000_000, 400_000, 400_000);
+        let slept_ns = 3_600_000_000_000;
+        for ns in [&mut answer.came_ns, &mut answer.left_ns, &mut answer.system_ns] {
+            *ns += slept_ns;
+        }
+        reckoning.heard(heard_ns, &answer);
+        let system = reckoning.system(heard_ns).unwrap().at(heard_ns);
+        assert!(system.ns.abs_diff(heard_ns + 1_000_000_000_000 + slept_ns) <= 400_000, "{system:?}");
+        assert_eq!(reckoning.answers(), 3);
     }
 
     #[test]

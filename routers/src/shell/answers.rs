@@ -1,12 +1,12 @@
 //! The answers that senders of undeliverable commands get: so they need not wait for their timeout, and learn why.
 
-use super::ways::{Reach, Ways};
+use super::ways::Ways;
 use crate::frame::NodeIndex;
 use crate::link::State;
 use crate::report::Mismatch;
 use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
-use rohrpost_mailbox::{Head, Kind, Options, Participant, Type, monotonic_ns};
+use rohrpost_mailbox::{Head, Kind, Name, Options, Participant, Type, monotonic_ns};
 use std::sync::Arc;
 
 /// Longest answer.
@@ -42,6 +42,8 @@ pub(super) struct Answers {
     stats: Arc<Stats>,
     faults: Arc<dyn Faults>,
     ways: Ways,
+    /// The router's own mailbox, which leads to other nodes.
+    via: Name,
     body: Vec<u8>,
 }
 
@@ -51,18 +53,20 @@ impl Answers {
         stats: &Arc<Stats>,
         faults: &Arc<dyn Faults>,
         participant: &Arc<Participant>,
+        via: Name,
     ) -> Self {
         Self {
             settings: settings.clone(),
             stats: stats.clone(),
             faults: faults.clone(),
-            ways: Ways::new(participant, Reach::Everywhere),
+            ways: Ways::everywhere(participant),
+            via,
             body: Vec::with_capacity(ANSWER_BYTES_MAX),
         }
     }
 
     /// Answers a command that came from another node, unless this life of the router has just begun: then it may be a copy of one that
-    /// the life before has delivered. Its caller's next try brings the truth.
+    /// the life before has delivered. Its caller's next try brings the truth. Who asks in a name that no node has gets none.
     pub(super) fn answer_arrived(
         &mut self,
         peer: Option<NodeIndex>,
@@ -71,7 +75,7 @@ impl Answers {
         cause: Cause,
         takes_bytes: Option<usize>,
     ) {
-        if !self.stats.is_young(monotonic_ns()) {
+        if !self.stats.is_young(monotonic_ns()) && self.settings.node_of(head.from).is_some() {
             self.answer(peer, head, body, cause, takes_bytes);
         }
     }
@@ -96,7 +100,7 @@ impl Answers {
             State::Refused(mismatch) => Some(mismatch),
             _ => None,
         });
-        let rule = settings.access.line(head.to.class()).filter(|_| cause == Cause::NotAllowed);
+        let rule = settings.admission.access.line(head.to.class()).filter(|_| cause == Cause::NotAllowed);
         let node = if rule.is_some() { settings.nodes.get(usize::from(settings.own)) } else { node };
         let why = Undelivered { cause, node: node.map(|node| node.name.as_str()), rule, mismatch, takes_bytes };
         self.body.clear();
@@ -111,8 +115,11 @@ impl Answers {
             options: Options::ERROR,
             ..*head
         };
-        // Who has gone, or takes no more answers, waits for its timeout.
-        let _ = self.ways.send(&answer, &self.body);
+        // Who has gone, or takes no more answers, waits for its timeout. On other nodes callers choose the name, so that it is not looked for.
+        let _ = match settings.node_of(answer.to) {
+            Some(_) => self.ways.send_by(self.via, &answer, &self.body),
+            None => self.ways.send(&answer, &self.body),
+        };
     }
 }
 
@@ -133,10 +140,11 @@ mod tests {
         }
     }
 
-    /// A router that began so long ago, ns, and the mailbox of a caller.
+    /// A router that began so long ago, ns, the mailbox of a caller on its node, and its own, for callers on others.
     struct Ground {
         answers: Answers,
         replies: Receiver,
+        transit: Receiver,
         _folder: tempfile::TempDir,
     }
 
@@ -146,19 +154,30 @@ mod tests {
             let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
             let participant = Participant::join(&node, Name::NONE).unwrap();
             let replies = participant.receiver(caller(), Shape { slots: 4, ..Shape::default() }).unwrap();
+            let transit = participant.receiver(transit(), Shape { slots: 4, ..Shape::default() }).unwrap();
             let settings = Arc::new(settings(0, 2));
             // A beginning that never is over.
             let started_ns = age_ns.map_or(u64::MAX, |age_ns| monotonic_ns() - age_ns);
             let faults: Arc<dyn Faults> = Arc::new(Words);
-            let answers = Answers::new(&settings, &Stats::new(&settings, started_ns), &faults, &participant);
-            Self { answers, replies, _folder: folder }
+            let answers =
+                Answers::new(&settings, &Stats::new(&settings, started_ns), &faults, &participant, self::transit());
+            Self { answers, replies, transit, _folder: folder }
         }
 
         fn answered(&mut self) -> Option<String> {
-            let package = self.replies.try_receive()?;
+            let package = self.replies.try_receive().or_else(|| self.transit.try_receive())?;
             assert!(package.head().options.has(Options::ERROR));
             Some(String::from_utf8_lossy(package.body()).into_owned())
         }
+    }
+
+    fn transit() -> Name {
+        module(250, 0).with_local(local::TRANSIT)
+    }
+
+    /// Of a command that came: its caller is on the other node.
+    fn arrived(options: Options) -> Head {
+        Head { to: module(60, 0), from: module(50, 1).with_local(local::REPLIES), ..command(options) }
     }
 
     fn caller() -> Name {
@@ -175,6 +194,7 @@ mod tests {
         for cause in Cause::ALL {
             let again = command(Options::default().with(Options::REDELIVERED));
             ground.answers.answer(Some(1), &again, b"call", cause, None);
+            let again = arrived(again.options);
             ground.answers.answer_arrived(Some(1), &again, b"call", cause, None);
             assert_eq!(ground.answered(), None, "{cause:?}: the life before may have sent it");
         }
@@ -184,16 +204,20 @@ mod tests {
 
     #[test]
     fn who_has_just_begun_says_nothing_of_what_came() {
-        let command = command(Options::default());
+        let (came, left) = (arrived(Options::default()), command(Options::default()));
         let mut ground = Ground::new(None);
         for cause in [Cause::NoMailbox, Cause::MailboxFull, Cause::TooLarge, Cause::Stale] {
-            ground.answers.answer_arrived(Some(1), &command, b"call", cause, None);
+            ground.answers.answer_arrived(Some(1), &came, b"call", cause, None);
             assert_eq!(ground.answered(), None, "{cause:?}: it may be a copy of what the life before delivered");
         }
-        ground.answers.answer(Some(1), &command, b"call", Cause::Stale, None);
+        ground.answers.answer(Some(1), &left, b"call", Cause::Stale, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::Stale.word()), "what is to leave is no copy");
         let mut ground = Ground::new(Some(YOUNG_NS));
-        ground.answers.answer_arrived(Some(1), &command, b"call", Cause::MailboxFull, None);
+        ground.answers.answer_arrived(Some(1), &came, b"call", Cause::MailboxFull, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::MailboxFull.word()));
+        for from in [caller(), Name::new(2, 50, 1, 1), Name::NONE] {
+            ground.answers.answer_arrived(Some(1), &Head { from, ..came }, b"call", Cause::MailboxFull, None);
+            assert_eq!(ground.answered(), None, "no other node has {from}");
+        }
     }
 }

@@ -38,13 +38,15 @@ pub(super) struct Arrivals {
     pub(super) guard: Option<Gate>,
     /// Where there are time slots, refusals and hellos leave through them.
     pub(super) answers: Option<SyncSender<Answer>>,
+    /// At the port of what is not real time: nobody is greeted or refused there.
+    pub(super) is_rest: bool,
 }
 
 impl Arrivals {
     /// Until the socket is closed.
     pub(super) fn run(mut self) {
         let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
-        let (mut awake, mut ring_ns) = (Awake::default(), 0);
+        let (mut awake, mut ring_ns, mut seen_dropped) = (Awake::default(), 0, 0);
         // What waited for this router before it began, in a socket that outlives routers, says nothing of who lives now.
         let mut is_of_before = true;
         loop {
@@ -54,9 +56,16 @@ impl Arrivals {
             match received {
                 Received::Closed => return,
                 Received::Nothing => {}
-                Received::Datagram { waited_ns, .. } if is_of_before && waited_ns > SOCKET_MAX_NS => continue,
-                Received::Datagram { bytes, source, waited_ns } => {
+                Received::Datagram { waited_ns, dropped, .. } if is_of_before && waited_ns > SOCKET_MAX_NS => {
+                    seen_dropped = dropped;
+                    continue;
+                }
+                Received::Datagram { bytes, source, waited_ns, dropped } => {
                     is_of_before = false;
+                    if dropped != seen_dropped {
+                        self.stats.dropped.add(dropped.wrapping_sub(seen_dropped).into());
+                        seen_dropped = dropped;
+                    }
                     let came = Came { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
                     self.take(now_ns, &came, &mut datagram[..bytes]);
                 }
@@ -64,12 +73,13 @@ impl Arrivals {
             self.ask(now_ns);
             while let Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.desk) {
                 match &self.answers {
+                    _ if self.is_rest => {}
                     // With no room in the line it is lost, and said again a second later.
                     Some(slots) => drop(slots.try_send(Answer::Refusal { to, bytes, datagram: refusal })),
                     None => self.socket.answer(to, &refusal[..bytes]),
                 }
             }
-            if now_ns >= ring_ns {
+            if now_ns >= ring_ns && !self.is_rest {
                 ring_ns = now_ns + RING_EVERY_NS;
                 self.shared.ring_if_due(now_ns);
             }
@@ -120,7 +130,8 @@ impl Arrivals {
 pub(super) struct Desk {
     pub(super) ways: Ways,
     pub(super) answers: Answers,
-    pub(super) news: News,
+    /// None where another thread tells the same.
+    pub(super) news: Option<News>,
     pub(super) ages: Arc<Ages>,
     /// Bytes that the mailbox takes which refused the last one.
     pub(super) takes_bytes: Option<usize>,
@@ -145,6 +156,6 @@ impl Deliver for Desk {
     }
 
     fn event(&mut self, event: Event) {
-        self.news.event(event);
+        self.news.iter().for_each(|news| news.event(event));
     }
 }

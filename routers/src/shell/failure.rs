@@ -14,7 +14,7 @@ pub enum Failure {
     TooLong,
     /// The kernel or the network card had no room.
     NoRoom,
-    /// So much waits already for its device: who sends in time slots does not wait for that.
+    /// So much waits already for its device that the kernel takes no more; nobody waits for that.
     Full,
     /// Nobody is known there that it could be sealed to.
     Unacquainted,
@@ -76,8 +76,8 @@ impl Failure {
                 "the kernel had no room; lower `rate` in [network], or with time slots `link` in [tdma], to what the network can carry"
             }
             Self::Full => {
-                "its device has not sent what earlier slots brought; does it carry what `link` in [tdma] says (`ethtool DEVICE`), and is \
-                 net.core.wmem_max enough for a slot (`sysctl`)?"
+                "its device has not sent what it was given before; does it stand still, or carry less than `rate` in [network], or with time slots \
+                 `link` in [tdma], says (`ethtool DEVICE`), and is net.core.wmem_max enough for a slot (`sysctl`)?"
             }
             Self::Unacquainted => "its router has not shown yet that it has the same key",
             Self::Other => "the kernel refused it",

@@ -22,13 +22,19 @@ mod arrivals;
 pub mod clock;
 mod departures;
 mod failure;
+mod filter;
+mod handover;
+mod hosted;
 mod news;
+mod rest;
+mod sending;
 pub mod slots;
 mod socket;
 mod threads;
 pub(crate) mod transit;
 pub mod tunnel;
 pub(crate) mod ways;
+mod wire;
 
 pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
@@ -47,9 +53,10 @@ use crate::tdma::{Discipline, Table};
 use answers::Answers;
 use arrivals::{Arrivals, Desk};
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
-use departures::{Departures, Wire};
+use departures::Departures;
 use news::News;
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
+use sending::Sending;
 use slots::Slots;
 use socket::InSocket;
 use std::io;
@@ -58,7 +65,8 @@ use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use threads::Shared;
-use ways::{Reach, Ways};
+use ways::Ways;
+use wire::Wire;
 
 /// Why a router did not start.
 #[derive(Debug, thiserror::Error)]
@@ -116,7 +124,10 @@ pub struct Shell {
     failures: Arc<Failures>,
     ages: Arc<Ages>,
     shared: Arc<Shared>,
-    socket: Arc<InSocket>,
+    /// Of what is not real time, where that goes its own way.
+    rest_stats: Option<Arc<Stats>>,
+    /// That of packages stands first.
+    sockets: Vec<Arc<InSocket>>,
     clock: Option<Arc<ClockState>>,
     slots: Option<Arc<slots::State>>,
     tunnel: Option<Arc<tunnel::Passed>>,
@@ -162,9 +173,10 @@ impl Shell {
             settings.senders.push(vec![name]);
         }
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
+        let peers = settings.peer_addresses();
         let socket = match socket {
-            Some(kept) => InSocket::kept(kept, own),
-            None => InSocket::open(own),
+            Some(kept) => InSocket::kept(kept, own, &peers),
+            None => InSocket::open(own, &peers, InSocket::WANTED_BYTES),
         };
         let socket = Arc::new(socket?);
         if socket.receive_bytes < InSocket::WANTED_BYTES {
@@ -188,24 +200,25 @@ impl Shell {
         let transit = sender.receiver(via, transit::shape())?;
         node.set_routes(via, &transit::ranges(&settings.routes))?;
         let shared = Arc::new(Shared::new(&sender));
-        let answers = |participant| Answers::new(&settings, &stats, &faults, participant);
-        let departures = Departures {
-            shared: shared.clone(),
-            transit,
+        let answers = |participant| Answers::new(&settings, &stats, &faults, participant, via);
+        let sealing = all.as_ref().map(|all| Sealing::new(all, Port::Packages));
+        let sending = Sending {
             outbound,
             stats: stats.clone(),
             answers: answers(&sender),
-            wire: Wire::new(&settings, all.as_ref().map(|all| Sealing::new(all, Port::Packages)), impair, &failures),
+            wire: Wire::new(&settings, settings.network.port, sealing, impair, &failures),
             datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
         };
+        let mut departures =
+            Departures { shared: shared.clone(), transit, sending, settings: settings.clone(), rest: None };
         let mut arrivals = Arrivals {
             shared: shared.clone(),
             socket: socket.clone(),
             inbound: Inbound::new(&settings, stats.clone()),
             desk: Desk {
-                ways: Ways::new(&receiver, Reach::Here),
+                ways: Ways::here(&receiver, &settings.hosts),
                 answers: answers(&receiver),
-                news: News::new(&settings),
+                news: Some(News::new(&settings)),
                 ages: ages.clone(),
                 takes_bytes: None,
             },
@@ -213,6 +226,7 @@ impl Shell {
             stats: stats.clone(),
             guard: all.as_ref().zip(seed).map(|(all, seed)| Gate::new(all, seed)),
             answers: None,
+            is_rest: false,
         };
         // From here on, whatever fails ends what has begun.
         let mut shell = Self {
@@ -221,7 +235,8 @@ impl Shell {
             failures,
             ages,
             shared,
-            socket,
+            rest_stats: None,
+            sockets: vec![socket],
             clock: None,
             slots: None,
             tunnel: None,
@@ -236,6 +251,7 @@ impl Shell {
             let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.acquaintances.as_ref()));
             shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
+            departures.rest = shell.begin_rest((node, name), &faults, impair)?;
             shell.begin("departures", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                     tracing::warn!(
@@ -270,9 +286,9 @@ impl Shell {
         let spin_ns = slots::spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(slots::ANSWERS);
         let hellos = self.acquaintances.as_ref().map(Waiting::new);
-        let line = slots::Line::new(waiting, hellos, self.socket.clone(), settings.clone());
+        let line = slots::Line::new(waiting, hellos, self.sockets[0].clone(), settings.clone());
         let discipline = Discipline::new(table, spin_ns);
-        let own = slots::Own { router: name, network: settings.network };
+        let own = slots::Own { router: name, nodes: settings.nodes.len(), network: settings.network };
         let slots = Slots::new(own, departures, works, discipline, line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
@@ -334,6 +350,12 @@ impl Shell {
         &self.stats
     }
 
+    /// The same of what is not real time, where that goes by threads and a port of its own: packages by class are counted in either, datagrams
+    /// and what waits in both.
+    pub fn rest_stats(&self) -> Option<&Arc<Stats>> {
+        self.rest_stats.as_ref()
+    }
+
     /// How often datagrams could not be sent.
     pub fn failures(&self) -> &Arc<Failures> {
         &self.failures
@@ -354,7 +376,7 @@ impl Shell {
 impl Drop for Shell {
     fn drop(&mut self) {
         self.shared.end();
-        self.socket.close();
+        self.sockets.iter().for_each(|socket| socket.close());
         for thread in self.threads.drain(..) {
             // One that panicked has said so.
             let _ = thread.join();

@@ -26,6 +26,9 @@ pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
              same file"
                 .into()
         }
+        (Reason::Key, _) => "what comes from its address is sealed with another key than this node's; copy the folder of keys from the first \
+                             computer of the installation to this one or to that (`rohrpost keys show`, on both, tells which differ)"
+            .into(),
         (Reason::Stranger, _) => {
             "its packages come from another address than the configuration has for it, or are for another \
              node; correct `address` in the configuration, and launch all nodes from it"
@@ -115,6 +118,7 @@ mod tests {
             (mismatch(Reason::Version, None), ["wire format 9", "this one 1", "same version of Rohrpost"]),
             (mismatch(Reason::Digest, Some(0xab)), ["00000000000000ab", "0000000000001234", "from the same file"]),
             (mismatch(Reason::Digest, None), ["another", "0000000000001234", "from the same file"]),
+            (mismatch(Reason::Key, None), ["another key", "from the first computer", "keys show"]),
             (mismatch(Reason::Stranger, Some(1)), ["another address", "for it", "correct `address`"]),
         ] {
             let text = difference(&mismatch, 0x1234);

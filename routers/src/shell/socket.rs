@@ -4,20 +4,24 @@
 //! node is its address.
 
 use super::failure::Failure;
+use super::filter;
 use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::socket::{ControlMessageOwned, MsgFlags, SockaddrStorage, recvmsg, setsockopt, sockopt};
 use nix::sys::time::TimeValLike;
 use rohrpost_mailbox::realtime_ns;
 use socket2::{Domain, Protocol, SockRef, Socket, Type};
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::{IpAddr, Shutdown, SocketAddr, UdpSocket};
-use std::os::fd::{AsRawFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// What may wait in the kernel for the thread that reads: a hundredth of a second of 10 Gbit/s, small datagrams counted with what
 /// the kernel needs for each.
 const RECEIVE_BYTES: usize = 8 << 20;
+/// The same for what is not real time: what waits longer than this takes at 100 MiB/s is late, and who reads it may have to wait itself.
+pub(super) const REST_BYTES: usize = 2 << 20;
 /// Expedited forwarding (RFC 3246), for switches and radios that know it; and the highest priority in this computer's own queues
 /// that needs no rights.
 const TRAFFIC_CLASS: u32 = 46 << 2;
@@ -25,7 +29,7 @@ const PRIORITY: u32 = 6;
 /// Reading ends after so long without a datagram. The kernel counts it in ticks of its slow timers, which costs less than it
 /// does to sleep.
 pub(super) const LISTEN: Duration = Duration::from_millis(100);
-/// Room for a stamp, and what the kernel puts around it.
+/// Room for a stamp and a count, and what the kernel puts around them.
 const CONTROL_BYTES: usize = 64;
 /// When reading fails.
 const PAUSE: Duration = Duration::from_millis(1);
@@ -64,6 +68,8 @@ pub(super) enum Received {
         source: IpAddr,
         /// How long it has waited in the kernel until now, ns; 0 if the kernel did not say.
         waited_ns: u64,
+        /// Datagrams that the kernel had dropped at this socket when it came, modulo 2^32: of strangers, or since the socket was full.
+        dropped: u32,
     },
     /// Nothing came for [`LISTEN`].
     Nothing,
@@ -76,8 +82,8 @@ pub(super) enum Received {
 ///
 /// # Errors
 /// [`SocketError`]
-pub fn listen(own: SocketAddr) -> Result<OwnedFd, SocketError> {
-    InSocket::open(own).map(|inside| inside.socket.into())
+pub fn listen(own: SocketAddr, peers: &[IpAddr]) -> Result<OwnedFd, SocketError> {
+    InSocket::open(own, peers, RECEIVE_BYTES).map(|inside| inside.socket.into())
 }
 
 /// Takes datagrams from all peers.
@@ -96,32 +102,40 @@ impl InSocket {
     pub(super) const WANTED_BYTES: usize = RECEIVE_BYTES;
 
     /// Binds the node's own address and port. Not shared with anybody: two routers of one node would each get some datagrams.
-    pub(super) fn open(own: SocketAddr) -> Result<Self, SocketError> {
+    /// It takes what comes from `peers`, and nothing else.
+    pub(super) fn open(own: SocketAddr, peers: &[IpAddr], bytes: usize) -> Result<Self, SocketError> {
         let socket = new_socket(own).map_err(|error| SocketError::Io(own, "making a socket", error))?;
         bind(&socket, own)?;
-        Self::of(socket, own, false)
+        Self::of(socket, own, (peers, bytes), false)
     }
 
     /// A socket that is kept for all routers of this node, one after the other: see [`listen`].
-    pub(super) fn kept(socket: OwnedFd, own: SocketAddr) -> Result<Self, SocketError> {
+    pub(super) fn kept(socket: OwnedFd, own: SocketAddr, peers: &[IpAddr]) -> Result<Self, SocketError> {
         let socket = Socket::from(socket);
         let bound =
             socket.local_addr().map_err(|error| SocketError::Io(own, "looking at the socket that is kept", error))?;
         match bound.as_socket() {
-            Some(bound) if bound == own => Self::of(socket, own, true),
+            Some(bound) if bound == own => Self::of(socket, own, (peers, RECEIVE_BYTES), true),
             bound => Err(SocketError::Strange(own, bound.map_or("nothing".into(), |bound| bound.to_string()))),
         }
     }
 
-    fn of(socket: Socket, own: SocketAddr, is_kept: bool) -> Result<Self, SocketError> {
+    fn of(
+        socket: Socket,
+        own: SocketAddr,
+        (peers, bytes): (&[IpAddr], usize),
+        is_kept: bool,
+    ) -> Result<Self, SocketError> {
         let failed = |what| move |error: io::Error| SocketError::Io(own, what, error);
-        if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
+        filter::take_only_from(&socket, peers).map_err(failed("SO_ATTACH_FILTER"))?;
+        if setsockopt(&socket, sockopt::RcvBufForce, &bytes).is_err() {
             // Without the right to go beyond the limit, up to the limit.
-            socket.set_recv_buffer_size(RECEIVE_BYTES).map_err(failed("SO_RCVBUF"))?;
+            socket.set_recv_buffer_size(bytes).map_err(failed("SO_RCVBUF"))?;
         }
         // The kernel tells twice what was asked for: it counts what it needs itself.
         let receive_bytes = socket.recv_buffer_size().map_err(failed("SO_RCVBUF"))? / 2;
         setsockopt(&socket, sockopt::ReceiveTimestampns, &true).map_err(|e| failed("SO_TIMESTAMPNS")(e.into()))?;
+        setsockopt(&socket, sockopt::RxqOvfl, &1).map_err(|e| failed("SO_RXQ_OVFL")(e.into()))?;
         socket.set_read_timeout(Some(LISTEN)).map_err(failed("SO_RCVTIMEO"))?;
         Ok(Self { socket: socket.into(), port: own.port(), closed: AtomicBool::new(false), is_kept, receive_bytes })
     }
@@ -146,13 +160,18 @@ impl InSocket {
         let source = message.address.as_ref().and_then(address);
         // Closed meanwhile: then nobody sent what was read.
         let Some(source) = source else { return Received::Nothing };
-        let stamps = message.cmsgs().into_iter().flatten();
-        let arrived_ns = stamps.filter_map(|control| match control {
-            ControlMessageOwned::ScmTimestampns(stamp) => u64::try_from(stamp.num_nanoseconds()).ok(),
-            _ => None,
-        });
-        let waited_ns = arrived_ns.last().map_or(0, |arrived_ns| realtime_ns().saturating_sub(arrived_ns));
-        Received::Datagram { bytes: message.bytes, source, waited_ns }
+        let (mut waited_ns, mut dropped) = (0, 0);
+        for control in message.cmsgs().into_iter().flatten() {
+            match control {
+                ControlMessageOwned::ScmTimestampns(stamp) => {
+                    let arrived_ns = u64::try_from(stamp.num_nanoseconds()).ok();
+                    waited_ns = arrived_ns.map_or(0, |arrived_ns| realtime_ns().saturating_sub(arrived_ns));
+                }
+                ControlMessageOwned::RxqOvfl(so_far) => dropped = so_far,
+                _ => {}
+            }
+        }
+        Received::Datagram { bytes: message.bytes, source, waited_ns, dropped }
     }
 
     /// Sends a datagram to the router at an address.
@@ -177,25 +196,27 @@ impl InSocket {
 pub(super) struct OutSocket {
     own: IpAddr,
     peer: SocketAddr,
-    /// So many bytes may wait in the kernel, and what is more fails. None: as many as it likes, and whoever sends more waits.
-    waiting_bytes: Option<usize>,
+    /// So many bytes may wait in the kernel at least; what is more fails.
+    waiting_bytes: usize,
     /// None while there is no way there, as when the network is down.
     socket: Option<Socket>,
 }
 
 impl OutSocket {
-    pub(super) fn new(own: IpAddr, peer: SocketAddr) -> Self {
-        Self { own, peer, waiting_bytes: None, socket: connect(own, peer, None).ok() }
-    }
-
-    /// One that never blocks, with room for so many bytes.
-    pub(super) fn that_never_waits(own: IpAddr, peer: SocketAddr, bytes: usize) -> Self {
-        let waiting_bytes = Some(bytes);
+    /// With room in the kernel for so many bytes at least, and for what is usual.
+    pub(super) fn new(own: IpAddr, peer: SocketAddr, waiting_bytes: usize) -> Self {
         Self { own, peer, waiting_bytes, socket: connect(own, peer, waiting_bytes).ok() }
     }
 
-    /// Sends these parts as one datagram. Unless it never waits, it blocks while the network card has more than it can send: what waits then
-    /// waits in the router's queue, where important packages overtake.
+    /// Whether it might take a datagram.
+    pub(super) fn has_room(&self) -> bool {
+        let Some(socket) = &self.socket else { return true };
+        let mut fds = [PollFd::new(socket.as_fd(), PollFlags::POLLOUT)];
+        !matches!(poll(&mut fds, PollTimeout::ZERO), Ok(0))
+    }
+
+    /// Sends these parts as one datagram; never waits. While the network card has more than it can send it fails: what waits then waits in the
+    /// router's queue, where important packages overtake.
     ///
     /// # Errors
     /// The datagram was not sent, or not because of what became of an earlier one.
@@ -233,14 +254,13 @@ fn address(of: &SockaddrStorage) -> Option<IpAddr> {
     v4.or_else(|| of.as_sockaddr_in6().map(|of| IpAddr::V6(of.ip())))
 }
 
-fn connect(own: IpAddr, peer: SocketAddr, waiting_bytes: Option<usize>) -> io::Result<Socket> {
+fn connect(own: IpAddr, peer: SocketAddr, waiting_bytes: usize) -> io::Result<Socket> {
     let socket = new_socket(peer)?;
-    if let Some(bytes) = waiting_bytes {
-        socket.set_nonblocking(true)?;
-        // The kernel tells twice what was asked for. Never less than what is usual.
-        if socket.send_buffer_size()? < 2 * bytes && setsockopt(&socket, sockopt::SndBufForce, &bytes).is_err() {
-            socket.set_send_buffer_size(bytes)?;
-        }
+    socket.set_nonblocking(true)?;
+    // The kernel tells twice what was asked for. Never less than what is usual.
+    let is_less = socket.send_buffer_size()? < 2 * waiting_bytes;
+    if is_less && setsockopt(&socket, sockopt::SndBufForce, &waiting_bytes).is_err() {
+        socket.set_send_buffer_size(waiting_bytes)?;
     }
     socket.bind(&SocketAddr::new(own, 0).into())?;
     // Refusals are not worth a failure: the network then treats these datagrams as all others.
@@ -285,7 +305,7 @@ mod tests {
 
     fn pair(address: IpAddr) -> (InSocket, OutSocket) {
         let at = SocketAddr::new(address, free_port(address));
-        (InSocket::open(at).unwrap(), OutSocket::new(address, at))
+        (InSocket::open(at, &[address], RECEIVE_BYTES).unwrap(), OutSocket::new(address, at, 0))
     }
 
     #[test]
@@ -294,7 +314,9 @@ mod tests {
             let (inside, mut outside) = pair(address);
             outside.send(&[IoSlice::new(b"head"), IoSlice::new(b""), IoSlice::new(b"body")]).unwrap();
             let mut datagram = [0; 100];
-            let Received::Datagram { bytes: 8, source, waited_ns } = inside.receive(&mut datagram) else { panic!() };
+            let Received::Datagram { bytes: 8, source, waited_ns, .. } = inside.receive(&mut datagram) else {
+                panic!()
+            };
             assert_eq!((source, &datagram[..8]), (address, &b"headbody"[..]));
             assert!((1..1_000_000_000).contains(&waited_ns), "the kernel stamped it: {waited_ns}");
             assert_eq!(inside.receive(&mut datagram), Received::Nothing);
@@ -318,13 +340,13 @@ mod tests {
     #[test]
     fn what_comes_while_nobody_reads_a_kept_socket_waits_for_the_next_one() {
         let at = SocketAddr::new(ONE, free_port(ONE));
-        let keeper = listen(at).unwrap();
-        let mut sender = OutSocket::new(OTHER, at);
+        let keeper = listen(at, &[OTHER]).unwrap();
+        let mut sender = OutSocket::new(OTHER, at, 0);
         let mut datagram = [0; 10];
         for life in 0..3_u8 {
             sender.send(&[IoSlice::new(&[life])]).unwrap();
             std::thread::sleep(Duration::from_millis(2));
-            let inside = InSocket::kept(keeper.try_clone().unwrap(), at).unwrap();
+            let inside = InSocket::kept(keeper.try_clone().unwrap(), at, &[OTHER]).unwrap();
             let Received::Datagram { bytes: 1, waited_ns, .. } = inside.receive(&mut datagram) else { panic!() };
             assert_eq!(datagram[0], life);
             assert!(waited_ns >= 2_000_000, "the kernel says how long: {waited_ns}");
@@ -332,7 +354,7 @@ mod tests {
             assert_eq!(inside.receive(&mut datagram), Received::Closed);
         }
         let elsewhere = SocketAddr::new(ONE, free_port(ONE));
-        let error = InSocket::kept(keeper, elsewhere).err().unwrap();
+        let error = InSocket::kept(keeper, elsewhere, &[]).err().unwrap();
         assert!(
             matches!(error, SocketError::Strange(..)) && error.to_string().contains("launch the node anew"),
             "{error}"
@@ -342,14 +364,14 @@ mod tests {
     #[test]
     fn an_address_in_use_and_one_of_another_computer_are_told_plainly() {
         let at = SocketAddr::new(ONE, free_port(ONE));
-        let _first = InSocket::open(at).unwrap();
-        let error = InSocket::open(at).err().unwrap();
+        let _first = InSocket::open(at, &[], REST_BYTES).unwrap();
+        let error = InSocket::open(at, &[], REST_BYTES).err().unwrap();
         assert!(
             matches!(error, SocketError::InUse(_)) && error.to_string().contains("choose another `port`"),
             "{error}"
         );
         // Set aside for documentation (RFC 5737), so nobody has it.
-        let error = InSocket::open("192.0.2.1:21117".parse().unwrap()).err().unwrap();
+        let error = InSocket::open("192.0.2.1:21117".parse().unwrap(), &[], REST_BYTES).err().unwrap();
         assert!(
             matches!(error, SocketError::NotHere(_)) && error.to_string().contains("correct its `address`"),
             "{error}"
@@ -359,11 +381,11 @@ mod tests {
     #[test]
     fn who_never_waits_has_room_for_what_it_asked_for() {
         let at = SocketAddr::new(ONE, free_port(ONE));
-        let there = InSocket::open(at).unwrap();
-        let usual = OutSocket::new(ONE, at).socket.unwrap();
-        assert!(!usual.nonblocking().unwrap());
+        let there = InSocket::open(at, &[ONE], REST_BYTES).unwrap();
+        let usual = OutSocket::new(ONE, at, 0).socket.unwrap();
+        assert!(usual.nonblocking().unwrap());
         for bytes in [1, usual.send_buffer_size().unwrap() * 2] {
-            let mut sender = OutSocket::that_never_waits(ONE, at, bytes);
+            let mut sender = OutSocket::new(ONE, at, bytes);
             let socket = sender.socket.as_ref().unwrap();
             assert!(socket.nonblocking().unwrap());
             // Beyond the system's limit it takes a right.
@@ -379,13 +401,13 @@ mod tests {
     #[test]
     fn failures_have_a_cause_and_do_not_stay() {
         let at = SocketAddr::new(OTHER, free_port(OTHER));
-        let mut sender = OutSocket::new(ONE, at);
+        let mut sender = OutSocket::new(ONE, at, 0);
         let big = vec![0; 65_508];
         assert_eq!(sender.send(&[IoSlice::new(&big)]), Err(Failure::TooLong));
         assert_eq!(sender.send(&[IoSlice::new(b"to nobody")]), Ok(()), "it is not known yet");
         // Loopback answers at once.
         assert_eq!(sender.send(&[IoSlice::new(b"to nobody either")]), Err(Failure::NobodyThere));
-        let there = InSocket::open(at).unwrap();
+        let there = InSocket::open(at, &[ONE], REST_BYTES).unwrap();
         let _ = sender.send(&[IoSlice::new(b"here")]);
         let mut datagram = [0; 10];
         let received = there.receive(&mut datagram);

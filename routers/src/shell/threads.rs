@@ -95,3 +95,9 @@ impl Awake {
 pub(super) fn schedule(fifo: u8) -> std::io::Result<()> {
     sys::schedule(sys::Scheduling::Fifo(fifo))
 }
+
+/// Schedules the calling thread as modules are that are not real time: below all that are, whatever its process is.
+pub(super) fn schedule_below() {
+    // Who has real time may give it up.
+    let _ = sys::schedule(sys::Scheduling::Normal(0));
+}

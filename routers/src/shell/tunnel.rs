@@ -8,7 +8,8 @@
 //! dropped, which is how TCP learns how much a network carries. Both threads are ordinary ones.
 
 use super::threads::Shared;
-use super::ways::{Reach, Ways};
+use super::ways::Ways;
+use crate::admission::{Addresses, Admission, PACKET, PACKET_PRIORITY, TUNNEL};
 use crate::frame::NodeIndex;
 use crate::netlink::Netlink;
 use crate::outbound::DIRECT_HEAD_BYTES;
@@ -17,17 +18,15 @@ use crate::stats::Count;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use rohrpost_config::Tunnel;
 use rohrpost_config::wire::KEPT_IN_BYTES;
-use rohrpost_mailbox::{CreateError, Head, Name, Participant, Priority, Receiver, Shape, Type, sys};
+use rohrpost_mailbox::{CreateError, Head, Name, Participant, Receiver, Shape, sys};
 use std::fs::File;
 use std::io::{self, Read, Write};
-use std::net::Ipv4Addr;
+use std::net::IpAddr;
 use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// Of a router: takes IP packets from other nodes.
-const LOCAL: u8 = 4;
 /// The kernel numbers the devices of one network.
 const DEVICE: &str = "rohrpost%d";
 /// Largest packet, where the largest datagram has room for it.
@@ -39,8 +38,6 @@ const SLOTS: u16 = 64;
 /// The threads look this often whether the router ends.
 const LOOK: Duration = Duration::from_millis(100);
 const LOOK_MS: u8 = 100;
-/// Where an IPv4 packet has its destination.
-const DESTINATION: std::ops::Range<usize> = 16..20;
 
 const _: () = assert!(WAITING_BYTES_MAX <= QUOTA_BYTES_MIN as u64, "it is dropped here before its quota drops it");
 
@@ -51,11 +48,11 @@ pub struct Passed {
     pub sent: Count,
     /// Packets for other nodes that were dropped: too many waited.
     pub dropped: Count,
-    /// Packets for nobody, or not of IPv4.
+    /// Packets from or for an address that is not in the tunnel, or not of IPv4.
     pub stray: Count,
     /// Packets from other nodes, handed to the kernel.
     pub received: Count,
-    /// Packets from other nodes that the kernel did not take.
+    /// Packets that somebody of this node put there in the name of another, or that the kernel did not take.
     pub refused: Count,
 }
 
@@ -97,7 +94,8 @@ pub(super) struct Out {
     ways: Ways,
     /// The router's name.
     own: Name,
-    first: Ipv4Addr,
+    tunnel: Tunnel,
+    node: NodeIndex,
     nodes: NodeIndex,
 }
 
@@ -105,6 +103,7 @@ pub(super) struct Out {
 pub(super) struct In {
     common: Common,
     mailbox: Receiver,
+    admission: Admission,
 }
 
 /// Why there is no tunnel.
@@ -130,12 +129,14 @@ pub(super) fn ends(
     let passed = Arc::new(Passed::default());
     let common = |device| Common { shared: shared.clone(), device, passed: passed.clone() };
     let shape = Shape { slots: SLOTS, body_bytes_max: MTU_MAX as u16, ..Shape::default() };
-    let incoming = In { common: common(device.twin()?), mailbox: receiver.receiver(own.with_local(LOCAL), shape)? };
+    let mailbox = receiver.receiver(own.with_local(TUNNEL), shape)?;
+    let incoming = In { common: common(device.twin()?), mailbox, admission: settings.admission.clone() };
     let outgoing = Out {
         common: common(device),
-        ways: Ways::new(sender, Reach::Everywhere),
-        own: own.with_local(LOCAL),
-        first: tunnel.address(0),
+        ways: Ways::everywhere(sender),
+        own: own.with_local(TUNNEL),
+        tunnel: *tunnel,
+        node: settings.own,
         nodes: settings.nodes.len() as NodeIndex,
     };
     Ok((outgoing, incoming, passed))
@@ -160,14 +161,17 @@ impl Out {
 
     fn send(&mut self, packet: &[u8]) {
         let passed = self.common.passed.clone();
-        let Some(node) = node_of(packet, self.first, self.nodes) else { return passed.stray.add(1) };
-        let to = Name::new(self.own.system(), self.own.class().0, node, LOCAL);
+        let ends = Addresses::of(packet);
+        let Some(node) = ends.and_then(|ends| node_of(&ends, &self.tunnel, self.node, self.nodes)) else {
+            return passed.stray.add(1);
+        };
+        let to = Name::new(self.own.system(), self.own.class().0, node, TUNNEL);
         let head = Head {
             to,
             from: self.own,
             len: packet.len() as u16,
-            kind: Type::data(1),
-            priority: Priority(0),
+            kind: PACKET,
+            priority: PACKET_PRIORITY,
             ..Head::default()
         };
         let full = self.common.shared.tunnel_bytes.load(Ordering::Relaxed) >= WAITING_BYTES_MAX;
@@ -179,43 +183,48 @@ impl Out {
 impl In {
     /// Until the router ends.
     pub(super) fn run(mut self) {
-        let Common { shared, device, passed } = &mut self.common;
+        let (Common { shared, device, passed }, admission) = (&mut self.common, &self.admission);
         while !shared.ends() {
             let Some(packet) = self.mailbox.receive_timeout(LOOK) else { continue };
-            let taken = device.file.write(packet.body()).is_ok();
+            // What came from other nodes was looked at on its way in; this mailbox is open to all of this node.
+            let node = admission.tunnel_end(packet.head().from);
+            let is_packet = node.is_some_and(|node| admission.is_packet_of(node, packet.body()));
+            let taken = is_packet && device.file.write(packet.body()).is_ok();
             let count = if taken { &passed.received } else { &passed.refused };
             count.add(1);
         }
     }
 }
 
-/// The node that an IPv4 packet is for; addresses begin with that of node 0.
-fn node_of(packet: &[u8], first: Ipv4Addr, nodes: NodeIndex) -> Option<NodeIndex> {
-    let is_v4 = packet.first().is_some_and(|byte| byte >> 4 == 4);
-    let destination: [u8; 4] = packet.get(DESTINATION)?.try_into().ok()?;
-    let node = u32::from_be_bytes(destination).checked_sub(first.to_bits())?;
-    NodeIndex::try_from(node).ok().filter(|node| is_v4 && *node < nodes)
+/// The node that a packet of the own node is for: both have an address of the tunnel.
+fn node_of(ends: &Addresses, tunnel: &Tunnel, own: NodeIndex, nodes: NodeIndex) -> Option<NodeIndex> {
+    let is_own = ends.source == IpAddr::from(tunnel.address(own));
+    (0..nodes).find(|node| is_own && ends.destination == IpAddr::from(tunnel.address(*node)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::admission::v4;
+    use std::net::Ipv4Addr;
 
     #[test]
-    fn a_packet_goes_to_the_node_with_its_address() {
-        let packet = |version: u8, to: [u8; 4]| [&[version << 4 | 5][..], &[0; 15], &to, b"payload"].concat();
-        let first = Ipv4Addr::new(10, 78, 0, 1);
+    fn a_packet_of_the_own_address_goes_to_the_node_with_its_destination() {
+        let tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
+        let packet = |from: [u8; 4], to: [u8; 4]| v4(from.into(), to.into(), b"payload");
+        let own = [10, 78, 0, 2];
         for (bytes, node, why) in [
-            (packet(4, [10, 78, 0, 1]), Some(0), "the first"),
-            (packet(4, [10, 78, 0, 3]), Some(2), "the last"),
-            (packet(4, [10, 78, 0, 4]), None, "behind it"),
-            (packet(4, [10, 78, 0, 0]), None, "before the first"),
-            (packet(4, [10, 78, 1, 1]), None, "so far behind that a byte does not tell"),
-            (packet(6, [10, 78, 0, 1]), None, "not of IPv4"),
-            (packet(4, [10, 78, 0, 1])[..19].to_vec(), None, "cut short"),
-            (Vec::new(), None, "nothing"),
+            (packet(own, [10, 78, 0, 1]), Some(0), "the first"),
+            (packet(own, [10, 78, 0, 3]), Some(2), "the last"),
+            (packet(own, [10, 78, 0, 4]), None, "behind it"),
+            (packet(own, [10, 78, 0, 0]), None, "before the first"),
+            (packet(own, [10, 78, 1, 1]), None, "so far behind that a byte does not tell"),
+            (packet([10, 78, 0, 3], [10, 78, 0, 1]), None, "with the address of another node"),
+            (packet([192, 168, 0, 7], [10, 78, 0, 1]), None, "from another network"),
+            (packet(own, [10, 78, 0, 1])[..19].to_vec(), None, "cut short"),
         ] {
-            assert_eq!(node_of(&bytes, first, 3), node, "{why}");
+            let ends = Addresses::of(&bytes);
+            assert_eq!(ends.and_then(|ends| node_of(&ends, &tunnel, 1, 3)), node, "{why}");
         }
     }
 }

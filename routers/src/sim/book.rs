@@ -14,7 +14,7 @@ use super::wire::Wire;
 use crate::frame::NodeIndex;
 use crate::settings::LEVELS;
 use crate::time::Term;
-use rohrpost_mailbox::{Head, Name};
+use rohrpost_mailbox::{Head, Name, Priority, local};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -54,6 +54,9 @@ pub enum Promise {
     Bounded,
     /// What a router says of its peers and of losses on the wire is so.
     Links,
+    /// Nothing is delivered that is not admitted: where datagrams are sealed, in the name of another node; to a router's own mailbox; with more
+    /// priority than its sender, or who asked for it, may have.
+    Admission,
     /// A while after the last fault all is well.
     Recovery,
     /// System time is within its stated bound.
@@ -98,6 +101,8 @@ pub enum Role {
         /// Which call.
         call: usize,
     },
+    /// What nobody needs, from who wants to do harm: a program that writes what it likes in its heads, and whose router caps no priority.
+    Intruder,
 }
 
 /// How far a package has come at its sender's side.
@@ -173,6 +178,8 @@ pub struct Book {
     pattern: Vec<u8>,
     /// Level of a priority.
     bulk_below: u8,
+    /// Whether datagrams are sealed.
+    pub is_sealed: bool,
     /// From then on all must be well, true ns.
     pub well_ns: u64,
     /// System time.
@@ -184,6 +191,8 @@ pub struct Book {
 }
 
 const PATTERN_PRIME: usize = 251;
+/// Whether routers of intruders do as those want: that takes mistakes which can be switched on.
+const HOSTILE: bool = cfg!(any(test, feature = "broken-variants"));
 
 impl Book {
     /// Empty books.
@@ -214,13 +223,10 @@ impl Book {
         *id = id.wrapping_add(1);
         head.id = *id;
         // As it is to leave.
-        let mut leaving = head;
-        if matches!(role, Role::Command { .. }) {
-            leaving.priority = head.priority.at_most(head.from.class().priority());
-        }
+        let leaving = if role == Role::Intruder && HOSTILE { head } else { admitted(&head) };
         self.by_head.insert(key(&head), number);
         let place = self.places.entry((head.from, head.to, leaving.priority.0)).or_default();
-        *place += u32::from(!matches!(role, Role::Report { .. }));
+        *place += u32::from(!matches!(role, Role::Report { .. } | Role::Intruder));
         self.packages.push(Package {
             head: leaving,
             from_node: nodes.0 as NodeIndex,
@@ -256,6 +262,18 @@ impl Book {
         let start = number as usize % PATTERN_PRIME;
         number_of(body) == Some(number) && body[8..] == self.pattern[start + 8..start + body.len()]
     }
+}
+
+/// As a package may be delivered at most.
+pub(super) fn admitted(head: &Head) -> Head {
+    let [sender, receiver] = [head.from, head.to].map(|name| name.class().0);
+    let most = match head.kind.0 {
+        1.. => sender,
+        _ if head.to.local() == local::COMMANDS => sender,
+        -16383..=-1 => receiver,
+        _ => sender.max(receiver),
+    };
+    Head { priority: Priority(head.priority.0.min(most)), ..*head }
 }
 
 fn key(head: &Head) -> (Name, Name, i16, u16) {

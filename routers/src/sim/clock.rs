@@ -5,8 +5,12 @@
 pub struct Now {
     /// The simulation's own time, ns.
     pub true_ns: u64,
-    /// The computer's CLOCK_MONOTONIC, ns.
+    /// The computer's monotonic clock, which runs on while it sleeps, ns.
     pub monotonic_ns: u64,
+    /// The one that nobody slews, and that stands still while it sleeps, ns.
+    pub unslewed_ns: u64,
+    /// For how long it has slept, as it says, ns.
+    pub slept_ns: u64,
     /// Its CLOCK_REALTIME, ns since 1970.
     pub realtime_ns: u64,
 }
@@ -21,6 +25,10 @@ pub struct Clock {
     monotonic_ns: u64,
     /// How much it runs fast, in ns a second.
     rate_ppb: i64,
+    /// How much faster somebody makes it than its oscillator is, ns a second.
+    slewed_ppb: i64,
+    unslewed_ns: u64,
+    slept_ns: u64,
     realtime_less_monotonic_ns: i64,
 }
 
@@ -28,23 +36,28 @@ impl Clock {
     /// A clock that shows `monotonic_ns` and `realtime_ns` at true time 0.
     pub fn new(monotonic_ns: u64, realtime_ns: u64, rate_ppb: i64) -> Self {
         let realtime_less_monotonic_ns = realtime_ns.wrapping_sub(monotonic_ns).cast_signed();
-        Self { true_ns: 0, monotonic_ns, rate_ppb, realtime_less_monotonic_ns }
+        let (slewed_ppb, unslewed_ns, slept_ns) = (0, monotonic_ns, 0);
+        Self { true_ns: 0, monotonic_ns, rate_ppb, slewed_ppb, unslewed_ns, slept_ns, realtime_less_monotonic_ns }
     }
 
     /// What it shows at a true time that is not before the last change of its rate.
     pub fn at(&self, true_ns: u64) -> Now {
         let since = i128::from(true_ns - self.true_ns);
-        let fast = since * i128::from(self.rate_ppb) / BILLION;
-        let monotonic_ns = (i128::from(self.monotonic_ns) + since + fast) as u64;
-        Now { true_ns, monotonic_ns, realtime_ns: monotonic_ns.wrapping_add_signed(self.realtime_less_monotonic_ns) }
+        let fast = |ppb: i64| since * i128::from(ppb) / BILLION;
+        let monotonic_ns = (i128::from(self.monotonic_ns) + since + fast(self.rate_ppb + self.slewed_ppb)) as u64;
+        let unslewed_ns = (i128::from(self.unslewed_ns) + since + fast(self.rate_ppb)) as u64;
+        let realtime_ns = monotonic_ns.wrapping_add_signed(self.realtime_less_monotonic_ns);
+        Now { true_ns, monotonic_ns, unslewed_ns, slept_ns: self.slept_ns, realtime_ns }
     }
 
     /// The true time at which it shows at least `monotonic_ns`, not before `true_ns`.
     pub fn when(&self, monotonic_ns: u64, true_ns: u64) -> u64 {
         let wait = i128::from(monotonic_ns.saturating_sub(self.at(true_ns).monotonic_ns));
-        let slow = wait * i128::from(-self.rate_ppb) / BILLION;
-        // Two roundings are less than 2 ns, and the square of the rate is less than a millionth of the wait.
-        let rounding = if wait > 0 { 2 + wait / 1_000_000 } else { 0 };
+        let fast_ppb = i128::from(self.rate_ppb + self.slewed_ppb);
+        let slow = -wait * fast_ppb / BILLION;
+        // Two roundings are less than 2 ns; the square of the rate is less than a millionth of the wait, unless somebody slews.
+        let square = wait * fast_ppb / BILLION * fast_ppb / BILLION;
+        let rounding = if wait > 0 { 2 + square.max(wait / 1_000_000) } else { 0 };
         u64::try_from(i128::from(true_ns) + wait + slow + rounding).unwrap_or(u64::MAX)
     }
 
@@ -55,9 +68,29 @@ impl Clock {
 
     /// From now on it runs so much fast.
     pub fn set_rate(&mut self, true_ns: u64, rate_ppb: i64) {
-        self.monotonic_ns = self.at(true_ns).monotonic_ns;
+        let now = self.at(true_ns);
+        (self.monotonic_ns, self.unslewed_ns) = (now.monotonic_ns, now.unslewed_ns);
         self.true_ns = true_ns;
         self.rate_ppb = rate_ppb;
+    }
+
+    /// From now on somebody slews it by so much, ns a second.
+    pub fn slew(&mut self, true_ns: u64, slewed_ppb: i64) {
+        self.set_rate(true_ns, self.rate_ppb);
+        self.slewed_ppb = slewed_ppb;
+    }
+
+    /// The computer wakes up: it has slept for so long until now, and what it takes for that is so much more.
+    pub fn wakes(&mut self, true_ns: u64, slept_ns: u64, wrong_ns: i64) {
+        self.set_rate(true_ns, self.rate_ppb);
+        self.unslewed_ns -= slept_ns;
+        self.slept_ns = (self.slept_ns + slept_ns).saturating_add_signed(wrong_ns);
+        self.monotonic_ns = self.monotonic_ns.saturating_add_signed(wrong_ns);
+    }
+
+    /// Whether somebody slews it.
+    pub fn is_slewed(&self) -> bool {
+        self.slewed_ppb != 0
     }
 
     /// Somebody sets CLOCK_REALTIME.

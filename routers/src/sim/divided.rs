@@ -28,6 +28,9 @@ pub enum Parts {
     Cut(usize, usize),
     /// Those whose bit is set from all others.
     Split(u64),
+    /// This one from all others, which hear nothing of it meanwhile: it stands still, or has not begun. Only of those who go by other configurations:
+    /// all others know its slots.
+    Still(usize),
 }
 
 impl Parts {
@@ -36,6 +39,7 @@ impl Parts {
         match *fault {
             Fault::Cut { from, to } | Fault::Bad { from, to, .. } => Some(Self::Cut(from, to)),
             Fault::Split { side } => Some(Self::Split(side)),
+            Fault::Freeze { node, .. } => Some(Self::Still(node)),
             _ => None,
         }
     }
@@ -44,6 +48,7 @@ impl Parts {
     fn part_any(self, nodes: &[usize]) -> bool {
         match self {
             Self::Cut(one, other) => nodes.contains(&one) && nodes.contains(&other),
+            Self::Still(node) => nodes.contains(&node),
             Self::Split(side) => nodes.iter().any(|node| side >> node & 1 != side >> nodes[0] & 1),
         }
     }
@@ -89,12 +94,14 @@ impl Divisions {
         if [one, other].iter().any(|sends| sends.basis.is_misled()) {
             return true;
         }
-        if one.term == other.term {
+        let is_one_table = one.digest == other.digest;
+        if is_one_table && one.term == other.term {
             return false;
         }
         let nodes: Vec<usize> =
             [one, other].into_iter().flat_map(|sends| [Some(sends.node), sends.master]).flatten().collect();
-        let mut lasting = self.lasting(at_ns).filter(|division| division.parts.part_any(&nodes));
+        let counts = |parts: Parts| parts.part_any(&nodes) && !(is_one_table && matches!(parts, Parts::Still(_)));
+        let mut lasting = self.lasting(at_ns).filter(|division| counts(division.parts));
         lasting.any(|division| division.from_ns + HOLDOVER_NS <= at_ns || division.from_ns <= began_ns)
     }
 
@@ -115,7 +122,7 @@ mod tests {
 
     fn sends(node: usize, rank: u8, basis: Basis) -> Transmission {
         let (begin_ns, end_ns) = (AT_NS, AT_NS + 1000);
-        Transmission { node, master: Some(rank.into()), term: Term::new(7, rank), basis, begin_ns, end_ns }
+        Transmission { node, master: Some(rank.into()), digest: 1, term: Term::new(7, rank), basis, begin_ns, end_ns }
     }
 
     #[test]

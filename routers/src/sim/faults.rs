@@ -1,15 +1,22 @@
 //! Faults of a simulated network: how they begin, and how they end.
 
+use super::book::Role;
 use super::chance::Chance;
 use super::clock::Now;
 use super::modules::DATA_MAILBOXES;
-use super::plan::{Fault, MS, mended};
+use super::packages::{ROUTER_CLASS, digest};
+use super::plan::{Fault, MS, SYSTEM, mended};
+use super::run::incarnation;
 use super::seals::altered;
 use super::station::Arrived;
 use super::world::{Event, World};
+use crate::admission::{PACKET, TUNNEL};
 use crate::frame::{Alive, FrameHead, Kind};
-use rohrpost_mailbox::local;
+use rohrpost_mailbox::{Head, Name, Priority, Type, local};
 use std::rc::Rc;
+
+/// The last that a router could send.
+const SEQUENCE_MAX: u64 = (1 << 48) - 1;
 
 impl World<'_> {
     pub(super) fn begin(&mut self, index: usize) {
@@ -24,6 +31,20 @@ impl World<'_> {
             Fault::Restart { node } => {
                 self.book.saw("router killed");
                 self.kill(node);
+            }
+            Fault::Sleep { node, .. } => {
+                self.book.saw("asleep");
+                self.stations[node].frozen += 1;
+                self.stations[node].asleep += 1;
+                self.stations[node].sleeps += 1;
+            }
+            Fault::Slew { node, slewed_ppb } => {
+                self.book.saw("slewed");
+                self.slew(node, slewed_ppb);
+            }
+            Fault::Edited { node, edition } => {
+                self.book.saw("edited");
+                self.edit(node, edition);
             }
             Fault::Cut { from, to } => {
                 self.book.saw("cut");
@@ -66,6 +87,16 @@ impl World<'_> {
                     self.at(at_ns, Event::Arrive { to, arrived });
                 }
             }
+            Fault::Intruder { node, count } => (0..count).for_each(|_| self.intrude(node)),
+            Fault::Forged { from, to, count } => {
+                self.book.saw("forged");
+                for _ in 0..count {
+                    let bytes = self.forged(from, to);
+                    let arrived = Arrived { port: 0, source: Some(from), bytes, stamp: Now::default(), damaged: false };
+                    let at_ns = self.now_ns + self.chance.below(50 * MS);
+                    self.at(at_ns, Event::Arrive { to, arrived });
+                }
+            }
             Fault::Replay { to, count } => {
                 for _ in 0..count.min(self.old.len() as u64) {
                     let (whose, life, arrived) = self.chance.pick_ref(&self.old).clone();
@@ -99,6 +130,19 @@ impl World<'_> {
                 }
             }
             Fault::Restart { node } => self.at(self.now_ns, Event::Start { node }),
+            Fault::Sleep { node, wrong_ns } => {
+                let slept_ns = self.now_ns - self.plan.faults[index].from_ns;
+                self.stations[node].clock.wakes(self.now_ns, slept_ns, wrong_ns);
+                self.book.times.changes(&self.stations[node].clock, node);
+                self.stations[node].frozen -= 1;
+                self.stations[node].asleep -= 1;
+                self.stations[node].sleeps -= 1;
+                if self.stations[node].runs() {
+                    self.catch_up(node);
+                }
+            }
+            Fault::Slew { node, .. } => self.slew(node, 0),
+            Fault::Edited { node, .. } => self.edit(node, 0),
             Fault::Cut { from, to } => self.links[from][to].cuts -= 1,
             Fault::Split { side } => self.split(side, |cuts| *cuts -= 1),
             Fault::Bad { from, to, .. } => self.links[from][to].quality = self.plan.quality,
@@ -107,8 +151,22 @@ impl World<'_> {
             Fault::ModuleRestart { node, module } => self.restart_module(node, module),
             Fault::Unsendable { node } => self.stations[node].host.unsendable -= 1,
             Fault::Echo { to, .. } => self.stations[to].echo_ns = None,
-            Fault::Step { .. } | Fault::Foreign { .. } | Fault::Replay { .. } => {}
+            Fault::Step { .. } | Fault::Foreign { .. } | Fault::Forged { .. } | Fault::Replay { .. } => {}
+            Fault::Intruder { .. } => {}
         }
+    }
+
+    fn slew(&mut self, node: usize, slewed_ppb: i64) {
+        self.stations[node].clock.slew(self.now_ns, slewed_ppb);
+        self.book.times.changes(&self.stations[node].clock, node);
+    }
+
+    /// A router is started anew, from another file.
+    fn edit(&mut self, node: usize, edition: usize) {
+        self.kill(node);
+        self.stations[node].edition = edition;
+        let at_ns = self.now_ns + self.chance.between(MS, 50 * MS);
+        self.at(at_ns, Event::Start { node });
     }
 
     /// After the last fault all links are as good as they get.
@@ -134,6 +192,51 @@ impl World<'_> {
                 change(mailbox);
             }
         }
+    }
+
+    /// A package of somebody who means harm.
+    fn intrude(&mut self, node: usize) {
+        let nodes = self.stations.len();
+        let [to, third] = [1, 2].map(|further| (node + further) % nodes);
+        let module = |of: usize, chance: &mut Chance| chance.pick(&self.plan.nodes[of].modules);
+        let router = |of: usize, local| Name::new(SYSTEM, ROUTER_CLASS.0, of as u8, local);
+        let chance = &mut self.chance;
+        let (own, others) = (module(node, chance), module(third, chance));
+        let data = module(to, chance).with_local(local::DATA + chance.below(DATA_MAILBOXES.into()) as u8);
+        let (from, to) = match chance.below(6) {
+            0 => (own, data),
+            1 => (own, data.with_local(local::REPLIES)),
+            2 => (others, data),
+            3 => (own, router(to, local::TRANSIT)),
+            4 => (own, router(to, TUNNEL)),
+            _ => (router(node, TUNNEL), router(to, TUNNEL)),
+        };
+        let kind = if to.local() == local::REPLIES { Type::reply(16) } else { PACKET };
+        let len = chance.between(8, 200) as u16;
+        let priority = Priority(chance.pick(&[0, 100, u8::MAX]));
+        self.book.saw("intruder");
+        self.post(node, Head { to, from, len, kind, priority, ..Head::default() }, Role::Intruder);
+    }
+
+    /// Something that a router could have sent, if it had been started anew, or had sent far more than it has.
+    fn forged(&mut self, from: usize, to: usize) -> Rc<[u8]> {
+        let life = self.stations[from].router.as_ref().map_or(0, |router| router.life);
+        let chance = &mut self.chance;
+        let is_of_life = chance.percent(50);
+        // Far from all that is sent in these seconds.
+        let any = chance.between(1 << 32, SEQUENCE_MAX);
+        let sequence = chance.pick(&[SEQUENCE_MAX, SEQUENCE_MAX / 2, any]);
+        let head = FrameHead {
+            kind: Kind::Alive,
+            system: super::plan::SYSTEM,
+            from: from as u8,
+            to: to as u8,
+            digest: digest(self.stations[to].edition),
+            incarnation: if is_of_life { incarnation(self.plan.seed, life) } else { chance.bits() | 1 },
+            sequence: if is_of_life { sequence } else { chance.below(1 << 20) },
+        };
+        let rest = Alive { heard_incarnation: chance.bits(), ..Alive::default() }.to_bytes();
+        Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat())
     }
 
     /// Something that no router of this installation sends: noise, or a frame of another version, installation or system.

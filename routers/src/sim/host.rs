@@ -51,14 +51,22 @@ impl Transit {
 
     /// The most urgent; of those, the first.
     pub fn take(&mut self) -> Option<Parcel> {
-        let first =
-            self.waiting.iter().enumerate().max_by_key(|(at, parcel)| (parcel.head.priority.0, usize::MAX - at));
-        first.map(|(at, _)| at).map(|at| self.waiting.remove(at))
+        self.first_at().map(|at| self.waiting.remove(at))
     }
 
     /// How many packages wait, and how important the first is.
     pub fn waits(&self) -> (usize, Option<Priority>) {
         (self.waiting.len(), self.waiting.iter().map(|parcel| parcel.head.priority).max_by_key(|priority| priority.0))
+    }
+
+    /// The one that is taken next.
+    pub fn first(&self) -> Option<&Parcel> {
+        self.first_at().map(|at| &self.waiting[at])
+    }
+
+    fn first_at(&self) -> Option<usize> {
+        let all = self.waiting.iter().enumerate();
+        all.max_by_key(|(at, parcel)| (parcel.head.priority.0, usize::MAX - at)).map(|(at, _)| at)
     }
 
     /// The router died with this one in its hand: it comes again, once.

@@ -1,6 +1,6 @@
 //! The modules of a simulated network: they post data and commands, run commands, and read what comes.
 
-use super::book::{Promise, Role, Way};
+use super::book::{Promise, Role, Way, admitted};
 use super::calls::{Answer, Waiting};
 use super::host::Parcel;
 use super::plan::{MS, US};
@@ -24,7 +24,7 @@ impl World<'_> {
         }
         // A little off its period, so that flows meet in all ways.
         let next_ns = flow.period_ns * self.chance.between(90, 110) / 100;
-        self.at(self.now_ns + next_ns, Event::Flow { flow: index });
+        self.at(self.now_ns + self.plan.moment_of(&flow).unwrap_or(next_ns), Event::Flow { flow: index });
         if self.stations[flow.node].asleep > 0 {
             return;
         }
@@ -37,7 +37,8 @@ impl World<'_> {
             }
             let head =
                 Head { to, from: flow.from, len, kind: Type::data(1), priority: Priority(priority), ..Head::default() };
-            self.post(flow.node, head, Role::Data);
+            // Of what is lowered on its way, what its sender held for more urgent may have gone first.
+            self.post(flow.node, admitted(&head), Role::Data);
             // The router reads while the sender still writes.
             if self.chance.percent(10) && self.stations[flow.node].runs() {
                 self.poll(flow.node);
@@ -46,7 +47,7 @@ impl World<'_> {
     }
 
     /// A module sends a package to another node.
-    fn post(&mut self, node: usize, head: Head, role: Role) {
+    pub(super) fn post(&mut self, node: usize, head: Head, role: Role) {
         let now = self.now(node);
         let (number, head, body) = self.book.post(now, head, (node, usize::from(head.to.instance())), role);
         let station = &mut self.stations[node];
@@ -161,7 +162,7 @@ impl World<'_> {
             let package = &self.book.packages[number as usize];
             let (head, posted_ns) = (package.head, package.posted_ns);
             match package.role {
-                Role::Data => {}
+                Role::Data | Role::Intruder => {}
                 Role::Answer { call, answer } => self.calls.answered(&mut self.book, now, call, answer),
                 Role::Report { call } => self.calls.answered(&mut self.book, now, call, Answer::NotRun),
                 Role::Command { call, age_ns } => {

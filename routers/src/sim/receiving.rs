@@ -1,11 +1,12 @@
 //! The books of the receiver's side: what a router took, and what it delivered or lost.
 
-use super::book::{Book, Promise, Role};
+use super::book::{Book, Package, Promise, Role, admitted};
 use super::clock::Now;
+use super::packages::ROUTER_CLASS;
 use super::table::{Group, Table};
 use crate::frame::{Frame, NodeIndex};
 use crate::inbound::{REORDER_MAX, WINDOW};
-use rohrpost_mailbox::{Head, Name};
+use rohrpost_mailbox::{Head, Name, local};
 
 /// What one life of a router takes.
 #[derive(Default, Debug)]
@@ -120,7 +121,7 @@ impl Book {
     pub fn arrives(&mut self, now: Now, node: usize, head: &Head, body: &[u8]) -> Option<u32> {
         let known = super::book::number_of(body).filter(|number| {
             self.packages.get(*number as usize).is_some_and(|package| {
-                let same = Head { options: package.head.options, ..*head };
+                let same = Head { options: package.head.options, priority: package.head.priority, ..*head };
                 same == package.head && usize::from(package.to_node) == node && self.is_body(*number, body)
             })
         });
@@ -128,7 +129,25 @@ impl Book {
             let text = format!("node {node} delivers what was never sent to it: {head:?}, {} bytes", body.len());
             self.broken(now, Promise::Unchanged, text);
         }
+        if let Some(number) = known {
+            self.is_admitted(now, head, &self.packages[number as usize].clone());
+        }
         known
+    }
+
+    /// A package is delivered, with this head.
+    fn is_admitted(&mut self, now: Now, head: &Head, package: &Package) {
+        let wrong = if head.priority != admitted(&package.head).priority {
+            "with another priority than it may have"
+        } else if head.to.class() == ROUTER_CLASS && head.to.local() >= local::TRANSIT {
+            "to a router's own mailbox"
+        } else if self.is_sealed && head.from.instance() != package.from_node {
+            "in the name of another node"
+        } else {
+            return;
+        };
+        let text = format!("{wrong} {head:?} is delivered, posted at node {}: {:?}", package.from_node, package.head);
+        self.broken(now, Promise::Admission, text);
     }
 
     /// A mailbox took it. `lives`: incarnation of the router that sent the datagram, not of the one that has the package by now (it may
@@ -144,7 +163,7 @@ impl Book {
         let took_ns = now.true_ns - package.posted_ns;
         let slowest_ns = self.slowest_ns.entry((head.from, head.to, head.priority.0)).or_default();
         *slowest_ns = took_ns.max(*slowest_ns);
-        let has_place = !twice && !redelivered && !matches!(package.role, Role::Report { .. });
+        let has_place = !twice && !redelivered && !matches!(package.role, Role::Report { .. } | Role::Intruder);
         if twice {
             let text = format!("package {number} was delivered twice by one router: {head:?}");
             self.broken(now, Promise::NoCopies, text);

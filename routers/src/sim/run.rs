@@ -61,23 +61,28 @@ fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticki
     Outcome { problems: book.problems, seen: book.seen, slowest_ns, trace: world.trace.lines }
 }
 
+/// Of a life of a router: never the same again, and in no order.
+pub(super) fn incarnation(seed: u64, life: u32) -> u64 {
+    (seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1
+}
+
 /// Routers as this version has them.
 fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayers<'static> {
     let plan = plan.clone();
-    Box::new(move |node, life, now, page| {
-        // Never the same again, and in no order.
-        let incarnation = (plan.seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        let settings = settings(&plan, node, incarnation);
+    Box::new(move |node, edition, life, now, page| {
+        let incarnation = incarnation(plan.seed, life);
+        let settings = settings(&plan, node, incarnation, edition);
         let mut packages = Packages::new(&settings, now.monotonic_ns);
-        let mut ticking = Ticking::new(ticking::settings(&plan, node, incarnation), now, page, plan.has_stamps);
+        let mut ticking =
+            Ticking::new(ticking::settings(&plan, node, incarnation, edition), now, page, plan.has_stamps);
         if plan.sealed {
             let all = seals::acquaintances(&settings);
             (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all, plan.slots.is_some()));
         }
         change(&mut ticking);
-        if let Some(slots) = &plan.slots {
+        if let Some(slots) = plan.slots_of(edition) {
             let (own, nodes) = (settings.own, plan.nodes.len() as u8);
-            let table = Table::new(&slots.table, &plan.masters, own, nodes, settings.overhead_bytes());
+            let table = Table::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());
             return vec![Box::new(Slotted::new(packages, ticking, table, now))];
         }
         vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]

@@ -5,6 +5,7 @@ use super::clock::Now;
 use super::plan::{MS, Shape};
 use super::table::Table;
 use crate::frame::Frame;
+use crate::intake::MAKING_NS;
 use crate::outbound::WAIT_MAX_NS;
 use crate::settings::LEVELS;
 use crate::stats::Cause;
@@ -178,13 +179,22 @@ impl Book {
     }
 
     /// In time slots nothing leaves while something more important waits, whoever it is for and however large: of those that something can be
-    /// sealed to.
-    pub fn is_strict(&mut self, now: Now, life: u32, datagram: &[u8], reaches: impl Fn(u8) -> bool) {
+    /// sealed to. `behind`: the first that waits in the mailbox.
+    pub fn is_strict(
+        &mut self,
+        now: Now,
+        life: u32,
+        datagram: &[u8],
+        behind: Option<u32>,
+        reaches: impl Fn(u8) -> bool,
+    ) {
         let last = self.levels(datagram).map(|(_, last)| last);
         let waiting = self.sending.get(&life).into_iter().flat_map(|sending| sending.waiting.values());
         let may_leave = |(_, _, number): &&(usize, u64, u32)| reaches(self.packages[*number as usize].to_node);
         let first = waiting.filter_map(|waiting| waiting.packages.iter().find(may_leave)).min().copied();
-        if let (Some(last), Some((first, _, number))) = (last, first)
+        let behind = behind.map(|number| (self.level(self.packages[number as usize].head.priority.0), number));
+        let first = first.map(|(level, _, number)| (level, number)).into_iter().chain(behind).min();
+        if let (Some(last), Some((first, number))) = (last, first)
             && first < last
         {
             let text = format!("a package of level {last} leaves, and {number} of level {first} waits");
@@ -222,7 +232,7 @@ impl Book {
         } else if head.priority != package.head.priority {
             let text = format!("package {number} leaves with {:?}: {:?}", head.priority, package.head);
             self.broken(now, Promise::Fresh, text);
-        } else if now.monotonic_ns.saturating_sub(package.published_ns) > WAIT_MAX_NS {
+        } else if now.monotonic_ns.saturating_sub(package.published_ns) > WAIT_MAX_NS + MAKING_NS {
             let text = format!("package {number} leaves, but was published at {} ns", package.published_ns);
             self.broken(now, Promise::Fresh, text);
         }

@@ -39,6 +39,8 @@ pub struct Slots {
     pub masters: Vec<NodeIndex>,
     /// Wake-ups beyond what the late gate lets through, of a million.
     pub late_ppm: u32,
+    /// Windows for which the thread wakes up so late that it takes nothing before the call, of a hundred.
+    pub oversleeps_percent: u64,
     /// The faults that divide the network.
     pub divisions: Divisions,
     /// A router has system time and may send so long after it began, where nothing goes wrong but that others begin too; none: it is not asked.
@@ -122,6 +124,7 @@ impl Plan {
             table,
             masters: plan.masters.clone(),
             late_ppm: LATE_PPM,
+            oversleeps_percent: 0,
             divisions: Divisions::default(),
             joins_ns: None,
         });
@@ -162,7 +165,9 @@ impl Plan {
         let Some(slots) = &mut self.slots else { return };
         // As the table was made: over two links a frame of time is on its way for a quarter of the guard at most.
         let least_ns = 8 * takes_ns(TIME_WIRE_BYTES + TAG_BYTES, slots.table.link_bytes_s);
-        slots.table.guard = slots.table.guard.max(Duration::from_nanos(least_ns));
+        let longer = |slots: &mut Slots| slots.table.guard = slots.table.guard.max(Duration::from_nanos(least_ns));
+        longer(slots);
+        self.edited.iter_mut().for_each(longer);
         self.time_slots();
         self.echo();
     }

@@ -3,17 +3,17 @@
 use super::book::Promise;
 use super::clock::Now;
 use super::packages::{Hands, Packages};
-use super::plan::{Plan, RECOVERY_NS};
+use super::plan::RECOVERY_NS;
 use super::station::{Arrived, Io, Layer, PORTS, Port, Sent};
 use super::ticking::{self, Ticking};
 use super::wire::{Basis, Says};
 use crate::frame::{FrameHead, Kind};
-use crate::intake::Intake;
+use crate::intake::{Intake, QUIET_NS, TAKING_NS};
 use crate::tdma::{Carries, Discipline, Kind as WindowKind, Next, Permit, Planned, Table, UNPROVEN_CYCLES, Verdict};
 use std::collections::VecDeque;
 
 /// The thread wakes so long before its call, to spin.
-const SPIN_NS: u64 = 100_000;
+const SPIN_NS: u64 = 150_000;
 /// First datagrams of windows whose stamps are waited for at a time.
 const AWAITED_MAX: usize = 16;
 
@@ -26,6 +26,8 @@ pub struct Slotted {
     planned: Option<Planned>,
     /// Whether it is awake for the planned window.
     is_open: bool,
+    /// It woke up so late for the planned window that it takes nothing before the call.
+    has_overslept: bool,
     /// Datagrams that left each socket.
     sent: [u64; PORTS],
     /// First datagrams of windows: socket, how many went before, and when they were handed over.
@@ -48,6 +50,7 @@ impl Slotted {
             discipline,
             planned: None,
             is_open: false,
+            has_overslept: false,
             sent: [0; PORTS],
             firsts: VecDeque::new(),
             asked_ns: None,
@@ -56,12 +59,24 @@ impl Slotted {
     }
 
     /// Awake for a slot, it takes from the mailbox what that has room for.
-    fn open(&mut self, now_ns: u64) {
+    fn open(&mut self, io: &mut Io<'_>) {
+        let now_ns = io.now.monotonic_ns;
         let Some(planned) = self.planned.filter(|planned| planned.wake_ns <= now_ns && !self.is_open) else { return };
         self.is_open = true;
+        let oversleeps = io.plan.slots.as_ref().map_or(0, |slots| slots.oversleeps_percent);
+        self.has_overslept = oversleeps > 0 && io.chance.percent(oversleeps);
         if let (WindowKind::Slot { .. }, None) = (planned.window.kind, self.discipline.silent()) {
             let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
             self.intake.open(now_ns, self.discipline.table().wire().bytes_in(sends_ns));
+        }
+    }
+
+    /// Until shortly before the call: to take a package lasts its time.
+    fn take_before(&mut self, io: &mut Io<'_>, call_ns: u64) {
+        let mut left_ns = if self.has_overslept { 0 } else { call_ns.saturating_sub(io.now.monotonic_ns) };
+        let mut hands = Hands { packages: &mut self.packages, io, permit: None };
+        while left_ns > QUIET_NS && self.intake.take_one(&mut hands) {
+            left_ns = left_ns.saturating_sub(TAKING_NS);
         }
     }
 
@@ -80,7 +95,7 @@ impl Slotted {
 
     /// Sends what there is, time first.
     fn send(&mut self, io: &mut Io<'_>, mut permit: Permit) {
-        let before = io.sent.len();
+        let (before, asked_ns) = (io.sent.len(), io.now.monotonic_ns);
         let says = self.says(io, permit.carries);
         self.watch(io, &says);
         io.book.wire.goes_by(io.now, io.node, says);
@@ -92,7 +107,8 @@ impl Slotted {
         self.discipline.close(&permit);
         if let Some(first) = io.sent.get(before) {
             io.book.saw("window used");
-            self.firsts.push_back((first.port, self.sent[first.port], io.now.monotonic_ns));
+            let handed_ns = first.handed.monotonic_ns.max(asked_ns);
+            self.firsts.push_back((first.port, self.sent[first.port], handed_ns));
             self.firsts.truncate(AWAITED_MAX);
         }
         for sent in &io.sent[before..] {
@@ -106,7 +122,7 @@ impl Slotted {
 
     /// Says a hello that waits; by what it has only overheard, seldom.
     fn greet(&mut self, io: &mut Io<'_>, permit: &mut Permit) {
-        let overheard = self.time.overheard(io.now, allowance_ns(io.plan)).filter(|_| permit.carries == Carries::Hello);
+        let overheard = self.time.overheard(io.now, self.allowance_ns()).filter(|_| permit.carries == Carries::Hello);
         let says = self.packages.say_in(io, overheard.as_ref().map(|voice| voice.from), permit);
         if !says || overheard.is_none() {
             return;
@@ -127,25 +143,34 @@ impl Slotted {
         }
     }
 
+    /// Who sends may be off by half of the guard.
+    fn allowance_ns(&self) -> u64 {
+        self.discipline.table().allowance_ns()
+    }
+
     /// By what this node sends now: by its own time if that may be off by half of the guard at most, as it says; else by what it heard.
     fn says(&mut self, io: &Io<'_>, carries: Carries) -> Says {
-        let (now_ns, allowed_ns) = (io.now.monotonic_ns, allowance_ns(io.plan));
+        let (now_ns, allowed_ns) = (io.now.monotonic_ns, self.allowance_ns());
         let clock = self.time.clock();
         let own = clock.reckoning().filter(|own| own.bound_ns(now_ns) <= allowed_ns);
+        let digest = clock.digest();
         match own {
-            Some(own) if clock.is_beginning() => {
-                Says { basis: Basis::Begins { since_ns: io.now.true_ns }, term: clock.term(), reckoning: Some(own) }
-            }
-            Some(own) => Says { basis: Basis::Own, term: clock.reading(now_ns).term, reckoning: Some(own) },
+            Some(own) if clock.is_beginning() => Says {
+                basis: Basis::Begins { since_ns: io.now.true_ns },
+                digest,
+                term: clock.term(),
+                reckoning: Some(own),
+            },
+            Some(own) => Says { basis: Basis::Own, digest, term: clock.reading(now_ns).term, reckoning: Some(own) },
             None if carries == Carries::Hello => {
                 let Some(voice) = self.time.overheard(io.now, allowed_ns) else { return Says::default() };
                 let basis = Basis::Overheard { is_misled: voice.is_misled };
-                Says { basis, term: voice.term, reckoning: Some(voice.reckoning) }
+                Says { basis, digest, term: voice.term, reckoning: Some(voice.reckoning) }
             }
             None => {
                 let reckoning = clock.coarse(now_ns);
                 let is_misled = self.time.is_misled(io.now, allowed_ns);
-                Says { basis: Basis::Heard { is_misled }, term: self.time.told_term(), reckoning }
+                Says { basis: Basis::Heard { is_misled }, digest, term: self.time.told_term(), reckoning }
             }
         }
     }
@@ -167,9 +192,9 @@ impl Slotted {
     /// Whoever sends is off the time of its master by half of the guard at most, whatever it says itself.
     fn watch(&self, io: &mut Io<'_>, says: &Says) {
         let Some(reckoning) = says.reckoning else { return };
-        let Some(masters_ns) = io.book.times.of_term_ns(io.now, says.term) else { return };
+        let Some(masters_ns) = io.book.times.of_term_ns(io.now, (says.digest, says.term)) else { return };
         let off_ns = reckoning.system_ns(io.now.monotonic_ns).abs_diff(masters_ns);
-        if off_ns > allowance_ns(io.plan) && !says.basis.is_misled() {
+        if off_ns > self.allowance_ns() && !says.basis.is_misled() {
             let text = format!("node {} is {off_ns} ns off the time of its master, and sends: {says:?}", io.node);
             io.book.broken(io.now, Promise::SilentWhenUnsure, text);
         }
@@ -201,13 +226,13 @@ impl Layer for Slotted {
         let now_ns = io.now.monotonic_ns;
         let left_ns = self.planned.map_or(u64::MAX, |planned| planned.wake_ns.saturating_sub(now_ns));
         let idle_ns = self.packages.tidy(io).min(self.time.poll_in(io, None));
-        self.intake.relieve(now_ns, &mut Hands { packages: &mut self.packages, io }, || left_ns);
+        self.intake.relieve(now_ns, &mut Hands { packages: &mut self.packages, io, permit: None }, || left_ns);
         let until_ns = loop {
             // Once awake for a window, the thread spins until its call.
-            self.open(now_ns);
+            self.open(io);
             match self.planned.filter(|planned| planned.wake_ns <= now_ns) {
                 Some(planned) if now_ns < planned.call_ns => {
-                    while self.intake.take_one(&mut Hands { packages: &mut self.packages, io }) {}
+                    self.take_before(io, planned.call_ns);
                     break planned.call_ns;
                 }
                 Some(planned) => {
@@ -239,12 +264,12 @@ impl Layer for Slotted {
     fn check(&mut self, io: &mut Io<'_>, well: bool) {
         self.watch_joining(io);
         let clock = self.time.clock();
-        let off_ns = io.book.times.off_ns(io.now, io.node, clock.term());
-        let masters = clock.master().and_then(|master| io.book.times.page(master.into()));
+        let off_ns = io.book.times.off_ns(io.now, io.node, (clock.digest(), clock.term()));
+        let masters = clock.master().and_then(|master| io.book.times.page(io.now, master.into()));
         let is_of_later_epoch = masters.is_some_and(|page| page.epoch < clock.record().epoch);
         // Who is further off than it may be says nothing, and slews for up to five seconds, or waits until a master begins an epoch, see
         // [`EPOCH_PAUSE_NS`](super::plan::EPOCH_PAUSE_NS).
-        let waits = is_of_later_epoch || off_ns.is_some_and(|off_ns| off_ns > allowance_ns(io.plan));
+        let waits = is_of_later_epoch || off_ns.is_some_and(|off_ns| off_ns > self.allowance_ns());
         if waits && io.now.true_ns < io.plan.stepped_ns {
             io.book.saw("waits for an epoch");
             io.book.well_ns = io.book.well_ns.max(io.now.true_ns + RECOVERY_NS);
@@ -262,11 +287,6 @@ impl Layer for Slotted {
         self.time.close(io);
         self.packages.close(io);
     }
-}
-
-/// Who sends may be off by half of the guard.
-fn allowance_ns(plan: &Plan) -> u64 {
-    plan.slots.as_ref().map_or(0, |slots| slots.table.guard.as_nanos() as u64 / 2)
 }
 
 /// Whoever goes by what it heard asks what time it is, or who lives; by what it overheard, who lives.

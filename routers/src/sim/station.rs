@@ -45,6 +45,14 @@ pub struct Io<'a> {
 }
 
 impl Io<'_> {
+    /// The thread was busy for so long: what it does next is later.
+    pub fn works(&mut self, for_ns: u64) {
+        let now = &mut self.now;
+        now.true_ns += for_ns;
+        now.monotonic_ns += for_ns;
+        now.realtime_ns += for_ns;
+    }
+
     /// Writes a line.
     pub fn line(&mut self, text: impl FnOnce() -> String) {
         let (node, life) = (self.node, self.life);
@@ -60,6 +68,8 @@ pub struct Sent {
     pub to: usize,
     /// Its bytes.
     pub bytes: Rc<[u8]>,
+    /// When it was handed over; [`Now::default`] for what leaves at once.
+    pub handed: Now,
 }
 
 /// A datagram that came in.
@@ -127,6 +137,10 @@ pub struct Station {
     pub frozen: u32,
     /// How many faults keep its modules from running.
     pub asleep: u32,
+    /// How many faults have it sleep.
+    pub sleeps: u32,
+    /// Which edition of the configuration its router is started from.
+    pub edition: usize,
     /// So much later comes again what it is told of the time; none: nobody repeats it.
     pub echo_ns: Option<u64>,
     /// When its timing thread last went to sleep to wake too late, true ns.
@@ -148,6 +162,8 @@ impl Station {
             down: 0,
             frozen: 0,
             asleep: 0,
+            sleeps: 0,
+            edition: 0,
             echo_ns: None,
             late_at_ns: 0,
             sockets: Default::default(),

@@ -10,7 +10,8 @@ use crate::security::Acquaintances;
 use crate::tdma::{Permit, Table};
 use crate::time::message::Message;
 use crate::time::{
-    Allowed, Clock, JOINING_SYNCS, RATE_MAX_PPB, Reckoning, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings,
+    Allowed, Clock, JOINING_SYNCS, Looked, RATE_MAX_PPB, Reckoning, Role, SentId, Stamp, Step, TIME_BYTES, Term,
+    TimeSettings,
 };
 use rohrpost_mailbox::TimeRecord;
 use std::collections::{BTreeMap, VecDeque};
@@ -22,20 +23,25 @@ use std::time::Duration;
 pub const PORT: Port = 1;
 /// How far off a kernel's stamp is at most, ns; the kernel stamps CLOCK_REALTIME, and the other clock is read around it.
 const DOUBT_NS: u32 = 100;
+/// Two clocks are read one after the other.
+const APART_NS: u64 = 300;
+/// However long nothing comes, its thread looks at its clocks so often, where there are no slots.
+const LOOKS_EVERY_NS: u64 = S / 10;
 /// All routers have begun, and one of them is master.
 const STARTED_NS: u64 = S;
 /// Stamps that are waited for at a time.
 const AWAITED_MAX: usize = 16;
 
 /// What one life of a router's time is configured with.
-pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> TimeSettings {
+pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> TimeSettings {
+    let slots = plan.slots_of(edition);
     TimeSettings {
         system: SYSTEM,
         own: node as u8,
         nodes: plan.nodes.len() as u8,
-        masters: plan.masters.clone(),
-        interval: Duration::from_nanos(plan.shape.interval_ns),
-        digest: super::packages::DIGEST,
+        masters: slots.map_or(&plan.masters, |slots| &slots.masters).clone(),
+        interval: slots.map_or(Duration::from_nanos(plan.shape.interval_ns), |slots| slots.table.cycle),
+        digest: super::packages::digest(edition),
         incarnation,
     }
 }
@@ -44,6 +50,8 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> TimeSettings {
 #[derive(Clone, Copy, Debug)]
 struct Told {
     term: Term,
+    /// It is of another configuration, and so of another table.
+    is_other: bool,
     /// How long it was on its way, from where it was handed over, ns.
     way_ns: u64,
     /// When it came, true ns.
@@ -59,16 +67,16 @@ pub(super) struct Voice {
 }
 
 /// What a frame told of the time, if it did.
-fn told(io: &Io<'_>, arrived: &Arrived, message: &Message) -> Option<Told> {
+fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &Message) -> Option<Told> {
     let (term, sent_ns) = match message {
         Message::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
         Message::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
         _ => return None,
     };
-    let now_ns = io.book.times.of_term_ns(io.now, term)?;
+    let now_ns = io.book.times.of_term_ns(io.now, (head.digest, term))?;
     let came_ns = arrived.stamp.true_ns;
     let way_ns = now_ns.saturating_sub(sent_ns).saturating_sub(io.now.true_ns - came_ns);
-    Some(Told { term, way_ns, came_ns })
+    Some(Told { term, is_other: head.digest != own, way_ns, came_ns })
 }
 
 /// Of as many as count for what a node goes by.
@@ -135,6 +143,7 @@ impl Ticking {
 
     /// With time slots: sends what a window is for, as long as it fits; without one does what passing time does. When to ask again.
     pub(super) fn poll_in(&mut self, io: &mut Io<'_>, mut permit: Option<&mut Permit>) -> u64 {
+        self.look_at_clocks(io);
         let (mut datagram, now_ns) = ([0; TIME_BYTES], io.now.monotonic_ns);
         loop {
             let fits = permit.as_ref().filter(|permit| permit.fits(now_ns, TIME_BYTES));
@@ -179,7 +188,8 @@ impl Ticking {
         let (from, reckoning) = self.clock.overheard(now.monotonic_ns)?;
         // Of several lives of a node it does not say by which: then any of them may mislead it.
         let lives = self.overheard.iter().filter(|((node, _), _)| *node == from).map(|(_, told)| told);
-        let is_misled = lives.clone().any(|told| are_late(told, now, way_ns));
+        let is_other = |told: &VecDeque<Told>| told.iter().any(|told| told.is_other);
+        let is_misled = lives.clone().any(|told| are_late(told, now, way_ns) || is_other(told));
         let latest = lives.filter_map(|told| told.back()).max_by_key(|told| told.came_ns);
         Some(Voice { from, reckoning, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
     }
@@ -189,10 +199,10 @@ impl Ticking {
         self.clock.asked_overheard(now.monotonic_ns);
     }
 
-    fn is_told(&mut self, io: &Io<'_>, arrived: &Arrived, message: &Message) {
+    fn is_told(&mut self, io: &Io<'_>, arrived: &Arrived, head: &FrameHead, message: &Message) {
         // Who hears a master does not go by others.
         let goes_by = matches!(message, Message::Sync(_)) || self.clock.role() == Role::Listening;
-        if let Some(told) = told(io, arrived, message).filter(|_| goes_by) {
+        if let Some(told) = told(io, arrived, head, self.clock.digest(), message).filter(|_| goes_by) {
             note(&mut self.told, told);
         }
     }
@@ -207,7 +217,7 @@ impl Ticking {
             io.book.saw("time: stepped back");
         }
         if let (Ok(()), Ok(message)) = (taken, Message::parse(head.kind, rest))
-            && let Some(told) = told(io, arrived, &message)
+            && let Some(told) = told(io, arrived, head, self.clock.digest(), &message)
         {
             note(self.overheard.entry((head.from, head.incarnation)).or_default(), told);
         }
@@ -231,7 +241,7 @@ impl Ticking {
             }
         }
         self.sent += 1;
-        io.sent.push(Sent { port: PORT, to: to.into(), bytes });
+        io.sent.push(Sent { port: PORT, to: to.into(), bytes, handed: io.now });
     }
 
     pub(super) fn stamp(&self, io: &mut Io<'_>, at: Now) -> Stamp {
@@ -240,6 +250,14 @@ impl Ticking {
         }
         let wrong_ns = io.chance.around(DOUBT_NS.into());
         Stamp { ns: at.monotonic_ns.saturating_add_signed(wrong_ns), doubt_ns: DOUBT_NS, by_kernel: true }
+    }
+
+    fn look_at_clocks(&mut self, io: &mut Io<'_>) {
+        let Now { monotonic_ns: local_ns, unslewed_ns, slept_ns, .. } = io.now;
+        if let Some(why) = self.clock.look_at_clocks(Looked { local_ns, unslewed_ns, apart_ns: APART_NS, slept_ns }) {
+            io.line(|| format!("time: {why}"));
+            io.book.saw("time: unsteady");
+        }
     }
 
     fn look(&mut self, io: &mut Io<'_>) {
@@ -254,6 +272,7 @@ impl Ticking {
 
 impl Layer for Ticking {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
+        self.look_at_clocks(io);
         let stamp = self.stamp(io, arrived.stamp);
         let now_ns = io.now.monotonic_ns;
         let overhears = self.clock.overhears(now_ns);
@@ -266,13 +285,20 @@ impl Layer for Ticking {
         if !is_proven {
             return self.overhear(io, arrived, stamp, &head, rest);
         }
+        if head.digest != self.clock.digest() {
+            let node = arrived.source.map(|source| source as NodeIndex);
+            let taken = self.clock.handle_other(now_ns, stamp, node, &head, rest);
+            io.line(|| format!("time: {:?} of another configuration: {taken:?}", head.kind));
+            io.book.saw(if taken.is_ok() { "time: of another configuration" } else { "time: ignored" });
+            return self.look(io);
+        }
         let heard_before = self.clock.coarse(now_ns);
         let taken = self.clock.handle(now_ns, stamp, &head, rest);
         io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));
         io.book.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
         let message = Message::parse(head.kind, rest);
         if let (Ok(()), Ok(message)) = (taken, &message) {
-            self.is_told(io, arrived, message);
+            self.is_told(io, arrived, &head, message);
         }
         if let (Ok(()), Ok(Message::Sync(sync))) = (taken, message) {
             self.heard = if sync.replacement { self.heard } else { (sync.term, sync.cycle) };
@@ -299,13 +325,14 @@ impl Layer for Ticking {
     }
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
+        self.look_at_clocks(io);
         let mut datagram = [0; TIME_BYTES];
         loop {
             let step = self.clock.poll(io.now.monotonic_ns, &mut datagram);
             self.look(io);
             match step {
                 Step::Send { to, stamp } => self.send(io, to, stamp, &datagram),
-                Step::Wait { until_ns } => return until_ns,
+                Step::Wait { until_ns } => return until_ns.min(io.now.monotonic_ns + LOOKS_EVERY_NS),
             }
         }
     }

@@ -9,20 +9,32 @@ use crate::time::{Clock as Core, Role, Term};
 use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord};
 use std::collections::BTreeMap;
 
+/// After so long a node knows that its clock does what bounds exclude: it looks once a cycle, or ten times a second, and its thread may wake late.
+const NOTICED_NS: u64 = 120_000_000;
+
 /// The line of a term.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     node: usize,
     record: TimeRecord,
     shift_ns: i128,
+    /// Its master's clock did meanwhile what bounds exclude: nobody knows any more what it would say.
+    is_void: bool,
 }
 
 /// A node's page of system time; it outlives a router.
 #[derive(Clone, Copy, Default, Debug)]
 struct Page {
     record: Option<TimeRecord>,
-    /// The term that it follows.
+    /// The term that it follows, of which configuration.
+    digest: u64,
+    /// See `digest`.
     term: Term,
+    /// Its clock did what bounds exclude: since when its router can have noticed, true ns; none: it has not run since.
+    is_changed: bool,
+    noticed_ns: Option<u64>,
+    /// For how long the computer had slept when that was written.
+    slept_ns: u64,
     /// Epoch and time that it was last seen to say.
     last: Option<(u64, u64)>,
 }
@@ -32,7 +44,8 @@ struct Page {
 pub struct Times {
     /// The clocks of all nodes.
     pub clocks: Vec<Clock>,
-    lines: BTreeMap<u64, Line>,
+    /// By the digest of the configuration, and the term.
+    lines: BTreeMap<(u64, Term), Line>,
     pages: Vec<Page>,
     /// Largest bound of a node that follows a master, and largest error, ns.
     pub worst_ns: (u64, u64),
@@ -45,21 +58,33 @@ impl Times {
     }
 
     /// What a node's page says, for its next router.
-    pub fn page(&self, node: usize) -> Option<TimeRecord> {
-        self.pages.get(node)?.record
+    ///
+    /// Of a computer that has slept since, nothing: as whoever keeps the page has it.
+    pub fn page(&self, now: Now, node: usize) -> Option<TimeRecord> {
+        let page = self.pages.get(node)?;
+        let has_slept = page.slept_ns != now.slept_ns;
+        page.record.map(|record| if has_slept { TimeRecord { error_ns: ERROR_UNKNOWN_NS, ..record } } else { record })
     }
 
-    /// How far a node's page is off the time of a term, ns; none if nobody began that.
-    pub fn off_ns(&self, now: Now, node: usize, term: Term) -> Option<u64> {
-        let (line, record) = (self.lines.get(&term.0)?, self.pages[node].record?);
+    /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that.
+    pub fn off_ns(&self, now: Now, node: usize, (digest, term): (u64, Term)) -> Option<u64> {
+        let (line, record) = (self.lines.get(&(digest, term))?, self.pages[node].record?);
         let off_ns = i128::from(record.at(now.monotonic_ns).ns) - self.at(line, now.true_ns);
         u64::try_from(off_ns.unsigned_abs()).ok()
     }
 
-    /// What time it is by the master of a term, ns; none if nobody began that.
-    pub fn of_term_ns(&self, now: Now, term: Term) -> Option<u64> {
-        let line = self.lines.get(&term.0)?;
+    /// What time it is by the master of a term of a configuration, ns; none if nobody began that.
+    pub fn of_term_ns(&self, now: Now, (digest, term): (u64, Term)) -> Option<u64> {
+        let line = self.lines.get(&(digest, term)).filter(|line| !line.is_void)?;
         Some(line.record.at(self.clocks[line.node].at(now.true_ns).monotonic_ns).ns)
+    }
+
+    /// A node's clock does what bounds exclude. What time it is by those terms in which it is master, nobody can say any more.
+    pub fn changes(&mut self, clock: &Clock, node: usize) {
+        self.clocks[node] = clock.clone();
+        let page = &mut self.pages[node];
+        (page.is_changed, page.noticed_ns) = (true, None);
+        self.lines.values_mut().filter(|line| line.node == node).for_each(|line| line.is_void = true);
     }
 
     /// Looks at a node after its layer of time did anything: its reign, and what its page says from now on.
@@ -69,8 +94,12 @@ impl Times {
         }
         let term = core.reading(now.monotonic_ns).term;
         let page = &mut self.pages[node];
+        page.noticed_ns.get_or_insert(now.true_ns);
+        page.slept_ns = now.slept_ns;
         page.record = Some(*core.record());
-        page.term = if term.is_none() { page.term } else { term };
+        if !term.is_none() {
+            (page.digest, page.term) = (core.digest(), term);
+        }
         self.read(now, node, problems);
     }
 
@@ -86,8 +115,17 @@ impl Times {
             let text = format!("node {node} goes back from {ns} ns of epoch {epoch} to {time:?}");
             problems.push(broken(Promise::TimeForward, text));
         }
-        let term = page.term;
-        let Some(line) = self.lines.get(&term.0).filter(|_| record.error_ns < ERROR_UNKNOWN_NS) else { return };
+        let (digest, term) = (page.digest, page.term);
+        let is_slewed = self.clocks[node].is_slewed();
+        if page.is_changed && page.noticed_ns.is_none_or(|noticed_ns| now.true_ns < noticed_ns + NOTICED_NS) {
+            return;
+        }
+        if is_slewed && record.error_ns < ERROR_UNKNOWN_NS {
+            let text = format!("node {node} is slewed, and says {time:?}");
+            return problems.push(broken(Promise::TimeBound, text));
+        }
+        let line = self.lines.get(&(digest, term)).filter(|line| !line.is_void && record.error_ns < ERROR_UNKNOWN_NS);
+        let Some(line) = line else { return };
         let off_ns = (i128::from(time.ns) - self.at(line, now.true_ns)).unsigned_abs();
         if off_ns > time.error.as_nanos() {
             let text = format!("node {node} is {off_ns} ns off the time of {term:?}, and says {time:?}");
@@ -102,21 +140,22 @@ impl Times {
 
     /// A master that was none before begins a term, which goes on from the time before unless an epoch began.
     fn reigns(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
-        let (term, record) = (core.term(), *core.record());
-        if let Some(known) = self.lines.get(&term.0) {
+        let (digest, term, record) = (core.digest(), core.term(), *core.record());
+        if let Some(known) = self.lines.get(&(digest, term)) {
             if known.node != node {
                 let text = format!("nodes {node} and {} are masters of {term:?}", known.node);
                 problems.push(Problem { promise: Promise::OneMaster, at_ns: now.true_ns, text });
             }
             return;
         }
-        let mut line = Line { node, record, shift_ns: 0 };
+        let mut line = Line { node, record, shift_ns: 0, is_void: self.clocks[node].is_slewed() };
         let page = self.pages[node];
-        if let (Some(before), Some(old)) = (self.lines.get(&page.term.0), page.record)
+        if let (Some(before), Some(old)) = (self.lines.get(&(page.digest, page.term)), page.record)
             && old.epoch == record.epoch
         {
+            line.is_void |= before.is_void;
             line.shift_ns = self.at(before, now.true_ns) - self.at(&line, now.true_ns);
         }
-        self.lines.insert(term.0, line);
+        self.lines.insert((digest, term), line);
     }
 }

@@ -49,6 +49,8 @@ impl Basis {
 pub struct Says {
     /// By what it finds its windows.
     pub basis: Basis,
+    /// Of its configuration.
+    pub digest: u64,
     /// The term whose time that is, as far as it knows.
     pub term: Term,
     /// The line by which it reckons.
@@ -62,6 +64,8 @@ pub struct Transmission {
     pub node: usize,
     /// By what.
     pub basis: Basis,
+    /// Of its configuration.
+    pub digest: u64,
     /// The term whose time it keeps.
     pub term: Term,
     /// The master of that term.
@@ -80,7 +84,7 @@ pub struct Wire {
     /// By what each sends.
     says: Vec<Says>,
     /// When somebody first sent by a term, true ns.
-    first_ns: BTreeMap<Term, u64>,
+    first_ns: BTreeMap<(u64, Term), u64>,
     recent: VecDeque<Transmission>,
 }
 
@@ -97,7 +101,7 @@ impl Wire {
 
     /// From now on a node sends by this. It may have begun a time before.
     pub fn goes_by(&mut self, now: Now, node: usize, says: Says) {
-        self.first_ns.entry(says.term).or_insert(now.true_ns);
+        self.first_ns.entry((says.digest, says.term)).or_insert(now.true_ns);
         let before = self.says[node].basis;
         let goes_on = matches!((before, says.basis), (Basis::Begins { .. }, Basis::Begins { .. }));
         self.says[node] = Says { basis: if goes_on { before } else { says.basis }, ..says };
@@ -133,13 +137,13 @@ impl Wire {
         let begin_ns = at_ns.max(self.free_ns[node]);
         let end_ns = begin_ns + slots.takes_ns(bytes);
         self.free_ns[node] = end_ns;
-        let Says { basis, term, .. } = self.says[node];
+        let Says { basis, digest, term, .. } = self.says[node];
         let master = slots.master(term);
-        let own = Transmission { node, basis, term, master, begin_ns, end_ns };
+        let own = Transmission { node, basis, digest, term, master, begin_ns, end_ns };
         let mut meets = self.recent.iter().filter(|other| other.node != node && own.meets(other));
-        let began_ns = |term| self.first_ns.get(&term).copied().unwrap_or(0);
+        let began_ns = |sends: &Transmission| self.first_ns.get(&(sends.digest, sends.term)).copied().unwrap_or(0);
         let is_blamed =
-            |other: &&Transmission| !slots.divisions.excuse(&own, other, began_ns(term).min(began_ns(other.term)));
+            |other: &&Transmission| !slots.divisions.excuse(&own, other, began_ns(&own).min(began_ns(other)));
         if let Some(other) = meets.find(is_blamed) {
             let text = format!("{own:?} and {other:?} at once");
             problems.push(Problem { promise: Promise::Exclusive, at_ns: begin_ns, text });

@@ -72,7 +72,7 @@ impl Holder {
 #[derive(Debug, thiserror::Error)]
 pub enum SealError {
     /// A file is not there, or holds something else.
-    #[error("{0}: {1}; `rohrpost keys new` with the configuration makes it")]
+    #[error("{0}: {1}; copy it from the first computer, where `rohrpost keys new` with the configuration makes it")]
     File(PathBuf, String),
     /// Others than its owner may read the key.
     #[error(transparent)]

@@ -1,5 +1,6 @@
 //! How a client and the server are, as their threads last said: for whoever publishes it.
 
+use crate::session::server::Crowded;
 use crate::session::{Cause, Counts};
 use rohrpost_mailbox::{Name, Priority, TimeRecord};
 use std::sync::{Mutex, PoisonError};
@@ -125,6 +126,8 @@ pub struct Member {
     pub age_ns: u64,
     /// Time since something came from it, ns.
     pub heard_ns: u64,
+    /// Packages lost in queues since it, or who connects as the same, sent more than its part of them.
+    pub lost: u64,
     /// Bytes of memory that it takes up, with what waits for it.
     pub bytes: u64,
 }
@@ -142,6 +145,10 @@ pub struct Members {
     pub refused: u64,
     /// Who was the last of them, and why; empty without one.
     pub refusal: String,
+    /// What went beyond the part of one certificate, or one address.
+    pub crowded: Crowded,
+    /// Packages of those that were lost.
+    pub crowded_packages: u64,
     /// Registrations that a later one of the same client took the place of before they were looked at.
     pub overtaken: u64,
     /// Lines that were not said one by one, since there were too many of their cause.

@@ -5,7 +5,8 @@ use super::lead::Lead;
 use super::permit::{Carries, Permit};
 use super::table::{Kind, Table, Window};
 use crate::broken::broken;
-use crate::time::{Clock, JOINING_SYNCS, Reckoning, Role, Stamp, SyncCounts, TIME_BYTES};
+use crate::frame::NodeIndex;
+use crate::time::{Clock, JOINING_SYNCS, Reckoning, Role, Stamp, SyncCounts, TIME_BYTES, Unsteady};
 
 /// What comes next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -41,6 +42,23 @@ pub struct Planned {
 /// Why a node does not send.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Silent {
+    /// There are nodes that go by another configuration, and so by another table; which, see [`Clock::parted_by`].
+    #[error(
+        "{} goes by another configuration, of digest {digest:016x} (this node's: {own:016x}); launch all nodes from the \
+         same file",
+        named(*node)
+    )]
+    OtherTable {
+        /// One of them; none: its address is no node's.
+        node: Option<NodeIndex>,
+        /// Its digest.
+        digest: u64,
+        /// This node's.
+        own: u64,
+    },
+    /// Its clock did what bounds exclude.
+    #[error("nothing is known of the time: {0}")]
+    Unsteady(Unsteady),
     /// It has no system time, and no master is heard.
     #[error("no system time, and no master is heard")]
     NoTime,
@@ -69,6 +87,10 @@ pub enum Silent {
     /// The table has no slot for it, and it has nothing to synchronise.
     #[error("no slot in the table")]
     NoSlot,
+}
+
+fn named(node: Option<NodeIndex>) -> String {
+    node.map_or_else(|| "a node that this one does not know".into(), |node| format!("node number {node}"))
 }
 
 /// What to do with a window, now that it is there.
@@ -261,6 +283,12 @@ impl Discipline {
 
     /// Why this node does not go by its own time.
     fn why_silent(&self, now_ns: u64, clock: &Clock) -> Silent {
+        if let Some(why) = clock.unsteady(now_ns) {
+            return Silent::Unsteady(why);
+        }
+        if let Some((node, digest)) = clock.parted_by(now_ns).next() {
+            return Silent::OtherTable { node, digest, own: clock.digest() };
+        }
         match (clock.reckoning(), clock.joining()) {
             _ if clock.is_beginning() => Silent::Beginning,
             (Some(own), _) => {

@@ -71,7 +71,7 @@ impl Permit {
     pub fn takes(&mut self, now_ns: u64, datagram_bytes: usize) {
         let wire_ns = self.wire.ns(datagram_bytes);
         self.free_ns = self.starts_ns(now_ns).saturating_add(wire_ns);
-        self.planned_ns += busy_ns(wire_ns);
+        self.planned_ns += reckoned_ns(wire_ns);
         self.datagrams += 1;
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
@@ -82,11 +82,16 @@ impl Permit {
         self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
     }
 
+    /// For so long the wire is still busy with what was handed over, ns: what is handed over meanwhile leaves no sooner.
+    pub fn busy_ns(&self, now_ns: u64) -> u64 {
+        self.free_ns.saturating_sub(now_ns.saturating_add(self.lead_ns))
+    }
+
     /// Whether a datagram that is handed over now would be off the wire later than bounds reckon with, after what the window has carried: the
     /// window began too late, or the thread stood still.
     pub fn is_late(&self, now_ns: u64, datagram_bytes: usize) -> bool {
         let wire_ns = self.wire.ns(datagram_bytes);
-        self.starts_ns(now_ns).saturating_add(wire_ns) > self.reckoned_ns().saturating_add(busy_ns(wire_ns))
+        self.starts_ns(now_ns).saturating_add(wire_ns) > self.reckoned_ns().saturating_add(reckoned_ns(wire_ns))
     }
 
     /// Whether the window has less room left now than bounds reckon with, after what it has carried.
@@ -133,6 +138,6 @@ impl Permit {
 }
 
 /// So long bounds have a datagram keep a window busy that takes the wire so long, ns: what is shorter waits for the thread.
-fn busy_ns(wire_ns: u64) -> u64 {
+fn reckoned_ns(wire_ns: u64) -> u64 {
     wire_ns.max(HAND_OVER.as_nanos() as u64)
 }

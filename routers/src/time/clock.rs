@@ -1,15 +1,19 @@
 //! A node's part in keeping time: what the thread with the socket hands it and asks of it.
 
 mod master;
+mod other_tables;
 mod overhearing;
 mod slave;
 mod slots;
+mod steady;
 
 use super::broken::Broken;
 use super::election::{Election, Origin, State};
 use super::history::{History, RATE_MAX};
 use super::line::{EVEN_PPB, Line};
 use super::message::{Message, Request};
+use super::others::Others;
+use super::steadiness::Steadiness;
 use super::types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
 use super::{Stamp, TIME_BYTES, Term};
 use crate::frame::{FrameHead, HEAD_BYTES, NodeIndex};
@@ -91,6 +95,10 @@ pub struct Clock {
     last: Option<Exchange>,
     offset_ns: i64,
     contradictions: u64,
+    /// Nodes that go by another configuration.
+    others: Others,
+    /// Whether the local clock is what bounds assume.
+    steadiness: Steadiness,
     /// What time slots need besides; none in free mode.
     slots: Option<Box<Slots>>,
     #[cfg(any(test, feature = "broken-variants"))]
@@ -136,6 +144,8 @@ impl Clock {
             last: None,
             offset_ns: 0,
             contradictions: 0,
+            others: Others::new(settings.nodes),
+            steadiness: Steadiness::default(),
             slots: None,
             #[cfg(any(test, feature = "broken-variants"))]
             broken: None,
@@ -151,7 +161,15 @@ impl Clock {
         if !self.is_ours(head) {
             return Err(Ignored::Stranger);
         }
-        match Message::parse(head.kind, rest)? {
+        let message = Message::parse(head.kind, rest)?;
+        self.others.agrees(head.from);
+        if self.is_parted(now_ns) {
+            return Err(Ignored::OtherTable);
+        }
+        if self.is_unsteady(now_ns) {
+            return Err(Ignored::Unsteady);
+        }
+        match message {
             Message::WarmUp => {
                 self.hears(head.from, head.incarnation, received.ns);
                 Ok(())

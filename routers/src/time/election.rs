@@ -272,7 +272,8 @@ impl Election {
         self.awake_since_ns = now_ns;
         let stood_ns = now_ns.saturating_sub(stood_since_ns);
         for since_ns in std::iter::once(&mut self.quiet_since_ns).chain(&mut self.timed_heard_ns) {
-            *since_ns = since_ns.saturating_add(stood_ns).min(now_ns);
+            // Who must not speak before a time that comes does not sooner.
+            *since_ns = since_ns.saturating_add(stood_ns).min(now_ns.max(*since_ns));
         }
     }
 

@@ -5,6 +5,7 @@
 
 use super::RATE_MAX_PPB;
 use super::line::{EVEN_PPB, Line};
+use crate::broken::broken;
 use rohrpost_mailbox::TimeRecord;
 
 /// The first answers are often slow; so many are waited for before the line begins.
@@ -54,6 +55,9 @@ impl Follower {
             }
             let by_ns = there.ns.wrapping_sub(self.line.at(now_ns).ns).cast_signed();
             let whole_ns = error_ns.saturating_add(by_ns.unsigned_abs());
+            if by_ns.unsigned_abs() > error_ns.saturating_add(self.line.error_ns(now_ns)) && !broken!(TakesSmallest) {
+                return self.distrusts(now_ns);
+            }
             // Where the line is surer of itself, it goes on.
             if whole_ns < self.line.error_ns(now_ns) {
                 self.line.bend(now_ns, by_ns, MEND_NS, EVEN_PPB, whole_ns, drift_ns_s);
@@ -65,6 +69,13 @@ impl Follower {
             self.heard = 0;
             self.line.step(now_ns, told.epoch, there.ns, EVEN_PPB, error_ns, drift_ns_s);
         }
+    }
+
+    /// The local clock did what bounds exclude, or two that cannot both be true say what time it is: nothing is known, and it begins as one that has
+    /// heard nobody.
+    pub fn distrusts(&mut self, now_ns: u64) {
+        self.line = Line::unsynchronised(now_ns, self.line.at(now_ns).ns, 0);
+        (self.heard, self.last) = (0, None);
     }
 
     /// Nobody tells anything.
@@ -130,6 +141,26 @@ mod tests {
             (3, follower.record().at(20).ns + 1),
             "a client that is started again goes on"
         );
+    }
+
+    #[test]
+    fn two_times_that_cannot_both_be_true_are_a_contradiction_and_no_choice() {
+        let mut follower = Follower::new(0, 5, None);
+        let begin = |follower: &mut Follower, from_ns: u64, ahead_ns: u64, answers: u64| {
+            (0..u64::from(HEARD_MIN)).for_each(|n| {
+                let now_ns = from_ns + n;
+                follower.told(now_ns, &told(7, now_ns, now_ns + ahead_ns, 10_000_000), answers + n);
+            });
+        };
+        begin(&mut follower, 100, AHEAD_NS, 1);
+        assert!(follower.record().error_ns < UNSYNCHRONISED_NS);
+        // The computer slept for an hour, and its clock stood still meanwhile.
+        let ahead_ns = AHEAD_NS + 3_600 * SECOND_NS;
+        follower.told(SECOND_NS, &told(7, SECOND_NS, SECOND_NS + ahead_ns, 10_000_000), 9);
+        assert_eq!((follower.record().epoch, follower.record().error_ns), (0, UNSYNCHRONISED_NS), "nothing is known");
+        begin(&mut follower, 2 * SECOND_NS, ahead_ns, 10);
+        let there = follower.record().at(3 * SECOND_NS);
+        assert_eq!((there.epoch, there.ns), (7, 3 * SECOND_NS + ahead_ns));
     }
 
     proptest! {

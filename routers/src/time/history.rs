@@ -106,7 +106,7 @@ impl History {
     }
 
     /// What is known at a moment that is not before the last sample. None without samples, or when they contradict each other: then a
-    /// clock did what [`RATE_MAX_PPB`] and [`WANDER_PPB_S`] exclude.
+    /// clock did what [`LIMITS`](super::LIMITS) exclude.
     pub(super) fn estimate(&self, local_ns: u64, usual_rate: f64) -> Option<Estimate> {
         let newest = self.buckets.last()?;
         let (rate_low, rate_high) = self.rate_interval(local_ns)?;

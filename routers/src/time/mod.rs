@@ -12,8 +12,9 @@
 //! *The time of a term* is what its master's page shows; when a master takes over, the time of the new term is the new master's,
 //! less what it was off just then, which its own bound states and all its followers add. So within an epoch the time of a term goes on
 //! from the one before. A reading's bound contains its distance from the time of the term that the node follows
-//! ([`Reading::term`]), provided that clocks keep what [`RATE_MAX_PPB`] and [`WANDER_PPB_S`] say of them, and that
-//! a frame never arrives before it leaves. Nothing is assumed of how long a way takes, nor that both ways take equally long.
+//! ([`Reading::term`]), provided that clocks keep what [`LIMITS`] say of them, and that
+//! a frame never arrives before it leaves. Whose own clock does not (its computer slept, or a time daemon slews it), by a clock that nobody slews, knows
+//! nothing of the time until it has measured it anew: [`Clock::look_at_clocks`]. Nothing is assumed of how long a way takes, nor that both ways take equally long.
 //! While a network is split, each part may have a master, and so two terms are two times.
 //!
 //! # Masters
@@ -45,6 +46,9 @@
 //! Where datagrams are sealed, who joins hears frames whose sender has not shown that it lives: [`Clock::overhear`] takes what they say for when to ask,
 //! and for a reason not to begin a time yet, for a while.
 //!
+//! Another configuration is another table: who hears the time of nodes with another digest, or is refused for it, neither begins a time nor goes on with
+//! one, but for the part with the greater claim, and that not for long if the others do not yield: see `others`.
+//!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
 #[cfg_attr(
@@ -57,10 +61,13 @@ mod coarse;
 mod election;
 mod follower;
 mod history;
+mod limits;
 mod line;
 pub mod message;
+mod others;
 mod overheard;
 mod reckoning;
+mod steadiness;
 #[cfg(test)]
 mod tests;
 mod types;
@@ -70,7 +77,10 @@ pub use broken::Broken;
 pub use clock::{Allowed, Clock};
 pub use coarse::JOINING_SYNCS;
 pub use follower::Follower;
+pub use limits::{ClockLimits, LIMITS};
 pub use reckoning::Reckoning;
+pub(crate) use steadiness::Steadiness;
+pub use steadiness::{Looked, Unsteady};
 pub use types::{Exchange, Ignored, InSlots, Reading, Role, SentId, Step, SyncCounts, TimeSettings};
 
 /// The bound of a node that does not know the time.
@@ -80,16 +90,16 @@ use crate::frame::HEAD_BYTES;
 
 /// Bytes of each datagram of time.
 pub const TIME_BYTES: usize = HEAD_BYTES + message::MESSAGE_BYTES;
-/// How much faster or slower than system time a computer's clock may be, ns a second: two clocks of 100 ppm, and some room.
-pub const RATE_MAX_PPB: i64 = 250_000;
-// Who judges tables of slots counts on it.
-const _: () = assert!(RATE_MAX_PPB * rohrpost_config::wire::RATE_MAX_PER as i64 == 1_000_000_000);
-/// How much that may change in a second, ns a second: measured clocks in a moving robot change by a tenth of it.
-pub const WANDER_PPB_S: i64 = 500;
+/// See [`ClockLimits::rate_ppb`].
+pub const RATE_MAX_PPB: i64 = LIMITS.rate_ppb;
+/// See [`ClockLimits::wander_ppb_s`].
+pub const WANDER_PPB_S: i64 = LIMITS.wander_ppb_s;
 /// From so far on a node steps instead of slewing, which is a new epoch for all.
 pub const STEP_MIN_NS: u64 = 5_000_000;
 /// Pace may differ so much from the rate while slewing, ns a second: 5 ms take 5 s.
 pub const SLEW_MAX_PPB: i64 = 1_000_000;
+// Who computes bounds counts on both.
+const _: () = assert!(SLEW_MAX_PPB * rohrpost_config::wire::BEND_MAX_PER as i64 == 1_000_000_000);
 /// Silence of a master, in half intervals, until the first of the others takes over.
 pub const TAKEOVER_HALF_INTERVALS: u64 = 7;
 

@@ -67,6 +67,12 @@ pub enum Ignored {
     /// Not of this system, for another node, or of another configuration.
     #[error("from or for somebody else")]
     Stranger,
+    /// Of another configuration, or of this one while another is heard: see [`Clock::parted_by`](super::Clock::parted_by).
+    #[error("there are nodes of another configuration")]
+    OtherTable,
+    /// Nothing is measured by a clock that is not steady: see [`Clock::unsteady`](super::Clock::unsteady).
+    #[error("this computer's clock is not steady")]
+    Unsteady,
     /// Wrong in itself.
     #[error(transparent)]
     Bad(#[from] BadFrame),

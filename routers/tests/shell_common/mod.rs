@@ -2,7 +2,7 @@
 
 use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
-use rohrpost_routers::access::Access;
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 use rohrpost_routers::settings::{NodeSettings, Settings};
@@ -100,8 +100,10 @@ impl Side {
             tdma,
             routes: vec![Route { first: there, last: there.with_local(255), node: 1 - own }],
             senders: vec![vec![module(own)]],
-            access: Access::default(),
+            hosts: [module(own), router(own)].map(|name| (name, name.with_local(u8::MAX))).into(),
+            admission: Admission { router: Some(router(own).class()), ..Admission::default() },
             flows: vec![declared(module(own), there)],
+            real_time_from: 0,
         };
         Self { node, settings, socket: None, shell: None }
     }

@@ -12,7 +12,7 @@ const SEEN_IN_A_HUNDRED: [(&str, u64); 6] = [
     ("delivered", 100_000),
     ("time: overheard", 20_000),
     ("asked by what was overheard", 300),
-    ("rejected", 10_000),
+    ("rejected", 2_000),
     ("router killed", 20),
     ("split", 8),
 ];

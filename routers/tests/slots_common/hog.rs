@@ -66,7 +66,7 @@ fn spin_in_bursts() -> ! {
     loop {
         let begin_ns = monotonic_ns().next_multiple_of(EVERY_NS);
         let begin = TimeSpec::new((begin_ns / (1000 * MS)).cast_signed(), (begin_ns % (1000 * MS)).cast_signed());
-        let _ = clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &begin);
+        let _ = clock_nanosleep(ClockId::CLOCK_BOOTTIME, ClockNanosleepFlags::TIMER_ABSTIME, &begin);
         while monotonic_ns() < begin_ns + BURST_NS {
             std::hint::spin_loop();
         }

@@ -12,7 +12,7 @@ use rohrpost_mailbox::{
     HEAD_BYTES, Head, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type,
     monotonic_ns, realtime_ns,
 };
-use rohrpost_routers::access::Access;
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::frame::{Alive, FrameHead, Kind};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Crossing, Lab, LabError, NodeSpec};
@@ -285,7 +285,13 @@ fn settings(own: u8, tunnel: Option<Tunnel>) -> Settings {
         tdma: Some(Tdma { tunnel, ..table() }),
         routes: others().map(module).chain(others().map(router)).map(route).collect(),
         senders: vec![vec![module(own)]],
-        access: Access::default(),
+        hosts: [module(own), router(own)].map(|name| (name, name.with_local(u8::MAX))).into(),
+        admission: Admission {
+            router: Some(router(own).class()),
+            tunnel: tunnel.map(|tunnel| (tunnel, own)),
+            ..Admission::default()
+        },
+        real_time_from: 0,
         flows: Vec::new(),
     }
 }

@@ -1,10 +1,9 @@
 //! A TCP router and systems of one node each, in this process.
 
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type, local, monotonic_ns};
-use rohrpost_routers::access::Access;
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::session::client::ClientSettings;
-use rohrpost_routers::session::frame::Range;
-use rohrpost_routers::session::server::ServerSettings;
+use rohrpost_routers::session::server::{Names, OwnNodes, ServerSettings};
 use rohrpost_routers::shell::{Faults, Undelivered};
 use rohrpost_routers::tcp::{
     ClientParts, ClientSeal, ClientShell, LinkState, ServerError, ServerParts, ServerSeal, ServerShell,
@@ -76,12 +75,13 @@ pub(crate) fn start_for(
     node: &Arc<Node>,
     life: u64,
     seal: Option<ServerSeal>,
-    names: Option<BTreeMap<String, Arc<[Range]>>>,
+    names: Option<BTreeMap<String, Names>>,
 ) -> Result<ServerShell, ServerError> {
     let settings = ServerSettings {
         name: "the TCP router".into(),
         common: COMMON,
         system: names.is_some().then_some((1, 1)),
+        own_nodes: OwnNodes::default(),
         life,
         clients_max: 16,
         greetings_max: 16,
@@ -118,10 +118,16 @@ impl System {
     }
 
     pub(crate) fn sealed(id: u8, name: &str, server: SocketAddr, seal: Option<ClientSeal>) -> Self {
-        Self::guarded(id, name, server, seal, Access::default())
+        Self::guarded(id, name, server, seal, Admission::default())
     }
 
-    pub(crate) fn guarded(id: u8, name: &str, server: SocketAddr, seal: Option<ClientSeal>, access: Access) -> Self {
+    pub(crate) fn guarded(
+        id: u8,
+        name: &str,
+        server: SocketAddr,
+        seal: Option<ClientSeal>,
+        admission: Admission,
+    ) -> Self {
         let (folder, node) = node();
         let settings = ClientSettings {
             name: name.into(),
@@ -132,6 +138,7 @@ impl System {
             life: monotonic_ns(),
             quota_bytes: 256 << 10,
             levels: [0; 256],
+            admission,
         };
         let own = (module(id).with_local(0), module(id).with_local(255));
         let [before, after] = [own.0.raw() - 1, own.1.raw() + 1].map(Name::from_raw);
@@ -146,7 +153,6 @@ impl System {
             hosts: vec![own],
             beyond,
             faults,
-            access,
             seal,
             keeps_time: false,
             impair: None,

@@ -148,7 +148,7 @@ fn a_certificate_of_the_own_system_hosts_what_its_file_gives_that_node_and_no_mo
     let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
     let range = |name: Name| Range::module(name);
     let others = [range(Name::new(1, 101, 0, 0))];
-    let with = |ranges: Vec<Range>| Some(BTreeMap::from([("base".to_owned(), ranges.into())]));
+    let with = |ranges: Vec<Range>| Some(BTreeMap::from([("base".to_owned(), ranges.into_iter().collect())]));
     let seal = || Some(ServerSeal::load(authority.path()).unwrap());
     let server = start_for(address, &own, 1, seal(), with(others.to_vec())).unwrap();
     let one = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));

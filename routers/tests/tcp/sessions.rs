@@ -3,7 +3,7 @@
 use crate::ground::{COMMON, System, address, module, node, start, wait};
 use rohrpost_config as config;
 use rohrpost_mailbox::{ALL_SYSTEMS, Class, Head, Priority, Type};
-use rohrpost_routers::access::Access;
+use rohrpost_routers::admission::{Access, Admission};
 use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
 use rohrpost_routers::tcp::{Link, LinkState};
 use std::io::{Read, Write};
@@ -99,7 +99,8 @@ fn a_node_takes_commands_from_beyond_only_as_its_configuration_allows() {
     let _server = start(address, &own, 1).unwrap();
     let mut one = System::new(1, "one", address);
     let only_others = config::Access { class: module(2).class(), callers: vec![Class(101)], line: 12 };
-    let mut two = System::guarded(2, "two", address, None, Access::new(&[only_others]));
+    let admission = Admission { access: Access::new(&[only_others]), ..Admission::default() };
+    let mut two = System::guarded(2, "two", address, None, admission);
     one.wait_up();
     two.wait_up();
     let mut sender = one.sender(2);

@@ -127,7 +127,7 @@ fn scheduling(scheduling: Scheduling) -> Value {
 
 fn network(network: Network) -> Value {
     json!({
-        "security": "none", "port": network.port, "time_port": network.time_port(), "mtu": network.mtu,
+        "security": "none", "port": network.port, "time_port": network.time_port(), "rest_port": network.rest_port(), "mtu": network.mtu,
         "datagram_bytes_max": network.datagram_bytes_max, "rate_bytes_s": network.rate_bytes_s,
         "quota_bytes": network.quota_bytes, "bulk_below": network.bulk_below,
     })

@@ -2,8 +2,8 @@
 
 mod json;
 
-use super::{Failure, say};
-use rohrpost::config::{Errors, Installation, MissingProgram, explain};
+use super::{Failure, daemons, say};
+use rohrpost::config::{Errors, Installation, MissingProgram, TimeSource, explain};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -66,6 +66,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     say(explain(&installation, only).trim_end());
     for program in missing {
         say(format_args!("note: {program}"));
+    }
+    if let TimeSource::Master { .. } = installation.time {
+        for daemon in daemons::running(Path::new("/proc")) {
+            say(format_args!(
+                "note: {} runs on this computer; if that is a node, end it: {}; {}",
+                daemon.name,
+                daemon.ends,
+                daemons::WHY
+            ));
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -30,7 +30,7 @@ const SETTLE: Duration = Duration::from_secs(8);
 const LOOK: Duration = Duration::from_millis(600);
 
 pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> Result<ExitCode, Failure> {
-    let folder = tempfile::Builder::new().prefix("rohrpost-demo-").tempdir()?;
+    let folder = super::folder::Folder::new()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let nodes = installation.nodes.len();
     if nodes != usize::from(count) {

@@ -2,6 +2,7 @@
 
 use super::machine::Machine;
 use super::{Finding, State};
+use crate::cli::daemons::{self, Daemon};
 
 /// Open-file-description locks came with it.
 const KERNEL_LEAST: (u32, u32) = (3, 15);
@@ -13,7 +14,24 @@ pub(super) fn findings(machine: &Machine) -> Vec<Finding> {
     let found =
         [version(machine), preemption(machine), throttling(machine), fair_server(machine), clock_source(machine)];
     let found = found.into_iter().flatten();
-    found.chain([governor(machine), idle(machine), cores(machine), isolated(machine)]).collect()
+    let found = found.chain([governor(machine), idle(machine), cores(machine), isolated(machine)]);
+    found.chain(time_daemons(machine)).collect()
+}
+
+/// Where nodes have a common time, nobody else may slew their clocks.
+fn time_daemons(machine: &Machine) -> Vec<Finding> {
+    let finding = |daemon: Daemon| {
+        let (what, is) = ("time daemon", format!("{} runs", daemon.name));
+        match machine.asked.lan {
+            Some(_) => Finding::not(State::Warn, what, is, daemons::WHY, daemon.ends),
+            None => Finding::ok(what, is, "it is in nobody's way, unless nodes have the time of a master"),
+        }
+    };
+    let running = daemons::running(&machine.folder("/proc"));
+    if running.is_empty() {
+        return vec![Finding::ok("time daemon", "none runs", daemons::WHY)];
+    }
+    running.into_iter().map(finding).collect()
 }
 
 fn version(machine: &Machine) -> Option<Finding> {

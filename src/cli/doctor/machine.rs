@@ -1,10 +1,13 @@
 //! What is read of a computer: files below a root, and the few things that no file tells.
 
 use super::network::Lan;
-use rohrpost::config::{FIFO_MAX, Installation, Node as NodeConfig, Scheduling, find_program};
+use super::security::Protection;
+use rohrpost::config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
 use rohrpost::mailbox::sys::{self, Room};
 use rohrpost::mailbox::{Node, NodeError, base_directory};
 use std::path::{Path, PathBuf};
+
+const BRIDGE: &str = "rohrpost-gui-bridge";
 
 /// What a configuration needs; without one, what any may need.
 pub(super) struct Needs {
@@ -14,6 +17,8 @@ pub(super) struct Needs {
     pub(super) memory: u64,
     /// Whether something is to be shown.
     pub(super) gui: bool,
+    /// The bridge, where the configuration has it.
+    pub(super) bridge: Option<PathBuf>,
     /// Processes that are started.
     pub(super) processes: usize,
     /// The configuration's file.
@@ -22,14 +27,14 @@ pub(super) struct Needs {
 
 impl Default for Needs {
     fn default() -> Self {
-        Self { priority: FIFO_MAX, memory: 0, gui: false, processes: 1, from: None }
+        Self { priority: FIFO_MAX, memory: 0, gui: false, bridge: None, processes: 1, from: None }
     }
 }
 
 impl Needs {
     pub(super) fn of(installation: &Installation, node: &NodeConfig) -> Self {
         let modules = || installation.modules_on(&node.name);
-        let priority = |module: &rohrpost::config::Module| match installation.scheduling(module.name.class()) {
+        let priority = |module: &Module| match installation.scheduling(module.name.class()) {
             Scheduling::Fifo { priority } => priority,
             Scheduling::Normal { .. } => 0,
         };
@@ -37,10 +42,23 @@ impl Needs {
             priority: modules().map(priority).max().unwrap_or(0),
             memory: modules().map(|module| module.memory()).sum(),
             gui: !installation.gui.show.is_empty(),
+            bridge: modules().find_map(|module| bridge_of(installation, module)),
             processes: modules().count(),
             from: Some(installation.path.clone()),
         }
     }
+}
+
+/// Where the program of a module is, if that is the bridge.
+fn bridge_of(installation: &Installation, module: &Module) -> Option<PathBuf> {
+    let Program::Command(words) = &module.program else { return None };
+    let program = words.first().filter(|program| is_bridge(Path::new(program)))?;
+    find_program(program, &installation.folder, &beside())
+}
+
+/// The folder of this program.
+fn beside() -> PathBuf {
+    std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned())).unwrap_or_default()
 }
 
 /// A computer.
@@ -58,10 +76,18 @@ pub(super) struct Asked {
     /// Room of the file system there.
     pub(super) room: Option<Room>,
     pub(super) nodes: Vec<NodeFound>,
-    pub(super) bridge: Option<PathBuf>,
+    pub(super) bridge: Option<Bridge>,
     pub(super) viewer: Option<PathBuf>,
     /// The network of a configuration of several nodes.
     pub(super) lan: Option<Lan>,
+    pub(super) protection: Protection,
+}
+
+/// The program that draws.
+pub(super) struct Bridge {
+    pub(super) path: PathBuf,
+    /// Its process, if one of this user's nodes has it.
+    pub(super) pid: Option<u32>,
 }
 
 /// A node's directory.
@@ -86,19 +112,19 @@ pub(super) enum Seen {
 
 impl Machine {
     /// This computer.
-    pub(super) fn this(needs: &Needs, lan: Option<Lan>) -> Self {
+    pub(super) fn this(needs: &Needs, lan: Option<Lan>, protection: Protection) -> Self {
         let base = base_directory();
-        let beside = std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned())).unwrap_or_default();
-        let program = |name| find_program(name, Path::new("."), &beside);
+        let program = |name| find_program(name, Path::new("."), &beside());
         // The directory is made by the first launch; before that, what counts is where it will be.
         let there = base.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
         let asked = Asked {
             fifo: try_fifo(needs.priority),
             room: sys::room(there).ok(),
             nodes: nodes(&base),
-            bridge: program("rohrpost-gui-bridge"),
+            bridge: bridge(&base, needs.bridge.clone().or_else(|| program(BRIDGE))),
             viewer: program("rerun"),
             lan,
+            protection,
             base,
         };
         Self { root: "/".into(), asked }
@@ -114,6 +140,11 @@ impl Machine {
     pub(super) fn read(&self, path: &str) -> Option<String> {
         let text = std::fs::read_to_string(self.root.join(path.trim_start_matches('/'))).ok()?;
         Some(text.trim().to_owned())
+    }
+
+    /// Where a folder of it is.
+    pub(super) fn folder(&self, path: &str) -> PathBuf {
+        self.root.join(path.trim_start_matches('/'))
     }
 
     pub(super) fn number(&self, path: &str) -> Option<u64> {
@@ -166,10 +197,29 @@ fn try_fifo(priority: u8) -> Result<(), String> {
 }
 
 fn nodes(base: &Path) -> Vec<NodeFound> {
+    directories(base).into_iter().map(|path| NodeFound { seen: seen(&path), path }).collect()
+}
+
+fn directories(base: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(base).into_iter().flatten();
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
     paths.sort();
-    paths.into_iter().map(|path| NodeFound { seen: seen(&path), path }).collect()
+    paths
+}
+
+/// The bridge that runs; else the one that would.
+fn bridge(base: &Path, found: Option<PathBuf>) -> Option<Bridge> {
+    let pids = directories(base).into_iter().filter_map(|path| Node::open(&path).ok());
+    let pids = pids.flat_map(|node| node.participants()).map(|participant| participant.pid).filter(|pid| *pid != 0);
+    let running = pids.filter_map(|pid| Some((std::fs::read_link(format!("/proc/{pid}/exe")).ok()?, pid)));
+    // Whoever launched it may have another PATH than this program.
+    let running = running.map(|(path, pid)| Bridge { path, pid: Some(pid) }).find(|bridge| is_bridge(&bridge.path));
+    running.or_else(|| found.map(|path| Bridge { path, pid: None }))
+}
+
+fn is_bridge(program: &Path) -> bool {
+    // A program that was built anew since is marked by the kernel.
+    program.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.trim_end_matches(" (deleted)") == BRIDGE)
 }
 
 fn seen(path: &Path) -> Seen {

@@ -1,12 +1,14 @@
 //! Where a node would lie, what surrounds it, and what is there already.
 
-use super::machine::{Machine, Needs, Seen};
+use super::machine::{Bridge, Machine, Needs, Seen};
 use super::{Finding, State};
 use rohrpost::config::size_text;
 use std::path::Path;
 
 /// Room for tools, and for mailboxes that modules make themselves, bytes.
 const SPARE: u64 = 16 << 20;
+/// What the smallest node takes: its own pages, an output module, and a tool that looks.
+const LEAST: u64 = 2 << 20;
 /// Threads that a process of a node has, at most of our making.
 const THREADS: u64 = 4;
 
@@ -90,7 +92,7 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
         format!("rohrpost clean; {}", more_room(mount.as_ref(), wanted))
     };
     Some(match room.free {
-        free if free < needs.memory => Finding::not(State::Bad, what, is, why, mend()),
+        free if free < needs.memory.max(LEAST) => Finding::not(State::Bad, what, is, why, mend()),
         free if free < needs.memory + SPARE => Finding::not(State::Warn, what, is, why, mend()),
         _ => Finding::ok(what, is, why),
     })
@@ -240,7 +242,8 @@ fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     };
     let (what, why) = ("GUI bridge", "draws what modules publish; the module `gui.0` of the demo is it");
     let bridge = match &machine.asked.bridge {
-        Some(path) => Finding::ok(what, path.display().to_string(), why),
+        Some(Bridge { path, pid: Some(pid) }) => Finding::ok(what, format!("{}, process {pid}", path.display()), why),
+        Some(Bridge { path, pid: None }) => Finding::ok(what, path.display().to_string(), why),
         None => {
             missing(what, why, "cargo build -p rohrpost-gui-bridge --profile bridge, then PATH=target/bridge:$PATH")
         }

@@ -1,6 +1,5 @@
 //! The graph for Graphviz.
 
-use super::super::summary::SILENT;
 use super::{Carries, Graph};
 use std::fmt::Write;
 
@@ -11,7 +10,7 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
     text.push_str("    edge [fontname = \"sans-serif\", fontsize = 10]\n");
     for module in &graph.modules {
         let below = graph.below(module).map(|line| format!("\\n{line}"));
-        let dead = if matches!(module.state.as_str(), "dead" | SILENT) { ", style = \"rounded,dashed\"" } else { "" };
+        let dead = if module.is_down() { ", style = \"rounded,dashed\"" } else { "" };
         let _ = writeln!(
             text,
             "    {:?} [label = \"{}{}\"{dead}]",
@@ -27,7 +26,7 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
             Carries::Reply => ", style = dotted",
             Carries::Output => ", color = gray",
         };
-        let label = format!("{} {}", edge.what, edge.rate());
+        let label = edge.label();
         let _ = writeln!(text, "    {:?} -> {:?} [label = {label:?}{style}]", edge.from, edge.to);
     }
     text.push('}');

@@ -11,8 +11,9 @@ use super::watch::Tracks;
 use super::{Failure, say};
 use rohrpost::Name;
 use rohrpost::description::Description;
-use rohrpost::mailbox::{FlowInfo, Kind, local};
-use rohrpost::survey::{Scope, Survey, is_hop};
+use rohrpost::mailbox::{FlowInfo, Kind};
+use rohrpost::output::plain;
+use rohrpost::survey::{Scope, Standing, Survey, is_hop};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -76,6 +77,17 @@ struct Module {
     faces: Vec<String>,
     state: String,
     priority: u8,
+    /// It need not run.
+    #[serde(skip)]
+    is_left_out: bool,
+}
+
+impl Module {
+    /// Whether nothing of it runs that one could see. What sends from outside the configuration has no standing.
+    fn is_down(&self) -> bool {
+        let down = [Standing::Stopped, Standing::Unreachable];
+        down.iter().any(|standing| standing.word() == self.state)
+    }
 }
 
 /// What an edge carries.
@@ -187,8 +199,9 @@ impl Graph {
                 module: classes.format(module.name),
                 node: module.node.clone(),
                 faces: module.faces.iter().map(|face| classes.format(*face)).collect(),
-                state: super::summary::state(module, None, &running.installation),
+                state: module.standing().word().into(),
                 priority: module.name.class().0,
+                is_left_out: module.is_left_out(&running.installation),
             })
             .collect();
         // Tools send too, and are in no configuration.
@@ -197,7 +210,8 @@ impl Graph {
                 let found = running.module(name).ok();
                 let priority = found.map_or(0, |module| module.class().0);
                 let node = found.map_or(&*running.node_name, |module| running.node_of(module)).into();
-                modules.push(Module { module: name.clone(), node, faces: Vec::new(), state: "tool".into(), priority });
+                let (faces, state, is_left_out) = (Vec::new(), "tool".into(), false);
+                modules.push(Module { module: name.clone(), node, faces, state, priority, is_left_out });
             }
         }
         let installation = running.installation.name.clone();
@@ -246,6 +260,11 @@ impl Edge {
         self.refused += other.refused;
     }
 
+    /// What a drawing says of it.
+    fn label(&self) -> String {
+        format!("{} {}", plain::line(&self.what), self.rate())
+    }
+
     fn rate(&self) -> String {
         match self.packages_per_s {
             rate if rate < 0.95 => format!("{rate:.2}/s"),
@@ -274,9 +293,14 @@ impl Names<'_> {
         self.descriptions.entry(module).or_insert_with(ask).as_ref()
     }
 
+    /// Whether output lines go there. Any other module's mailbox of that local id is its own, for whatever data it likes.
+    fn is_collector(&self, mailbox: Name) -> bool {
+        let class = self.running.installation.classes.id(rohrpost::output::CLASS);
+        class == Some(mailbox.class()) && mailbox.local() == rohrpost::output::LINES
+    }
+
     fn what(&mut self, flow: &FlowInfo) -> (Carries, String) {
         let of = |number, name: Option<&String>| name.cloned().unwrap_or_else(|| format!("number {number}"));
-        let own_mailbox = !matches!(flow.to.local(), local::COMMANDS | local::REPLIES | local::DATA);
         match flow.kind.kind() {
             Kind::Command(number) if number < rohrpost::common::FIRST_OWN => (Carries::Common, common(number)),
             Kind::Command(number) => {
@@ -292,7 +316,7 @@ impl Names<'_> {
                 let function = description.and_then(|found| found.functions.iter().find(|f| f.number == number));
                 (Carries::Reply, format!("{} answered", of(number, function.map(|function| &function.name))))
             }
-            Kind::Data(_) if own_mailbox => (Carries::Output, "lines".into()),
+            Kind::Data(_) if self.is_collector(flow.to) => (Carries::Output, "lines".into()),
             Kind::Data(number) => {
                 let description = self.description(flow.from.module());
                 let item = description.and_then(|found| found.data.iter().find(|item| item.number == number));

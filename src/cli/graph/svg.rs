@@ -1,6 +1,5 @@
 //! The graph as a drawing. The library `layout` says where things go; this says how they look.
 
-use super::super::summary::SILENT;
 use super::{Carries, Edge, Graph, Module};
 use layout::core::base::Orientation;
 use layout::core::color::Color;
@@ -28,7 +27,7 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
     let mut plan = VisualGraph::new(Orientation::LeftToRight);
     let edges: Vec<&Edge> = graph.drawn(all).collect();
     let in_use = |module: &&Module| {
-        module.state != "left out" && (module.state != "tool" || edges.iter().any(|edge| edge.touches(&module.module)))
+        !module.is_left_out && (module.state != "tool" || edges.iter().any(|edge| edge.touches(&module.module)))
     };
     let modules: Vec<&Module> = graph.modules.iter().filter(in_use).collect();
     let boxes: Vec<_> = modules.iter().map(|module| plan.add_node(box_of(graph, module))).collect();
@@ -55,7 +54,7 @@ impl Edge {
 fn box_of(graph: &Graph, module: &Module) -> Element {
     let below: String = graph.below(module).map(|line| format!("\n{line}")).collect();
     let text = format!("{}{below}", module.module);
-    let fill = if matches!(module.state.as_str(), "dead" | SILENT) { 0xf4_d9_d3 } else { 0xf1_f4_f8 };
+    let fill = if module.is_down() { 0xf4_d9_d3 } else { 0xf1_f4_f8 };
     let look = StyleAttr::new(colour(0x33_3a_44), 1, Some(colour(fill)), 6, FONT);
     let size = get_size_for_str(&text, FONT);
     let size = Point::new(size.x * LETTER + 24.0, size.y * 1.2 + 14.0);
@@ -73,7 +72,7 @@ fn arrow_of(edge: &Edge) -> Arrow {
     // Ten times as often is one point wider.
     let width = (1.0 + edge.packages_per_s.max(1.0).log10()).round() as usize;
     let look = StyleAttr::new(colour(ink), width, None, 0, LABEL_FONT);
-    let text = format!("{} {}", edge.what, edge.rate());
+    let text = edge.label();
     // The library makes room for the text; where it is written is for the line to say, which gets it as its property.
     Arrow::with_properties(LineEndKind::None, LineEndKind::Arrow, dashed, &text, &look, text.clone(), &None, &None)
 }
@@ -277,6 +276,7 @@ mod tests {
             faces: Vec::new(),
             state: "on".into(),
             priority: 9,
+            is_left_out: false,
         };
         let edge = |(from, to): &(usize, usize)| Edge {
             from: format!("m.{from}"),

@@ -10,6 +10,7 @@ use rcgen::{
 use rohrpost::config::{Installation, KeysError, check_secret};
 use rohrpost::mailbox::realtime_ns;
 use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
+pub(in crate::cli) use shown::lacking;
 pub(super) use shown::show;
 use std::fs::{self, File};
 use std::io;
@@ -242,6 +243,11 @@ fn issue(
         Holder::Router => ExtendedKeyUsagePurpose::ServerAuth,
         Holder::Node { .. } => ExtendedKeyUsagePurpose::ClientAuth,
     }];
+    // RFC 5280 asks for all of these, and strict verifiers with it: that it is no authority, what its key is for, and
+    // whose key signed it.
+    params.is_ca = IsCa::ExplicitNoCa;
+    params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+    params.use_authority_key_identifier_extension = true;
     hold(&mut params, days);
     let signed = params.signed_by(&key, issuer).map_err(unfit)?;
     let secret = Written { path: secret, text: key.serialize_pem(), mode: SECRET };

@@ -262,3 +262,19 @@ fn how_long_certificates_hold_is_shown_and_the_age_of_keys() {
     std::fs::File::open(place.path().join("keys/udp.keys")).unwrap().set_modified(before).unwrap();
     assert!(says("udp.keys: written").ends_with("written 3 days ago"));
 }
+
+/// Python 3.13 asks for no less by itself.
+#[test]
+fn strict_verifiers_take_the_certificates() {
+    let place = tempfile::tempdir().unwrap();
+    let file = robot(place.path(), "one");
+    // Those of a first authority, and of one that was read from its files.
+    for made in [Step::New, rotate as fn(Place) -> Step] {
+        step(made, &file).unwrap();
+        let mut python = std::process::Command::new("python3");
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/cli/keys/strict.py");
+        python.arg(script).arg(place.path().join("shown")).args(["tcp-router", "desk.system-1"]);
+        let said = python.output().unwrap();
+        assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+    }
+}

@@ -10,7 +10,9 @@ pub(super) fn of(installation: Arc<Installation>, node: String) -> impl Fn(&Modu
     move |module| {
         let network = installation.network.filter(|_| installation.router_of(&node) == Some(module.name))?;
         let address = installation.node(&node)?.address?;
+        let others = installation.lan_nodes().iter().filter(|other| other.name != node);
+        let peers: Vec<_> = others.filter_map(|other| other.address).collect();
         // Where it cannot be made now, each process of the router makes its own, or says why it cannot.
-        rohrpost_routers::shell::listen(SocketAddr::new(address, network.port)).ok()
+        rohrpost_routers::shell::listen(SocketAddr::new(address, network.port), &peers).ok()
     }
 }

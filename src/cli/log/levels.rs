@@ -2,7 +2,7 @@
 
 use super::super::table::table;
 use super::super::target::Running;
-use super::super::{Failure, call, say};
+use super::super::{Failure, call, complain, say};
 use super::{Arguments, filter};
 use rohrpost::common::OutputLevel;
 use rohrpost::config::Module;
@@ -58,7 +58,11 @@ pub(super) fn set(settings: &[Setting], running: &Running, arguments: &Arguments
                 Set { module: names(module, running), level: level.name(), before: before.map(OutputLevel::name) }
             }
             Err(error) => {
-                eprintln!("{}: its level is not set: {}", running.text(module), running.told(module, &error));
+                complain(format_args!(
+                    "{}: its level is not set: {}",
+                    running.text(module),
+                    running.told(module, &error)
+                ));
                 code = ExitCode::FAILURE;
                 continue;
             }
@@ -71,7 +75,7 @@ pub(super) fn set(settings: &[Setting], running: &Running, arguments: &Arguments
         };
         // Followed by lines, it is not one of them.
         if arguments.follow {
-            eprintln!("{text}");
+            complain(text);
         } else {
             say(text);
         }

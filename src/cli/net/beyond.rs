@@ -5,7 +5,8 @@ use crate::cli::table::{table, time};
 use crate::cli::target::Running;
 use crate::cli::units::{bytes, fine};
 use rohrpost::Class;
-use rohrpost::interfaces::{BeyondClients, BeyondLink, BeyondState, ClassPassed};
+use rohrpost::interfaces::{BeyondClients, BeyondCrowded, BeyondLink, BeyondState, ClassPassed};
+use rohrpost::output::plain;
 use std::time::Duration;
 
 /// Tables of clients, of the server's connections and of what was lost or replaced, and why who takes no part does not; empty without a TCP router.
@@ -64,7 +65,7 @@ fn outages(link: &BeyondLink) -> String {
 
 fn whys(links: &[&BeyondLink]) -> String {
     let told = links.iter().filter(|link| !link.why.is_empty());
-    told.map(|link| format!("node {}: {}\n", link.node, link.why)).collect()
+    told.map(|link| format!("node {}: {}\n", link.node, plain::line(&link.why))).collect()
 }
 
 fn clients(servers: &[&BeyondClients]) -> String {
@@ -80,20 +81,28 @@ fn clients(servers: &[&BeyondClients]) -> String {
                 client.ranges.to_string(),
                 ms(client.age_ms),
                 ms(client.heard_ms),
+                client.lost.to_string(),
                 bytes(client.bytes as f64),
             ]
         });
-        let heads = ["client", "from", ">system", "state", ">ranges", ">since", ">heard", ">memory"];
+        let heads = ["client", "from", ">system", "state", ">ranges", ">since", ">heard", ">lost", ">memory"];
         text += &table(heads, rows);
         if server.more > 0 {
             text += &format!("… and {} more\n", server.more);
         }
         text += &format!("(TCP router at {}: {} left, {} refused)\n", server.address, server.left, server.refused);
+        let BeyondCrowded { greetings, clients, ranges, packages } = server.crowded;
+        if greetings + clients + ranges + packages > 0 {
+            text += &format!(
+                "(beyond the part of one certificate or address: {packages} packages lost, {clients} clients and {greetings} connections \
+                 before their hello gave way, {ranges} registrations of too many ranges)\n"
+            );
+        }
         if server.overtaken > 0 {
             text += &format!("({} registrations were overtaken by later ones of the same client)\n", server.overtaken);
         }
         if !server.refusal.is_empty() {
-            text += &format!("the last that was refused: {}\n", server.refusal);
+            text += &format!("the last that was refused: {}\n", plain::line(&server.refusal));
         }
     }
     text

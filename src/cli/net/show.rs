@@ -8,6 +8,7 @@ use crate::cli::target::Running;
 use crate::cli::units::{bytes, fine};
 use rohrpost::Class;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
+use rohrpost::output::plain;
 use std::time::Duration;
 
 /// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
@@ -16,12 +17,17 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
     parts.extend(
         all.iter()
             .filter_map(|told| told.failure.as_ref().map(|why| (told, why)))
-            .map(|(told, why)| format!("node {}: {why}\n", told.node)),
+            .map(|(told, why)| format!("node {}: {}\n", told.node, plain::line(why))),
     );
     let refused = |peer: &&PeerLink| !peer.why.is_empty();
     for told in all {
         for peer in told.links.iter().flat_map(|links| &links.peers).filter(refused) {
-            parts.push(format!("node {} and node {} refuse each other: {}\n", told.node, peer.node, peer.why));
+            parts.push(format!(
+                "node {} and node {} refuse each other: {}\n",
+                told.node,
+                peer.node,
+                plain::line(&peer.why)
+            ));
         }
     }
     let slots = all.iter().filter_map(|told| told.slots.as_ref());
@@ -101,8 +107,8 @@ fn strangers(all: &[Told]) -> String {
         }
         if links.foreign > 0 {
             text += &format!(
-                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's: if another installation uses this \
-                 network, give one of them another `port` in [network]\n",
+                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's, or found the router's socket full: if \
+                 another installation uses this network, give one of them another `port` in [network]\n",
                 links.node,
                 datagrams(links.foreign)
             );

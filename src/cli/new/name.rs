@@ -27,6 +27,8 @@ pub(super) enum NameError {
     Crate(String),
     #[error("`{0}` is the class of {1}; a module of yours needs another name, such as `my-{0}`")]
     Class(String, &'static str),
+    #[error("`{0}` is built in (`builtin = \"{1}\"`); a module of yours needs another name, such as `my-{0}`")]
+    BuiltIn(String, &'static str),
 }
 
 impl FromStr for ModuleName {
@@ -51,7 +53,10 @@ impl FromStr for ModuleName {
         match text {
             "tool" => Err(NameError::Class(own(), "programs run by hand")),
             "output" => Err(NameError::Class(own(), "the collector of what modules say")),
-            _ => Ok(Self(own())),
+            _ => match rohrpost_modules::builtin::of_class(text) {
+                Some(builtin) => Err(NameError::BuiltIn(own(), builtin)),
+                None => Ok(Self(own())),
+            },
         }
     }
 }
@@ -128,6 +133,12 @@ mod tests {
             ),
         ] {
             assert_eq!(text.parse::<ModuleName>().unwrap_err().to_string(), message);
+        }
+        for (text, builtin) in
+            [("motor", "sim"), ("laser", "sim"), ("pilot", "pilot"), ("sim", "sim"), ("router", "router")]
+        {
+            let error = text.parse::<ModuleName>().unwrap_err();
+            assert_eq!(error, NameError::BuiltIn(text.into(), builtin));
         }
         for text in ["std", "test", "deps", "rohrpost"] {
             assert!(matches!(text.parse::<ModuleName>(), Err(NameError::Crate(_))), "{text}");

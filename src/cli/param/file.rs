@@ -2,7 +2,9 @@
 
 use super::Failure;
 use rohrpost::config::{Installation, Saved};
+use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, toml_text};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -83,6 +85,6 @@ fn key(name: &str) -> String {
 }
 
 /// For a comment: whatever a module says, it ends with the line.
-fn one_line(text: &str) -> String {
-    text.chars().map(|char| if char.is_control() { ' ' } else { char }).collect()
+fn one_line(text: &str) -> Cow<'_, str> {
+    plain::line(text)
 }

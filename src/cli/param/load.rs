@@ -1,7 +1,7 @@
 //! `param load`.
 
 use super::set::{set, told};
-use super::{Failure, Session, find, say};
+use super::{Failure, Session, complain, find, say};
 use rohrpost::Name;
 use rohrpost::config::Saved;
 use rohrpost::parameter::from_file;
@@ -18,7 +18,7 @@ pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> 
     let modules: Vec<Name> = saved.modules().collect();
     let mut failed = modules.is_empty();
     if failed {
-        eprintln!("{} has no parameters of any module", path.display());
+        complain(format_args!("{} has no parameters of any module", path.display()));
     }
     for module in modules {
         let name = session.running.text(module);
@@ -34,7 +34,7 @@ pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> 
                 }
             }
             Err(error) => {
-                eprintln!("{name} keeps its values: {error}");
+                complain(format_args!("{name} keeps its values: {error}"));
                 failed = true;
             }
         }

@@ -7,7 +7,8 @@ mod set;
 mod show;
 
 use super::target::{Running, Target};
-use super::{Failure, say};
+use super::{Failure, complain, say};
+use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, Refusal};
 use rohrpost::{CallError, Fault, Name, ToolLink};
 use std::path::PathBuf;
@@ -152,7 +153,7 @@ impl Session {
         let mut asked = Vec::new();
         for (module, silence) in self.running.modules_to_ask()? {
             match silence {
-                Some(silence) => eprintln!("{}: {}", self.running.text(module), silence.text()),
+                Some(silence) => complain(format_args!("{}: {}", self.running.text(module), silence.text())),
                 None => asked.push(module),
             }
         }
@@ -181,7 +182,7 @@ fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) -> Result<&'p
         let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
         let nearest = rohrpost::config::nearest(name, names.iter().copied());
         let nearest = nearest.map_or(String::new(), |nearest| format!("did you mean `{nearest}`? "));
-        format!("{module} has no parameter `{name}`; {nearest}it has: {}", names.join(", ")).into()
+        plain::line(&format!("{module} has no parameter `{name}`; {nearest}it has: {}", names.join(", "))).into()
     };
     parameters.iter().find(|parameter| parameter.name == name).ok_or_else(unknown)
 }

@@ -1,7 +1,7 @@
 //! `param save`.
 
 use super::file::Contents;
-use super::{Failure, Session, no_parameters, say};
+use super::{Failure, Session, complain, no_parameters, say};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -30,7 +30,7 @@ pub(super) fn run(session: &mut Session, names: &[String], output: Option<&Path>
         }
     }
     for failure in &failures {
-        eprintln!("{failure}");
+        complain(failure);
     }
     if saved.is_empty() {
         return Err("no parameters to save; no file was written".into());

@@ -3,6 +3,7 @@
 use super::{Failure, Session, find, say};
 use rohrpost::Name;
 use rohrpost::common::{Change, SetParameters};
+use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, from_word, value_text};
 use rohrpost::value::decode;
 use std::process::ExitCode;
@@ -35,5 +36,7 @@ pub(super) fn told(change: &Change, parameter: &Parameter) -> Result<String, Fai
     let text = |bytes: &[u8]| decode(&parameter.ty, bytes).map(|value| value_text(&value));
     let (old, new) = (text(&change.old)?, parameter.with_unit(&text(&change.new)?));
     let name = &change.name;
-    Ok(if change.old == change.new { format!("{name}: {new} as before") } else { format!("{name}: {old} -> {new}") })
+    let told =
+        if change.old == change.new { format!("{name}: {new} as before") } else { format!("{name}: {old} -> {new}") };
+    Ok(plain::line(&told).into_owned())
 }

@@ -1,7 +1,7 @@
 //! `param list` and `param get`.
 
 use super::super::table::table;
-use super::{Failure, Session, find, no_parameters, say};
+use super::{Failure, Session, complain, find, no_parameters, say};
 use rohrpost::parameter::{Parameter, value_text};
 use rohrpost::value::decode;
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ pub(super) fn list(session: &mut Session, name: Option<&str>, json: bool) -> Res
         }
     }
     for error in &silent {
-        eprintln!("{error}");
+        complain(error);
     }
     Ok(if silent.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -25,7 +25,8 @@ impl Encoded {
     fn fault(&self, why: &Undelivered<'_>) -> Option<Fault> {
         let node = || why.node.unwrap_or("?").to_owned();
         Some(match why.cause {
-            Cause::NoRoute => Fault::NoRoute,
+            // No way leads to a router's own mailboxes from elsewhere.
+            Cause::NoRoute | Cause::RoutersOwn => Fault::NoRoute,
             Cause::Silent => Fault::NodeSilent { node: node() },
             Cause::Unheard => Fault::NodeDeaf { node: node() },
             Cause::Refused => {
@@ -41,7 +42,7 @@ impl Encoded {
                 Fault::NotAllowed { node: node(), rule: format!("{}:{}", self.file, why.rule.unwrap_or_default()) }
             }
             // Who speaks in another's name is not answered.
-            Cause::ForeignName => return None,
+            Cause::ForeignName | Cause::BadPacket => return None,
             // Of these the caller's next try comes through, or brings another answer.
             Cause::Socket | Cause::Late | Cause::Incomplete => return None,
         })
@@ -72,6 +73,7 @@ mod tests {
         let mismatch = Some(Mismatch { reason: Reason::Digest, version: 1, digest: Some(0xabc) });
         for (cause, words) in [
             (Cause::NoRoute, "same configuration"),
+            (Cause::RoutersOwn, "no router knows a way there"),
             (Cause::Silent, "node arm is silent"),
             (Cause::Unheard, "node arm is heard, but does not hear"),
             (Cause::Refused, "0000000000000abc, this node's 0000000000000123"),

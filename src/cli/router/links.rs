@@ -7,27 +7,37 @@ use rohrpost::mailbox::{Class, Latency, Priority, monotonic_ns};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::link::State;
 use rohrpost_routers::security::{Port, Rejection};
+use rohrpost_routers::settings::LEVELS;
 use rohrpost_routers::shell::{Failure, Shell, difference};
-use rohrpost_routers::stats::{Cause, ClassCounts};
+use rohrpost_routers::stats::{Cause, ClassCounts, Count, PeerReceived, PeerSent, PeerStats, Stats};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// How it stands now.
 pub(super) fn of(shell: &Shell) -> Links {
     let (settings, stats, now_ns) = (shell.settings(), shell.stats(), monotonic_ns());
-    let waiting = stats.waiting.iter().zip(0..).filter(|(count, _)| count.get() > 0);
+    let in_all = |of: fn(&Stats) -> u64| lanes(shell).map(of).sum();
+    let waiting = (0..LEVELS).map(|level| (level, lanes(shell).map(|stats| stats.waiting[level].get()).sum()));
     Links {
         node: settings.nodes[usize::from(settings.own)].name.clone(),
         digest: settings.digest,
         uptime_ms: now_ns.saturating_sub(stats.started_ns) / 1_000_000,
         peers: settings.peers().map(|peer| link(shell, peer, now_ns)).collect(),
-        waiting: waiting.map(|(count, level)| LevelWaiting { level, packages: count.get() }).collect(),
-        waiting_bytes: stats.waiting_bytes.get(),
+        waiting: waiting
+            .filter(|(_, packages)| *packages > 0)
+            .map(|(level, packages)| LevelWaiting { level: level as u8, packages })
+            .collect(),
+        waiting_bytes: in_all(|stats| stats.waiting_bytes.get()),
         classes: classes(shell),
-        foreign: stats.foreign.get(),
+        foreign: in_all(|stats| stats.foreign.get() + stats.dropped.get()),
         failures: failures(shell),
         rejections: rejections(shell),
     }
+}
+
+/// What counts datagrams: of what is real time, and of the rest where that goes its own way.
+fn lanes(shell: &Shell) -> impl Iterator<Item = &Stats> {
+    [Some(shell.stats()), shell.rest_stats()].into_iter().flatten().map(|stats| &**stats)
 }
 
 fn rejections(shell: &Shell) -> Vec<Rejected> {
@@ -37,10 +47,7 @@ fn rejections(shell: &Shell) -> Vec<Rejected> {
     let told = all.map(|(peer, why)| Rejected {
         node: peer.map_or_else(String::new, |peer| settings.nodes[usize::from(peer)].name.clone()),
         cause: why.word().into(),
-        datagrams: [Port::Packages, Port::Time]
-            .into_iter()
-            .filter_map(|port| Some(shell.rejections(port)?.of(peer, why)))
-            .sum(),
+        datagrams: Port::ALL.into_iter().filter_map(|port| Some(shell.rejections(port)?.of(peer, why))).sum(),
     });
     told.filter(|rejected| rejected.datagrams > 0).collect()
 }
@@ -53,7 +60,10 @@ fn failures(shell: &Shell) -> Vec<SocketFailure> {
 fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
     let (settings, stats) = (shell.settings(), shell.stats());
     let (node, counts, state) = (&settings.nodes[usize::from(peer)], stats.peer(peer), stats.state(peer, now_ns));
-    let (sent, received) = (&counts.sent, &counts.received);
+    let sent = |of: fn(&PeerSent) -> &Count| lanes(shell).map(|stats| of(&stats.peer(peer).sent).get()).sum();
+    let received =
+        |of: fn(&PeerReceived) -> &Count| lanes(shell).map(|stats| of(&stats.peer(peer).received).get()).sum();
+    let of_peer = |of: fn(&PeerStats) -> u64| lanes(shell).map(|stats| of(stats.peer(peer))).sum();
     let heard_ns = Some(counts.link.heard_ns.get()).filter(|at_ns| *at_ns > 0);
     PeerLink {
         node: node.name.clone(),
@@ -71,25 +81,25 @@ fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
         },
         heard_ms: heard_ns.map(|at_ns| now_ns.saturating_sub(at_ns) / 1_000_000),
         sent: Carried {
-            packages: sent.packages.get(),
-            datagrams: sent.datagrams.get(),
-            bytes: sent.bytes.get(),
-            parts: sent.fragments.get(),
+            packages: sent(|sent| &sent.packages),
+            datagrams: sent(|sent| &sent.datagrams),
+            bytes: sent(|sent| &sent.bytes),
+            parts: sent(|sent| &sent.fragments),
         },
         received: Carried {
-            packages: received.packages.get(),
-            datagrams: received.datagrams.get(),
-            bytes: received.bytes.get(),
-            parts: received.fragments.get(),
+            packages: received(|received| &received.packages),
+            datagrams: received(|received| &received.datagrams),
+            bytes: received(|received| &received.bytes),
+            parts: received(|received| &received.fragments),
         },
-        unsent: sent.unsent.get(),
-        lost: received.missing(),
-        missed: counts.link.missed_by_it.get(),
-        copies: received.copies.get(),
-        damaged: received.damaged.get(),
-        overtaken: received.overtaken.get(),
-        refused: received.refused.get() + received.old.get(),
-        restarts: received.restarts.get(),
+        unsent: sent(|sent| &sent.unsent),
+        lost: of_peer(|peer| peer.received.missing()),
+        missed: of_peer(|peer| peer.link.missed_by_it.get()),
+        copies: received(|received| &received.copies),
+        damaged: received(|received| &received.damaged),
+        overtaken: received(|received| &received.overtaken),
+        refused: of_peer(|peer| peer.received.refused.get() + peer.received.old.get()),
+        restarts: counts.received.restarts.get(),
     }
 }
 

@@ -1,12 +1,12 @@
 //! A node's client of the TCP router, as a module.
 
-use super::{NoSettings, PERIOD, certificates, classes, configured, levels, short};
+use super::{NoSettings, PERIOD, called, certificates, classes, configured, levels};
 use crate::cli::router::{faults::Encoded, impairment};
 use rohrpost::config::Reach;
 use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
 use rohrpost::mailbox::{ERROR_UNKNOWN_NS, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError};
-use rohrpost_routers::access::Access;
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::impair;
 use rohrpost_routers::session::client::ClientSettings;
 use rohrpost_routers::tcp::{ClientParts, ClientSeal, ClientShell, Holder, LinkState};
@@ -34,7 +34,7 @@ impl Module for ClientModule {
         let digest = installation.digest();
         let is_beyond = installation.node(&node_name).is_some_and(|node| node.reach == Reach::Tcp);
         let settings = ClientSettings {
-            name: short(&format!("node {node_name} of {}", installation.system.name)),
+            name: called(&node_name, installation),
             system: installation.system.id,
             reaches_own: !is_beyond,
             common: digest.common,
@@ -42,10 +42,11 @@ impl Module for ClientModule {
             life: realtime_ns().max(1),
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
+            admission: Admission::new(installation, &node_name),
         };
         let server = tcp.address;
         let others = installation.nodes.iter().filter(|other| !is_beyond && other.name != node_name);
-        let others = others.flat_map(|other| installation.names_on(&other.name)).collect();
+        let others = others.flat_map(|other| installation.names_registered(&other.name)).collect();
         // Of nodes on the LAN the network there is made worse.
         let impair = if is_beyond { impairment()? } else { None };
         if let Some(impair) = impair {
@@ -57,11 +58,10 @@ impl Module for ClientModule {
             name: context.me(),
             server,
             settings,
-            hosts: installation.names_on(&node_name),
+            hosts: installation.names_registered(&node_name),
             others,
             beyond: installation.names_beyond(&node_name),
             faults: Arc::new(Encoded::of(installation)),
-            access: Access::new(&installation.access),
             seal,
             keeps_time: is_beyond,
             impair,

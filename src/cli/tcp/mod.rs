@@ -61,6 +61,11 @@ fn levels(tcp: &Tcp) -> [u8; 256] {
     std::array::from_fn(|priority| tcp.level(Priority(priority as u8)))
 }
 
+/// What a node's client calls itself at the TCP router.
+fn called(node: &str, installation: &Installation) -> String {
+    short(&format!("node {node} of {}", installation.system.name))
+}
+
 /// A name for people, no longer than sessions take it.
 fn short(name: &str) -> String {
     let printable = || name.chars().filter(|c| !c.is_control());

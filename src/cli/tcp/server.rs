@@ -1,13 +1,15 @@
 //! The TCP router, as a module.
 
-use super::{NoSettings, PERIOD, certificates, classes, configured, levels, short};
+use super::{NoSettings, PERIOD, called, certificates, classes, configured, levels, short};
 use crate::cli::router::faults::Encoded;
-use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondHost, BeyondHosts, Tcp, TcpInterface};
+use rohrpost::config::Node;
+use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, Tcp, TcpInterface};
 use rohrpost::mailbox::{monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError, Name};
 use rohrpost_routers::session::frame::Range;
-use rohrpost_routers::session::server::ServerSettings;
+use rohrpost_routers::session::server::{Names, OwnNode, OwnNodes, ServerSettings};
 use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
@@ -28,21 +30,27 @@ impl Module for ServerModule {
         let tcp = configured(installation)?;
         let seal = certificates(installation, tcp).map(|folder| ServerSeal::load(&folder)).transpose()?;
         let digest = installation.digest();
+        let names_of = |ranges: Vec<(Name, Name)>| -> Names {
+            ranges.into_iter().map(|(first, last)| Range { first, last }).collect()
+        };
+        let registered = |node: &Node| (node.name.clone(), names_of(installation.names_registered(&node.name)));
+        let names: BTreeMap<String, Names> = installation.nodes.iter().map(registered).collect();
+        let own = |node: &Node| {
+            let names = names.get(&node.name).cloned().unwrap_or_default();
+            let all = names_of(installation.names_on(&node.name));
+            OwnNode { name: called(&node.name, installation), names, all, address: node.address }
+        };
         let settings = ServerSettings {
             name: short(&format!("the TCP router of {}", installation.system.name)),
             common: digest.common,
             system: Some((installation.system.id, digest.system)),
+            own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
             life: realtime_ns().max(1),
             clients_max: tcp.clients,
             greetings_max: tcp.clients.max(GREETINGS_MIN),
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
         };
-        let names_of = |node: &rohrpost::config::Node| {
-            let ranges = installation.names_on(&node.name).into_iter().map(|(first, last)| Range { first, last });
-            (node.name.clone(), ranges.collect())
-        };
-        let names = installation.nodes.iter().map(names_of).collect();
         let address = tcp.address;
         let faults = Arc::new(Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
@@ -66,6 +74,12 @@ impl Module for ServerModule {
                 left: seen.left,
                 refused: seen.refused,
                 refusal: seen.refusal,
+                crowded: BeyondCrowded {
+                    greetings: seen.crowded.greetings,
+                    clients: seen.crowded.clients,
+                    ranges: seen.crowded.ranges,
+                    packages: seen.crowded_packages,
+                },
                 overtaken: seen.overtaken,
                 held_lines: seen.held,
                 classes: classes(&seen.classes),
@@ -102,6 +116,7 @@ fn client(member: Member) -> BeyondClient {
         ranges: member.ranges,
         age_ms: member.age_ns / 1_000_000,
         heard_ms: member.heard_ns / 1_000_000,
+        lost: member.lost,
         bytes: member.bytes,
     }
 }
@@ -127,6 +142,7 @@ mod tests {
             ranges: most,
             age_ms: most,
             heard_ms: most,
+            lost: most,
             bytes: most,
         };
         let lost = Cause::ALL.map(|cause| CarriedLoss { cause: cause.word().into(), packages: most });
@@ -139,6 +155,7 @@ mod tests {
             left: most,
             refused: most,
             refusal: "x".repeat(1000),
+            crowded: BeyondCrowded { greetings: most, clients: most, ranges: most, packages: most },
             overtaken: most,
             held_lines: most,
             classes: vec![class; 64],

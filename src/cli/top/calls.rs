@@ -6,7 +6,7 @@ use super::super::target::Running;
 use rohrpost::CallError;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::launch::{ChildState, Children, ControlError, Look, launcher_of};
+use rohrpost::launch::{ControlError, Look, launcher_of};
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::survey::{Distant, Scope, Seen, Survey};
 use rohrpost::{Name, ToolLink};
@@ -28,8 +28,6 @@ enum Wants {
     Lines,
     Why,
     Restart(Name),
-    /// All modules of a launch; those it has told of so far.
-    Children(Vec<ChildState>),
 }
 
 /// What came of a call.
@@ -38,8 +36,6 @@ pub(super) enum Answer {
     Lines(Result<Page, String>),
     Why(Name, String),
     Restarted(Name, Result<(), String>),
-    /// Of the launch of this name.
-    Children(Name, Vec<ChildState>),
     /// What another node shows, or why it does not.
     Seen(String, Result<Survey, Silence>),
 }
@@ -84,15 +80,6 @@ impl Calls {
         let launcher = running.launcher_of(module).unwrap_or(self.tool.launcher());
         let begun = self.tool.begin_restart(launcher, &running.text(module));
         self.begun(running, launcher, Wants::Restart(module), begun)
-    }
-
-    /// Asks a launch how it stands with the modules that do not run.
-    pub(super) fn children(&mut self, running: &Running, launcher: Name) -> Option<Answer> {
-        if self.under_way.iter().any(|call| call.to == launcher && matches!(call.wants, Wants::Children(_))) {
-            return None;
-        }
-        let begun = self.tool.begin_children(launcher, 0);
-        self.begun(running, launcher, Wants::Children(Vec::new()), begun)
     }
 
     /// Begins to look at other nodes, but for those that are being looked at.
@@ -171,16 +158,6 @@ impl Calls {
                 Ok(outcome) => Some(Answer::Restarted(module, outcome.map(|_| ()).map_err(|error| error.to_string()))),
                 Err(error) => failed(running, to, wants, &unread(&error)),
             },
-            Wants::Children(mut known) => {
-                let page = from_bytes::<Children>(bytes).ok()?;
-                let last = page.states.is_empty() || known.len() + page.states.len() >= page.total.into();
-                known.extend(page.states);
-                if last {
-                    return Some(Answer::Children(to, known));
-                }
-                let begun = self.tool.begin_children(to, known.len() as u16);
-                self.begun(running, to, Wants::Children(known), begun)
-            }
         }
     }
 }
@@ -188,7 +165,7 @@ impl Calls {
 /// What a call that failed comes to. What is asked again at the next look is told only when it was asked by a key.
 fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Option<Answer> {
     let who = match wants {
-        Wants::Restart(_) | Wants::Children(_) => "launch".into(),
+        Wants::Restart(_) => "launch".into(),
         _ => running.text(to),
     };
     let told = match error {
@@ -199,6 +176,6 @@ fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Optio
         Wants::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
         Wants::Lines => Some(Answer::Lines(Err(told))),
         Wants::Restart(module) => Some(Answer::Restarted(module, Err(told))),
-        Wants::Why | Wants::Children(_) => None,
+        Wants::Why => None,
     }
 }

@@ -2,6 +2,8 @@
 
 use super::super::units;
 use super::model::Row;
+use rohrpost::output::plain;
+use rohrpost::survey::Standing;
 use std::cmp::Ordering;
 
 /// A column.
@@ -102,7 +104,9 @@ impl Column {
         match self {
             Self::Module => "name, and with + the number of its further names",
             Self::Node => "where it runs; shown when there are several nodes",
-            Self::State => "starting, off, on, error, stopping; dead: no process; silent: its node; left out: optional",
+            Self::State => {
+                "starting, on, off, stopped; error; busy: its code does not come back; restarting; failed: given up; unreachable"
+            }
             Self::Class => "class: who is of it, is as important",
             Self::Priority => "class id = priority of its commands, 255 most urgent",
             Self::Scheduling => "what the kernel says: fifo 1..99, or nice",
@@ -116,7 +120,7 @@ impl Column {
             Self::Cpu => "of one processor",
             Self::Memory => "resident, mailboxes included",
             Self::Pid => "process",
-            Self::Why => "why it is in error, or how packages were lost",
+            Self::Why => "what went wrong last, or how packages were lost",
         }
     }
 
@@ -148,7 +152,7 @@ impl Column {
         match self {
             Self::Module => row.line.module.clone(),
             Self::Node => row.line.node.clone(),
-            Self::State => row.line.state.clone(),
+            Self::State => row.line.account.state.to_string(),
             Self::Class => row.class.clone(),
             Self::Priority => row.line.priority.to_string(),
             Self::Scheduling => row.line.scheduling.clone(),
@@ -158,7 +162,7 @@ impl Column {
             Self::Lost => short(row.line.losses.lost as f64),
             Self::P50 => waited(row.waited_p50_s),
             Self::P99 => waited(row.waited_p99_s),
-            Self::Restarts => row.line.restarts.to_string(),
+            Self::Restarts => row.line.account.restarts.to_string(),
             Self::Cpu => row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}")),
             Self::Memory => row.memory_bytes.map_or("-".into(), memory),
             Self::Pid => row.line.pid.map_or("-".into(), |pid| pid.to_string()),
@@ -168,9 +172,10 @@ impl Column {
 
     /// How two modules stand to each other in this column: what deserves a look comes first.
     pub(super) fn compare(self, a: &Row, b: &Row) -> Ordering {
+        let state = |row: &Row| row.line.account.state;
         let number = |of: fn(&Row) -> Option<f64>| of(b).unwrap_or(-1.0).total_cmp(&of(a).unwrap_or(-1.0));
         match self {
-            Self::State => severity(&a.line.state).cmp(&severity(&b.line.state)),
+            Self::State => state(a).severity().cmp(&state(b).severity()),
             Self::Module | Self::Node | Self::Class | Self::Scheduling | Self::Why => self.cell(a).cmp(&self.cell(b)),
             Self::Priority => b.line.priority.cmp(&a.line.priority),
             Self::In => number(|row| row.line.received_per_s),
@@ -179,7 +184,7 @@ impl Column {
             Self::Lost => b.line.losses.lost.cmp(&a.line.losses.lost),
             Self::P50 => number(|row| row.waited_p50_s),
             Self::P99 => number(|row| row.waited_p99_s),
-            Self::Restarts => b.line.restarts.cmp(&a.line.restarts),
+            Self::Restarts => b.line.account.restarts.cmp(&a.line.account.restarts),
             Self::Cpu => number(|row| row.cpu_percent),
             Self::Memory => b.memory_bytes.cmp(&a.memory_bytes),
             Self::Pid => a.line.pid.cmp(&b.line.pid),
@@ -187,18 +192,17 @@ impl Column {
     }
 }
 
-/// What needs a person first.
-pub(super) fn severity(state: &str) -> usize {
-    let order =
-        ["failed", "dead", "silent", "error", "stopping", "waiting", "starting", "off", "ended", "on", "left out"];
-    order.iter().position(|known| *known == state).unwrap_or(order.len())
-}
-
-/// Why it is in error; else how its packages were lost. Those that a newer one replaced are nobody's loss.
+/// Why it does not work; else how its packages were lost, or what went wrong before. Those that a newer one replaced are nobody's loss.
 fn why(row: &Row) -> String {
-    let losses =
-        || row.line.losses.lost_by_cause.iter().map(|(cause, lost)| format!("{lost} {cause}")).collect::<Vec<_>>();
-    row.error.clone().unwrap_or_else(|| losses().join(", "))
+    let account = &row.line.account;
+    let losses = row.line.losses.lost_by_cause.iter().map(|(cause, lost)| format!("{lost} {cause}"));
+    let losses = losses.collect::<Vec<_>>().join(", ");
+    let is_well = matches!(account.state, Standing::On | Standing::Off);
+    if is_well && !losses.is_empty() {
+        losses
+    } else {
+        account.error.as_deref().map_or(losses, |error| plain::line(error).into_owned())
+    }
 }
 
 /// A number in at most five characters.

@@ -10,6 +10,7 @@ use rohrpost::Name;
 use rohrpost::config::{Installation, Program};
 use rohrpost::description::Description;
 use rohrpost::mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
+use rohrpost::output::plain;
 use rohrpost::survey::sum;
 use rohrpost::value::{describe_result, describe_type};
 use std::time::Duration;
@@ -25,7 +26,7 @@ pub(super) fn page(
     let Some(row) = model.row(name) else {
         return vec![format!("{} is not here any more", installation.classes.format(name))];
     };
-    let mut lines = vec![format!("{}: {}", row.line.module, row.line.state)];
+    let mut lines = vec![format!("{}: {}", row.line.module, row.line.account.state)];
     lines.extend(indented(&about(installation, sample, row)));
     let module = sample.survey.module(name);
     let own = |mailbox: &&MailboxInfo| {
@@ -64,8 +65,8 @@ fn indented(text: &str) -> Vec<String> {
 fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
     let mut lines = Vec::new();
     let mut say = |what: &str, text: String| lines.push(format!("{what:<11}{text}"));
-    if let Some(error) = &row.error {
-        say("why", error.clone());
+    if let Some(error) = &row.line.account.error {
+        say("why", plain::line(error).into_owned());
     }
     let text = installation.classes.text(row.name.class()).filter(|text| !text.is_empty());
     let text = text.map_or(String::new(), |text| format!(": {text}"));
@@ -91,7 +92,7 @@ fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
     let process = sample.survey.module(row.name).and_then(|module| module.process.as_ref());
     if let Some(process) = process {
         let since = Duration::from_secs_f64(row.uptime_s.unwrap_or(0.0));
-        let restarts = match row.line.restarts {
+        let restarts = match row.line.account.restarts {
             0 => String::new(),
             count => format!(", started again {count} times"),
         };

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! demo.main  2026-11-21 10:40:12 UTC simulation              head
-//! 6 modules: 5 on, 1 left out   168 packages/s   0 lost
+//! 6 modules: 1 stopped, 5 on   168 packages/s   0 lost
 //! > module  state  in/s …                                    table, or details, or help
 //!   motor.0 on     25
 //! ── output: info and above, all modules ──────────          output, whatever room is left
@@ -18,6 +18,7 @@ use super::text::{head, help, wrap};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Style;
+use rohrpost::output::plain;
 
 /// Room before a name for the mark of the selected module.
 const MARK: u16 = 2;
@@ -178,10 +179,10 @@ impl View<'_> {
     }
 }
 
-/// A text in the first line of a place, cut to its width. On a small terminal a place may be empty.
+/// A text in the first line of a place, cut to its width, and nothing in it that the terminal would obey. On a small terminal a place may be empty.
 fn put(to: &mut Buffer, place: Rect, text: &str, style: Style) {
     if !place.is_empty() {
-        to.set_stringn(place.x, place.y, text, place.width.into(), style);
+        to.set_stringn(place.x, place.y, plain::line(text), place.width.into(), style);
     }
 }
 
@@ -207,10 +208,10 @@ fn name(row: &Row, width: u16) -> String {
 
 /// A text in so many columns; what is cut is seen to be.
 fn pad(text: &str, width: u16, right: bool) -> String {
-    let width = usize::from(width);
+    let (text, width) = (plain::line(text), usize::from(width));
     let text = match text.chars().count() {
         long if long > width => text.chars().take(width.saturating_sub(1)).chain(['…']).collect(),
-        _ => text.to_owned(),
+        _ => text.into_owned(),
     };
     if right { format!("{text:>width$}") } else { format!("{text:<width$}") }
 }

@@ -10,14 +10,15 @@ use super::draw::{OutputText, View, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
-use super::sample::{self, Children, Seen, by_name};
+use super::sample::{self, Said, Seen};
 use super::terminal::{Opened, keyboard};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyEventKind};
 use rohrpost::Name;
 use rohrpost::description::Description;
 use rohrpost::launch::{Event as Told, events};
-use std::collections::{BTreeSet, HashMap};
+use rohrpost::survey::Standing;
+use std::collections::HashMap;
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
@@ -76,20 +77,15 @@ struct Live {
     calls: Option<Calls>,
     output: Output,
     /// Why modules are in error, as they said.
-    errors: HashMap<Name, String>,
-    /// What launch said, if there was reason to ask.
-    children: Children,
-    /// The modules that did not run then.
-    absent: Vec<Name>,
+    said: Said,
 }
 
 impl Live {
     fn new(running: Running, interval: Duration, palette: Palette) -> Result<Self, Failure> {
         let others = not_seen_yet(&running);
         let seen = in_order(&running, sample::own(&running)?, &others);
-        let now = sample::put_together(&running, seen, None, &Children::new());
-        let model =
-            Model::new(&running.installation, &running.node_name, &running.shown(), &now, None, &HashMap::new());
+        let now = sample::put_together(&running, seen, None, &Said::default());
+        let model = Model::new(&running.installation, &running.node_name, &running.shown(), &now, None);
         let output = Output::new(&running.installation);
         let mut live = Self {
             running,
@@ -104,9 +100,7 @@ impl Live {
             described: HashMap::new(),
             calls: None,
             output,
-            errors: HashMap::new(),
-            children: Children::new(),
-            absent: Vec::new(),
+            said: Said::default(),
         };
         live.join();
         Ok(live)
@@ -181,14 +175,12 @@ impl Live {
             }
         }
         let seen = in_order(&self.running, sample::own(&self.running)?, &others);
-        Ok(sample::put_together(&self.running, seen, earlier, &self.children))
+        Ok(sample::put_together(&self.running, seen, earlier, &self.said))
     }
 
     fn make_model(&mut self) {
-        let Self { running, now, earlier, errors, children, .. } = self;
-        let why = sample::why(now, errors, children);
-        self.model =
-            Model::new(&running.installation, &running.node_name, &running.shown(), now, earlier.as_ref(), &why);
+        let Self { running, now, earlier, .. } = self;
+        self.model = Model::new(&running.installation, &running.node_name, &running.shown(), now, earlier.as_ref());
     }
 
     /// The node may have been launched again, and perhaps with another configuration.
@@ -196,7 +188,7 @@ impl Live {
         let Ok(running) = self.running.again() else { return };
         let Ok(own) = sample::own(&running) else { return };
         let others = not_seen_yet(&running);
-        let now = sample::put_together(&running, in_order(&running, own, &others), None, &Children::new());
+        let now = sample::put_together(&running, in_order(&running, own, &others), None, &Said::default());
         if !now.launched {
             return;
         }
@@ -207,8 +199,7 @@ impl Live {
             calls.close();
         }
         (self.running, self.now, self.earlier) = (running, now, None);
-        self.children.clear();
-        self.absent.clear();
+        self.said = Said::default();
         self.output = Output::new(&self.running.installation);
         self.join();
     }
@@ -222,17 +213,12 @@ impl Live {
         if let Some((collector, from)) = self.output.wants() {
             answers.extend(calls.lines(&self.running, collector, from));
         }
-        let in_error = self.model.modules.iter().filter(|row| row.line.state == "error" && row.error.is_none());
-        for row in in_error {
-            answers.extend(calls.why(&self.running, row.name));
-        }
-        // Of those that do not run, launch knows why. What it said holds until others do not run, or while it still tries.
-        let absent: Vec<Name> = self.now.absent().collect();
-        let tries = |name| self.children.get(name).is_some_and(|child| !child.phase.is_over());
-        if absent != self.absent || absent.iter().any(tries) {
-            let launchers: BTreeSet<Name> = absent.iter().filter_map(|name| self.running.launcher_of(*name)).collect();
-            answers.extend(launchers.into_iter().filter_map(|launcher| calls.children(&self.running, launcher)));
-            self.absent = absent;
+        // What is over is forgotten: the next error may be another one.
+        let is_in_error =
+            |name: &Name| self.model.row(*name).is_some_and(|row| row.line.account.state == Standing::Error);
+        self.said.retain(|name, _| is_in_error(name));
+        for name in self.now.unexplained() {
+            answers.extend(calls.why(&self.running, name));
         }
         answers.into_iter().for_each(|answer| self.answer(answer));
     }
@@ -257,12 +243,6 @@ impl Live {
             Answer::Restarted(name, outcome) => {
                 let done = format!("{} is told to end, and starts again", self.running.text(name));
                 self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
-                self.peek();
-            }
-            Answer::Children(launcher, children) => {
-                let running = &self.running;
-                self.children.retain(|name, _| running.launcher_of(*name) != Some(launcher));
-                self.children.extend(by_name(running, children));
                 self.peek();
             }
             Answer::Seen(node, seen) => {
@@ -290,8 +270,8 @@ impl Live {
                 }
             }
             Answer::Why(name, error) => {
-                self.errors.insert(name, error);
-                self.make_model();
+                self.said.insert(name, error);
+                self.peek();
             }
         }
     }

@@ -28,8 +28,7 @@ use super::{Failure, say};
 use model::Model;
 use rohrpost::Name;
 use rohrpost::survey::Scope;
-use sample::Children;
-use std::collections::{BTreeSet, HashMap};
+use sample::Said;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -77,27 +76,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What there is to show after one interval. Whoever is in error is asked why, and launch about those that do not run.
+/// What there is to show after one interval. Whoever is in error, and no launch knows why, is asked.
 fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
     let look = || running.look_at(&running.shown(), Scope::All);
-    let earlier = sample::put_together(running, look()?, None, &Children::new());
+    let earlier = sample::put_together(running, look()?, None, &Said::default());
     std::thread::sleep(interval);
     let seen = look()?;
-    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &Children::new());
-    let (mut said, mut children) = (HashMap::new(), Children::new());
-    let names: Vec<Name> = now.survey.modules.iter().map(|module| module.name).collect();
-    let ails = now.absent().next().is_some() || names.iter().any(|name| now.in_error(*name));
-    // What nobody answers stays unsaid; the counters are told all the same.
-    if ails && let Ok(mut tool) = running.join(calls::PATIENCE) {
-        let absent: Vec<Name> = now.absent().collect();
-        let launchers: BTreeSet<Name> = absent.iter().filter_map(|name| running.launcher_of(*name)).collect();
-        let told = launchers.into_iter().filter_map(|launcher| tool.children(launcher).ok()).flatten();
-        children = sample::by_name(running, told.collect());
-        now = sample::put_together(running, seen, Some(&earlier), &children);
+    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &Said::default());
+    let unexplained: Vec<Name> = now.unexplained().collect();
+    if !unexplained.is_empty()
+        && let Ok(mut tool) = running.join(calls::PATIENCE)
+    {
         let status = |name| Some((name, tool.status(name).ok()?.error));
-        said = names.into_iter().filter(|name| now.in_error(*name)).filter_map(status).collect();
+        let said = unexplained.into_iter().filter_map(status).collect();
         tool.close();
+        now = sample::put_together(running, seen, Some(&earlier), &said);
     }
-    let why = sample::why(&now, &mut said, &children);
-    Ok(Model::new(&running.installation, &running.node_name, &running.shown(), &now, Some(&earlier), &why))
+    Ok(Model::new(&running.installation, &running.node_name, &running.shown(), &now, Some(&earlier)))
 }

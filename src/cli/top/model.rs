@@ -5,10 +5,10 @@ use super::super::sight::Silence;
 use super::super::summary::{Losses, ModuleLine};
 use rohrpost::Name;
 use rohrpost::config::Installation;
-use rohrpost::mailbox::{FlowInfo, Loss, ModuleState, saturating_sum};
-use rohrpost::survey::{ModuleSurvey, Survey};
+use rohrpost::mailbox::{FlowInfo, Loss, saturating_sum};
+use rohrpost::survey::{ModuleSurvey, Standing, Survey};
 use serde::Serialize;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// What is shown, at one moment.
@@ -25,21 +25,16 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// Whether the module runs and says that it is in error.
-    pub(super) fn in_error(&self, name: Name) -> bool {
-        let process = self.survey.module(name).and_then(|module| module.process.as_ref());
-        process.is_some_and(|process| process.state == Some(ModuleState::Error))
+    /// Modules that are in error, and nobody has said why.
+    pub(super) fn unexplained(&self) -> impl Iterator<Item = Name> {
+        let modules = self.survey.modules.iter().zip(&self.lines);
+        let is_it = |line: &ModuleLine| line.account.state == Standing::Error && line.account.error.is_none();
+        modules.filter(move |(_, line)| is_it(line)).map(|(module, _)| module.name)
     }
 
     /// Whether the module's node does not show itself.
     pub(super) fn is_silent(&self, name: Name) -> bool {
         self.survey.module(name).is_some_and(|module| module.at_ns.is_none())
-    }
-
-    /// Modules that have no process, on nodes that show themselves.
-    pub(super) fn absent(&self) -> impl Iterator<Item = Name> {
-        let is_absent = |module: &&ModuleSurvey| module.process.is_none() && module.at_ns.is_some();
-        self.survey.modules.iter().filter(is_absent).map(|module| module.name)
     }
 }
 
@@ -70,7 +65,7 @@ pub(super) struct Model {
     /// What rates and waiting times are measured over; none with the first look.
     pub(super) interval_s: Option<f64>,
     /// Number of modules by state.
-    pub(super) states: BTreeMap<String, usize>,
+    pub(super) states: BTreeMap<&'static str, usize>,
     pub(super) received_per_s: Option<f64>,
     #[serde(flatten)]
     pub(super) losses: Losses,
@@ -87,8 +82,6 @@ pub(super) struct Row {
     #[serde(flatten)]
     pub(super) line: ModuleLine,
     pub(super) class: String,
-    /// Why it is in error or failed.
-    pub(super) error: Option<String>,
     /// Packages lost a second.
     pub(super) lost_per_s: Option<f64>,
     /// Packages sent a second.
@@ -114,15 +107,13 @@ pub(super) struct Peer {
 }
 
 impl Model {
-    /// What there is to show of `now`; with an earlier look also what is counted over time. `errors` are what modules said
-    /// when they were asked why.
+    /// What there is to show of `now`; with an earlier look also what is counted over time.
     pub(super) fn new(
         installation: &Installation,
         node: &str,
         nodes: &[&str],
         now: &Sample,
         earlier: Option<&Sample>,
-        errors: &HashMap<Name, String>,
     ) -> Self {
         let interval = earlier.map(|earlier| between(earlier.survey.at_ns, now.survey.at_ns));
         let rows = now.survey.modules.iter().zip(&now.lines).map(|(module, line)| {
@@ -133,7 +124,6 @@ impl Model {
                 name: module.name,
                 line: line.clone(),
                 class: installation.classes.name(module.name.class()).unwrap_or("-").into(),
-                error: errors.get(&module.name).cloned(),
                 lost_per_s: before.map(|(before, interval)| per_s(module.lost, before.lost, interval)),
                 sent_per_s: before.and_then(|(before, interval)| sent_per_s(module, before, interval)),
                 waited_p50_s: quantile(0.5),
@@ -154,7 +144,7 @@ impl Model {
         });
         let modules: Vec<Row> = rows.collect();
         let mut states = BTreeMap::new();
-        modules.iter().for_each(|row| *states.entry(row.line.state.clone()).or_default() += 1);
+        modules.iter().for_each(|row| *states.entry(row.line.account.state.word()).or_default() += 1);
         let received = |sample: &Sample| saturating_sum(sample.survey.classes.iter().map(|class| class.received));
         let losses = |sample: &Sample| {
             Losses::new(

@@ -4,6 +4,7 @@ use super::columns::Column;
 use super::model::Row;
 use ratatui::style::{Color, Modifier, Style};
 use rohrpost::common::OutputLevel;
+use rohrpost::survey::Standing;
 
 /// With or without colours.
 #[derive(Clone, Copy)]
@@ -45,16 +46,20 @@ impl Palette {
 
     pub(super) fn cell(self, column: Column, row: &Row) -> Style {
         match column {
-            Column::State => match row.line.state.as_str() {
-                "on" => self.coloured(Color::Green),
-                "failed" | "dead" | "error" => self.coloured(Color::Red).add_modifier(Modifier::BOLD),
-                "left out" | "ended" => Style::new(),
-                _ => self.coloured(Color::Yellow),
+            Column::State => match row.line.account.state {
+                Standing::On => self.coloured(Color::Green),
+                Standing::Failed | Standing::Busy | Standing::Error => {
+                    self.coloured(Color::Red).add_modifier(Modifier::BOLD)
+                }
+                Standing::Stopped => Style::new(),
+                Standing::Starting | Standing::Off | Standing::Restarting { .. } | Standing::Unreachable => {
+                    self.coloured(Color::Yellow)
+                }
             },
             Column::Lost if row.lost_per_s.is_some_and(|lost| lost > 0.0) => {
                 self.coloured(Color::Red).add_modifier(Modifier::BOLD)
             }
-            Column::Why if row.error.is_some() => self.coloured(Color::Red),
+            Column::Why if row.line.account.error.is_some() => self.coloured(Color::Red),
             _ => Style::new(),
         }
     }

@@ -6,13 +6,12 @@ use super::super::summary::module_lines;
 use super::super::target::Running;
 use super::model::{Sample, TimeNow};
 use rohrpost::Name;
-use rohrpost::launch::ChildState;
 use rohrpost::mailbox::SystemClock;
-use rohrpost::survey::{Scope, Survey};
+use rohrpost::survey::{Scope, Standing, Survey};
 use std::collections::HashMap;
 
-/// What launches said of their modules, by name.
-pub(super) type Children = HashMap<Name, ChildState>;
+/// Why modules are in error, as they said when they were asked.
+pub(super) type Said = HashMap<Name, String>;
 
 /// What each of some nodes shows, or why it does not.
 pub(super) type Seen = Vec<Result<Survey, Silence>>;
@@ -24,8 +23,8 @@ pub(super) fn own(running: &Running) -> Result<Seen, Failure> {
     running.look_at(&own, Scope::All)
 }
 
-/// Puts together what nodes show; `earlier` makes rates. Where a module does not run, launch may have said why.
-pub(super) fn put_together(running: &Running, seen: Seen, earlier: Option<&Sample>, children: &Children) -> Sample {
+/// Puts together what nodes show; `earlier` makes rates.
+pub(super) fn put_together(running: &Running, seen: Seen, earlier: Option<&Sample>, said: &Said) -> Sample {
     let (mut surveys, mut silent) = (Vec::new(), Vec::new());
     for seen in seen {
         match seen {
@@ -34,13 +33,13 @@ pub(super) fn put_together(running: &Running, seen: Seen, earlier: Option<&Sampl
         }
     }
     let names: Vec<&str> = silent.iter().map(|silence| silence.node.as_str()).collect();
-    let survey = Survey::joined(surveys, &names, &running.installation);
-    // What runs says more of itself than launch knew when it was asked.
-    let absent = |name| survey.module(name).is_some_and(|module| module.process.is_none());
-    let lines = module_lines(&running.installation, &survey, earlier.map(|sample| &sample.survey), |name| {
-        let child = children.get(&name).filter(|_| absent(name));
-        child.map_or((0, None), |child| (child.restarts, Some(child.phase)))
-    });
+    let mut survey = Survey::joined(surveys, &names, &running.installation);
+    for module in survey.modules.iter_mut().filter(|module| module.standing() == Standing::Error) {
+        if let Some(error) = said.get(&module.name) {
+            module.error = Some(error.clone());
+        }
+    }
+    let lines = module_lines(&running.installation, &survey, earlier.map(|sample| &sample.survey));
     let clock = SystemClock::open(&running.node);
     let record = clock.record();
     let time = TimeNow {
@@ -50,18 +49,4 @@ pub(super) fn put_together(running: &Running, seen: Seen, earlier: Option<&Sampl
     };
     let launched = running.node.launcher().is_some();
     Sample { survey, silent, lines, time, launched }
-}
-
-/// What a launch said, by the names of its modules.
-pub(super) fn by_name(running: &Running, children: Vec<ChildState>) -> Children {
-    let name = |child: &ChildState| running.module(&child.module).ok();
-    children.into_iter().filter_map(|child| Some((name(&child)?, child))).collect()
-}
-
-/// Why modules are in error, as they said themselves, and why others do not run, as launch said. What modules said is
-/// forgotten once it is over.
-pub(super) fn why(now: &Sample, said: &mut HashMap<Name, String>, children: &Children) -> HashMap<Name, String> {
-    said.retain(|name, _| now.in_error(*name));
-    let ended = now.absent().filter_map(|name| Some((name, children.get(&name)?.last_end.replace('\n', "; "))));
-    said.clone().into_iter().chain(ended.filter(|(_, how)| !how.is_empty())).collect()
 }

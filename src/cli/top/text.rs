@@ -1,9 +1,10 @@
 //! Texts of the screen: dates, long lines, the help.
 
 use super::super::table;
-use super::columns::{Column, severity, short};
+use super::columns::{Column, short};
 use super::model::Model;
-use rohrpost::output::iso;
+use rohrpost::output::{iso, plain};
+use rohrpost::survey::Standing;
 
 /// A moment to the second, such as `2026-11-21 10:40:12 UTC`.
 pub(super) fn date(time_ns: u64) -> String {
@@ -15,7 +16,7 @@ pub(super) fn date(time_ns: u64) -> String {
 /// as the line itself is, and a little more.
 pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
     // A module may say anything; on the screen a line is a line.
-    let text: String = text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
+    let text = plain::line(text);
     let indent = (text.chars().take_while(|letter| *letter == ' ').count() + 2).min(width / 3);
     let mut pieces = Vec::new();
     let mut rest: Vec<char> = text.trim_end().chars().collect();
@@ -62,8 +63,8 @@ pub(super) fn head(model: &Model) -> [String; 2] {
         first.push("NOT LAUNCHED".into());
     }
     first.extend(model.silent.iter().map(|silence| format!("{} {}", silence.node, silence.since().to_uppercase())));
-    let mut states: Vec<(&String, &usize)> = model.states.iter().collect();
-    states.sort_by_key(|(state, _)| severity(state));
+    let mut states: Vec<(&&str, &usize)> = model.states.iter().collect();
+    states.sort_by_key(|(state, _)| Standing::WORDS.iter().position(|word| word == *state));
     let states: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
     let number = |number: Option<f64>| number.map_or("-".into(), short);
     let mut second = vec![
@@ -115,7 +116,7 @@ mod tests {
         assert_eq!(wrap("  one two three", 10), ["  one two", "   three"]);
         assert_eq!(wrap("abcdefghij", 4), ["abcd", " efg", " hij"]);
         assert_eq!(wrap("", 4), [""]);
-        assert_eq!(wrap("a\u{1b}[31m\tb", 20), ["a [31m b"]);
+        assert_eq!(wrap("a\u{1b}[31m\tb", 20), ["a\\u001b[31m\\tb"]);
         for width in 0..30 {
             for piece in wrap("  a rather long line with averyverylongwordinit and more", width) {
                 assert!(piece.chars().count() <= width.max(56), "{width}: {piece:?}");

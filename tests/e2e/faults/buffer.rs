@@ -26,8 +26,13 @@ fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_afte
         let mut sink = Sink::new(field.robot("arm"), "arm");
         let mut flood = Source::new(field.robot("base"), "base", "arm", PLAIN);
         let router = field.router("arm");
-        // What the base said before the arm listened; that it did is known with the first that the arm has heard.
+        // What the base said before the arm listened; that it did is known with the first that the arm has heard, at either port.
         field.wait_for_state("arm", "base", LinkState::Alive);
+        wait("the first of the flow", || {
+            flood.send();
+            sink.take(Duration::from_millis(10));
+            (!sink.came.is_empty()).then_some(())
+        });
         let before = field.peer("arm", "base").lost;
         // A busy computer may not flood it in the second until it counts as silent; then once more.
         wait("the buffer runs over", || {

@@ -7,9 +7,9 @@ use rohrpost::mailbox::{Label, Loss, Participant, Receiver, SendError, Sender, S
 use rohrpost::{Class, Priority};
 use std::time::Duration;
 
-/// Classes that only flows have, so that their accounts are theirs alone.
-pub(super) const PLAIN: Class = Class(100);
-pub(super) const URGENT: Class = Class(200);
+/// Classes that only flows have, so that their accounts are theirs alone. None is above that of probes, between which they pass.
+pub(super) const PLAIN: Class = Class(60);
+pub(super) const URGENT: Class = Class(90);
 /// Less important than the calls of tools, and not real time.
 pub(super) const BULK: Class = Class(8);
 /// More than half of a datagram, and less than one: each datagram carries one package.

@@ -5,8 +5,8 @@ use super::{Field, LOG, configure, lines};
 use crate::harness::{OUTPUT, signal, wait};
 use crate::process::Said;
 use nix::sys::signal::Signal;
-use rohrpost::CallError;
 use rohrpost::interfaces::LinkState;
+use rohrpost::{CallError, Fault};
 use rohrpost_routers::frame::{FrameHead, Kind};
 use std::net::UdpSocket;
 use std::path::PathBuf;
@@ -137,14 +137,26 @@ fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
         };
         let rejected = wait(format!("{name}: base counts"), rejects);
         assert!(rejected.datagrams > 0, "{rejected:?}");
-        assert!(field.count("base", "probe.1", super::NEVER, Duration::from_secs(1)).is_err(), "{name}");
+        // A caller learns why, and need not look into the other's log; so do those who look.
+        let hint = if name == "none" { "one of both seals" } else { "copy the folder of keys from the first computer" };
+        let told =
+            |fault: &Fault| matches!(fault, Fault::NodeRefuses { node, why } if node == "arm" && why.contains(hint));
+        wait(format!("{name}: callers are told"), || Some(field.fault("base", "probe.1")).filter(told));
+        field.wait_for_state("base", "arm", LinkState::Refused);
+        for words in [&["ping", "probe.1", "-c", "1"][..], &["net"], &["list"]] {
+            wait(format!("{name}: {words:?} tells"), || {
+                // As seen from the base, which is the first.
+                let said = field.place.say(&[words, &["--config", field.config.to_str().unwrap()]].concat());
+                (said.out + &said.err).contains(hint).then_some(())
+            });
+        }
         field.halt_node("arm");
         std::fs::remove_file(field.place.path("arm.log")).unwrap();
     }
     // Without the file a node is not even launched.
     let other = field.with("arm", "security = \"keys\"\nkeys = \"nowhere\"");
     let said = field.place.say(&["launch", other.to_str().unwrap(), "--node", "arm"]).fails();
-    assert!(said.contains("nowhere/udp.keys") && said.contains("rohrpost keys new"), "{said}");
+    assert!(said.contains("nowhere/udp.keys") && said.contains("copy this folder from the first computer"), "{said}");
     // With the right one it takes part.
     field.launch(&["arm"], &[]);
     field.wait_counted("base", "probe.1", 1);
@@ -183,6 +195,11 @@ fn a_sealed_node_says_that_another_speaks_another_wire_format() {
         counted()
     });
     assert!(rejected.node == "arm" && rejected.datagrams > 0, "{rejected:?}");
+    wait("callers are told", || {
+        arm.send_to(&of_version_2(&head), ("10.78.0.1", 21117)).unwrap();
+        let told = |fault: &Fault| matches!(fault, Fault::NodeRefuses { why, .. } if why.contains("wire format 2"));
+        Some(field.fault("base", "probe.1")).filter(told)
+    });
     let words = ["takes nothing from node arm (10.78.0.2)", "wire format 2, ours is 1", "same version of Rohrpost"];
     field.wait_told("router.0", &words, 1);
     field.stop();
@@ -232,15 +249,17 @@ fn a_command_of_a_class_that_is_not_listed_is_answered_with_the_rule() {
     let text = std::fs::read_to_string(&field.config).unwrap();
     std::fs::write(&field.config, format!("{text}\n[access]\nprobe = [\"probe\"]\n")).unwrap();
     field.launch(&["base", "arm"], &[]);
-    let fault = wait("a fault", || match field.count("base", "probe.1", super::NEVER, Duration::from_secs(2)) {
-        Err(CallError::Fault(_, fault)) => Some(fault.to_string()),
-        // A router that has just begun answers nothing.
-        _ => None,
-    });
     let line = text.lines().count() + 3;
-    assert!(fault.contains(&format!("test.toml:{line}, [access]")) && fault.contains("node arm refuses it"), "{fault}");
+    // From another node its router refuses it, and from its own the module itself.
+    for from in ["base", "arm"] {
+        let fault = wait("a fault", || match field.count(from, "probe.1", super::NEVER, Duration::from_secs(2)) {
+            Err(CallError::Fault(_, fault)) => Some(fault.to_string()),
+            // A router that has just begun answers nothing.
+            _ => None,
+        });
+        let rule = format!("test.toml:{line}, [access]");
+        assert!(fault.contains(&rule) && fault.contains("node arm refuses it"), "{from}: {fault}");
+    }
     assert_eq!(field.counted("probe.1"), [0; 0]);
-    // On one node all trust each other.
-    field.wait_counted("arm", "probe.1", 1);
     field.stop();
 }

@@ -70,11 +70,12 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
             (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
         });
         let numbers = sink.numbers(PLAIN);
-        let turn = numbers.iter().position(|number| *number == SECOND).unwrap();
+        // The first datagram of another life is doubted until a second one says the same, and lost.
+        let turn = numbers.iter().position(|number| *number >= SECOND).unwrap();
         assert!(turn <= 2, "{turn} of the first came before");
         assert!(
-            (SECOND..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
-            "all of the second, and nothing else"
+            (SECOND + 1..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
+            "all of the second from then on, and nothing else"
         );
         // How many there were only their own router knows: on a busy computer it cannot send all of a burst.
         wait("those of the first are counted", || (field.peer("base", "arm").refused > 0).then_some(()));

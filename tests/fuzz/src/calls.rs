@@ -1,6 +1,7 @@
 //! What comes in as a command, a reply or data: envelopes, arguments, and the decision whether a command runs.
 
 use crate::split::Bytes;
+use rohrpost_config::Principal;
 use rohrpost_mailbox::Name;
 use rohrpost_modules::call::{CallEnvelope, Fault, Once, ReplyEnvelope, Request, Verdict};
 use rohrpost_modules::common::{Change, DataHead, DescriptionPart, SetParameters, Status, Subscribe};
@@ -61,7 +62,7 @@ fn round<T: Data + std::fmt::Debug>(body: &[u8]) {
 fn once(body: &[u8]) {
     let mut bytes = Bytes(body);
     let mut now_ns = bytes.long();
-    let mut once = Once::new(now_ns);
+    let mut once = Once::new(now_ns, &[]);
     while !bytes.is_empty() {
         let flags = bytes.byte();
         // Steps of 0 to 2.5 s, sometimes of 2^63 ns.
@@ -69,6 +70,7 @@ fn once(body: &[u8]) {
         now_ns = if flags & 8 == 0 { now_ns.saturating_add(step) } else { now_ns.saturating_add(1 << 63) };
         let request = Request {
             from: Name::new(1, bytes.byte(), 0, 1),
+            principal: Principal::System(flags >> 6),
             incarnation: u32::from(bytes.byte() % 4),
             sequence: if flags & 16 == 0 { bytes.byte().into() } else { bytes.word() },
             valid_for_ns: u64::from(bytes.word()) * 1000,

@@ -47,7 +47,8 @@ impl World {
         let client = self.connections.get(which % self.connections.len().max(1)).copied();
         match (what % 9, client) {
             (0, _) | (_, None) => {
-                let accepted = self.server.accept(self.now_ns, "somewhere", &mut Deaf);
+                let from = ([10, 0, 0, which as u8 % 3], 1).into();
+                let accepted = self.server.accept(self.now_ns, from, &mut Deaf);
                 self.connections.extend(accepted);
             }
             (1, Some(client)) => self.say(client, &hello(bytes)),

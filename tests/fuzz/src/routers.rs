@@ -5,7 +5,7 @@ use crate::frames::checked;
 use crate::split::Bytes;
 use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_routers::access::Access;
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::fragment::PARTIAL_MAX;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
@@ -62,8 +62,10 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
         tdma: None,
         routes: vec![Route { first: module(other), last: module(other).with_local(u8::MAX), node: other }],
         senders: Vec::new(),
-        access: Access::default(),
+        hosts: Vec::new(),
+        admission: Admission::default(),
         flows: Vec::new(),
+        real_time_from: 0,
     }
 }
 

@@ -1,10 +1,11 @@
 //! Frames of sessions: a stream that anybody writes, to a TCP router and to a client. What was read is written again, byte for byte, however
 //! the stream is split, and nothing that was promised in it takes memory before it came.
 
+use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
 use rohrpost_routers::session::client::{self, Client, ClientSettings};
 use rohrpost_routers::session::frame::{Carried, FrameHead, HEAD_BYTES, LENGTH_MAX, Message};
-use rohrpost_routers::session::server::{self, Output, Server, ServerSettings};
+use rohrpost_routers::session::server::{self, Output, OwnNodes, Server, ServerSettings};
 use rohrpost_routers::session::{Answers, Cause};
 
 pub(crate) const MS: u64 = 1_000_000;
@@ -67,6 +68,7 @@ pub(crate) fn server() -> Server {
         name: "the server".into(),
         common: 7,
         system: None,
+        own_nodes: OwnNodes::default(),
         life: 5,
         clients_max: 3,
         greetings_max: 2,
@@ -81,7 +83,7 @@ fn pieces(stream: &[u8], split: usize) -> impl Iterator<Item = &[u8]> {
 
 fn to_a_server(stream: &[u8], split: usize) {
     let mut server = server();
-    let Some(client) = server.accept(BEGIN_NS, "somewhere", &mut Deaf) else { return };
+    let Some(client) = server.accept(BEGIN_NS, ([10, 0, 0, 1], 1).into(), &mut Deaf) else { return };
     for (at, piece) in pieces(stream, split).enumerate() {
         let now_ns = BEGIN_NS + at as u64 * MS;
         server.received(now_ns, client, piece, &mut Deaf);
@@ -103,6 +105,7 @@ fn to_a_client(stream: &[u8], split: usize) {
         life: 3,
         quota_bytes: 64 << 10,
         levels: [0; 256],
+        admission: Admission::default(),
     };
     let mut client = Client::new(settings, Vec::new(), BEGIN_NS);
     client.poll(BEGIN_NS, &mut Deaf);

@@ -2,6 +2,7 @@
 
 mod clock;
 mod hop;
+mod junk;
 mod rates;
 mod sealed;
 mod urgent;
@@ -15,7 +16,10 @@ use std::cell::Cell as Counter;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [hop::cases(), sealed::cases(), rates::cases(), urgent::cases(), clock::cases()].into_iter().flatten().collect()
+    [hop::cases(), sealed::cases(), rates::cases(), urgent::cases(), junk::cases(), clock::cases()]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// As large as a datagram can be, so that none is parted.
@@ -33,7 +37,11 @@ struct Ground {
 impl Ground {
     /// Makes the network and starts the routers.
     fn new(settings: &Settings, network: &Network) -> Self {
-        let wire = Wire::new(network.mtu);
+        Self::on(settings, network, Wire::new(network.mtu))
+    }
+
+    /// The same on a network that is there.
+    fn on(settings: &Settings, network: &Network, wire: Result<Wire, Failure>) -> Self {
         let nodes =
             wire.as_ref().map_err(Clone::clone).and_then(|wire| Nodes::start(wire, network, settings.command()));
         Self { wire, nodes, turns: Counter::new(0) }

@@ -29,7 +29,8 @@ impl Case for Brisk {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, loaded| Watched { who, plan: BRISK, way: Way { rights: Rights::RealTime, loaded } };
+        let watched =
+            |who, loaded| Watched { who, plan: BRISK, way: Way { rights: Rights::RealTime, loaded, junk: false } };
         let contest = Contest {
             case: "cycle-1ms",
             watched: vec![watched("loaded", true), watched(UNLOADED, false)],

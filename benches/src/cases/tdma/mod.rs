@@ -5,6 +5,7 @@ mod clock;
 mod contest;
 mod flows;
 mod goals;
+mod junk;
 mod observed;
 mod pitch;
 pub mod plans;
@@ -15,7 +16,7 @@ use super::Case;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
-    [slots::cases(), brisk::cases(), pitch::cases(), clock::cases(), takeover::cases(), flows::cases()]
+    [slots::cases(), brisk::cases(), pitch::cases(), clock::cases(), takeover::cases(), flows::cases(), junk::cases()]
         .into_iter()
         .flatten()
         .collect()

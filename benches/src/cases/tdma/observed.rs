@@ -1,12 +1,13 @@
 //! A turn of three nodes that always have something to send, watched from outside.
 
 use crate::harness::{Failure, rest};
+use crate::lan::junk::Junk;
 use crate::settings::Settings;
 use crate::statistics::Summary;
 use crate::tdma::capture::Capture;
 use crate::tdma::counts::Counts;
 use crate::tdma::kept::Kept;
-use crate::tdma::plan::Plan;
+use crate::tdma::plan::{PORT, Plan};
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
 use crate::tdma::stage::{NODES, Stage};
@@ -19,6 +20,9 @@ const WATCHED_QUICK: Duration = Duration::from_secs(1);
 /// Until routers know how long their datagrams take to the wire, and everybody what the load is.
 const SETTLES: Duration = Duration::from_secs(1);
 
+/// Of packages and of time.
+const PORTS: [u16; 2] = [PORT, PORT + 1];
+
 /// All nodes.
 pub(super) const ALL: [u8; NODES as usize] = [0, 1, 2];
 
@@ -29,6 +33,8 @@ pub(super) struct Way {
     pub rights: Rights,
     /// Whether everything else is busy, too.
     pub loaded: bool,
+    /// Whether somebody sends junk to the ports of a node.
+    pub junk: bool,
 }
 
 /// What was seen.
@@ -42,6 +48,8 @@ pub(super) struct Observed {
     pub steal_percent: f64,
     /// Threads of slots waited so long for a processor, all together, ms for each second.
     pub waited_ms_s: f64,
+    /// Junk that was sent to each port, datagrams a second; none without any.
+    pub junk_s: Option<f64>,
 }
 
 /// How long a turn is watched.
@@ -60,6 +68,7 @@ impl Observed {
         let _traffic = Traffic::start(&routers)?;
         routers.await_packages(&ALL, &mut capture)?;
         let _load = way.loaded.then(|| stage.load()).transpose()?;
+        let junk = way.junk.then(|| stage.junk(&PORTS)).transpose()?;
         rest(SETTLES)?;
         let time = routers.clock(0)?.record().ok_or_else(|| Failure::Failed("the master has no time".into()))?;
         let (counts, machine, first) = (routers.counts()?, routers.machine(), capture.len());
@@ -67,6 +76,7 @@ impl Observed {
         let (frames, machine_after) = (capture.since(first), routers.machine());
         let counts = Counts::between(&counts, &routers.counts()?);
         capture.check()?;
+        let junk_s = junk.map(Junk::end).transpose()?;
         match (way.rights, counts.scheduled == "ordinary") {
             (Rights::RealTime, false) | (Rights::Ordinary, true) => {}
             (Rights::RealTime, true) => return Err(Failure::Skipped("no real time for routers here".into())),
@@ -79,6 +89,7 @@ impl Observed {
             steal_percent: machine_after.steal_percent(&machine),
             waited_ms_s: machine_after.waited_ms(&machine) / watched(settings).as_secs_f64(),
             counts,
+            junk_s,
         })
     }
 

@@ -32,7 +32,8 @@ impl Case for Pitch {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, plan| Watched { who, plan, way: Way { rights: Rights::RealTime, loaded: true } };
+        let watched =
+            |who, plan| Watched { who, plan, way: Way { rights: Rights::RealTime, loaded: true, junk: false } };
         let tables = [
             ("250 us, guard 80", SHORT_PITCH),
             ("320 us, guard 150", WIDE_GUARD),
@@ -78,7 +79,7 @@ mod tests {
         let is_kept = |outside, into_guard_us, late| {
             let kept = Kept { outside, into_guard_us, frames: 1_000, ..Kept::default() };
             let counts = Counts { used: 1_000 - late, late, ..Counts::default() };
-            super::is_kept(&SHORT_PITCH, &Observed { kept, counts, steal_percent: 0.0, waited_ms_s: 0.0 })
+            super::is_kept(&SHORT_PITCH, &Observed { kept, counts, steal_percent: 0.0, waited_ms_s: 0.0, junk_s: None })
         };
         assert!(is_kept(0, 80.0, 5));
         assert!(!is_kept(1, 0.0, 0) && !is_kept(0, 80.5, 0) && !is_kept(0, 0.0, 6));

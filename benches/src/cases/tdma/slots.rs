@@ -71,7 +71,7 @@ impl Case for Slots {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, rights, loaded| Watched { who, plan: LOADED, way: Way { rights, loaded } };
+        let watched = |who, rights, loaded| Watched { who, plan: LOADED, way: Way { rights, loaded, junk: false } };
         let at_most = |p50: Option<f64>, p99: f64| (p50.map(Target::AtMost), Some(Target::AtMost(p99)));
         let versus = [
             (MUST.0, at_most(Some(1.0), 1.0)),

@@ -1,10 +1,12 @@
 //! Whether every flow keeps its deadline with a table, and what waits has room.
 
 use super::{Judge, round_up};
-use crate::bounds::{self, Unbounded};
+use crate::bounds::{self, FlowBound, Unbounded};
 use crate::flow::Flow;
+use crate::network::{TRANSIT, TRANSIT_LOOK};
 use crate::units::{duration_decimal, size_text};
 use crate::wire::KEPT_IN_BYTES;
+use std::time::Duration;
 
 impl Judge<'_> {
     /// No flow publishes so quickly that a package could not even be sure of a slot that begins when the next one comes.
@@ -74,6 +76,35 @@ impl Judge<'_> {
                     size_text(bytes.next_power_of_two())
                 );
                 self.reader.report(flow.line, message);
+            }
+        }
+    }
+
+    /// Of the flows of a node as many packages may wait for its slots at once as the mailbox of its router holds: either all that can be
+    /// under way, or, since the router takes all when more than half of the mailbox is full, what comes between two looks at it.
+    pub(super) fn mailboxes(&self) {
+        let bounds = bounds::bounds(self.installation);
+        for (index, node) in (0..).zip(self.installation.lan_nodes()) {
+            let is_own = |bound: &&FlowBound| {
+                let from = self.installation.flows[bound.flow].from;
+                self.installation.module(from).is_some_and(|module| module.node == node.name)
+            };
+            let own =
+                || bounds.iter().filter(is_own).filter_map(|bound| Some((bound.flow, bound.latency.ok()?.latency)));
+            let in_ns = |flow: usize, time: Duration| {
+                1 + time.as_nanos() / self.installation.flows[flow].period.as_nanos().max(1)
+            };
+            let slots = self.tdma.slots.iter().filter(|slot| slot.node == index);
+            let look = TRANSIT_LOOK + slots.map(|slot| slot.length).max().unwrap_or_default();
+            let under_way: u128 = own().map(|(flow, latency)| in_ns(flow, latency)).sum();
+            let behind_half: u128 = own().map(|(flow, _)| in_ns(flow, look)).sum();
+            let most = under_way.min(behind_half + u128::from(TRANSIT.slots / 2));
+            if let Some((flow, _)) = own().next().filter(|_| most > TRANSIT.slots.into()) {
+                let message = format!(
+                    "[[flow]]s from `{}`: {most} of their packages may wait for its slots at once, and the mailbox of its router holds {};                      declare fewer, with one package for what goes to one module, or let slots of `{}` come oftener",
+                    node.name, TRANSIT.slots, node.name
+                );
+                self.reader.report(self.installation.flows[flow].line, message);
             }
         }
     }

@@ -888,7 +888,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it weakened",
         lines: &[
             "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
-            "sleeping.store(1, Ordering::SeqCst)",
+            "sleeping.store(sleeping, Ordering::SeqCst)",
             "hints.load(Ordering::SeqCst)",
             "level.store(level.0.into(), Ordering::SeqCst)",
         ],

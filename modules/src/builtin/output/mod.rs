@@ -1,21 +1,24 @@
 //! `output`: collects what all modules of the node say; keeps the last lines, writes them to a file and to the system's journal,
 //! passes them on.
 
+mod admission;
 mod file;
 mod journal;
+mod ring;
 mod sink;
 
-use crate::interfaces::{Collector, CollectorInterface, Page};
+use crate::interfaces::{Collector, CollectorInterface, Page, RefusedLines};
 use crate::module::{Module, ModuleError};
 use crate::output::{Format, LINES, OutputLine};
 use crate::runtime::{Context, Received};
+use admission::{Admission, Came, NotTaken};
 use file::LogFile;
 use journal::Journal;
-use rohrpost_config::{LineFormat, Output};
-use rohrpost_mailbox::Shape;
+use ring::Ring;
+use rohrpost_config::{LineFormat, Output, Principal};
+use rohrpost_mailbox::{Shape, monotonic_ns};
 use serde::Deserialize;
 use sink::Change;
-use std::collections::VecDeque;
 use std::path::Path;
 use std::time::Instant;
 
@@ -33,10 +36,8 @@ pub(super) struct Settings {}
 impl super::check::Settings for Settings {}
 
 pub(super) struct OutputModule {
-    ring: VecDeque<OutputLine>,
-    ring_max: usize,
-    /// Lines that have left the ring.
-    gone: u64,
+    admission: Admission,
+    ring: Ring,
     /// Tells this life's numbers from earlier ones.
     life: u32,
     format: LineFormat,
@@ -53,22 +54,22 @@ impl Module for OutputModule {
         let file = output.file.as_deref().map(|path| open(path, &output)).transpose()?;
         let journal = output.journal.then(|| Journal::new(Path::new(journal::SOCKET)));
         let journal = journal.transpose().map_err(|error| ModuleError::new(format!("journal: {error}")))?;
-        context.open_mailbox(LINES, Shape { slots: SLOTS, body_bytes_max: 1024, ..Shape::default() })?;
-        let ring_max = output.ring as usize;
-        let ring = VecDeque::with_capacity(ring_max.min(10_000));
+        context.open_mailbox_to_all(LINES, Shape { slots: SLOTS, body_bytes_max: 1024, ..Shape::default() })?;
+        let (admission, ring) = (Admission::new(output.rate, output.burst), Ring::new(output.ring as usize));
         let life = context.link().borrow().participant().incarnation();
-        Ok(Self { ring, ring_max, gone: 0, life, format: output.format, file, journal })
+        Ok(Self { admission, ring, life, format: output.format, file, journal })
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        let Some(line) = data.read_from::<OutputLine>(LINES) else { return Ok(()) };
-        self.write(&line, context);
-        context.publish(CollectorInterface::LINE, line.time_ns, &line)?;
-        if self.ring.len() >= self.ring_max {
-            self.ring.pop_front();
-            self.gone += 1;
+        match self.admit(context, data) {
+            Ok((principal, line)) => {
+                self.write(&line, context);
+                context.publish(CollectorInterface::LINE, line.time_ns, &line)?;
+                self.ring.push(principal, line);
+            }
+            Err(NotTaken(Some(why))) => tracing::warn!("{why} (`rohrpost call output.0 refused` counts them)"),
+            Err(NotTaken(None)) => {}
         }
-        self.ring.push_back(line);
         Ok(())
     }
 }
@@ -79,6 +80,15 @@ fn open(path: &Path, output: &Output) -> Result<LogFile, ModuleError> {
 }
 
 impl OutputModule {
+    /// The line in a package, and whose share it uses.
+    fn admit(&mut self, context: &Context, data: &Received<'_>) -> Result<(Principal, OutputLine), NotTaken> {
+        let came = Came { mono_ns: monotonic_ns(), time_ns: context.now().ns };
+        let read = postcard::from_bytes(data.value);
+        let mut line: OutputLine = read.map_err(|_| self.admission.unreadable(data.from, came.mono_ns))?;
+        let principal = self.admission.judge(context.installation(), data.from, &mut line, came)?;
+        Ok((principal, line))
+    }
+
     /// Passes a line to what keeps it for longer. A full disk or a journal that hangs must not end the collector: the ring
     /// and the subscribers go on.
     fn write(&mut self, line: &OutputLine, context: &Context) {
@@ -112,14 +122,17 @@ fn tell(change: Option<Change>, what: &dyn std::fmt::Display) {
 
 impl Collector for OutputModule {
     fn lines_from(&mut self, number: u64) -> Page {
-        let first = number.max(self.gone);
+        let (first, run) = self.ring.run(number);
         let mut bytes = 0;
         let fits = |line: &&OutputLine| {
             bytes += line.text.len() + NUMBERS_BYTES;
             bytes <= PAGE_BYTES
         };
-        let skip = usize::try_from(first - self.gone).unwrap_or(usize::MAX);
-        let lines = self.ring.iter().skip(skip).take_while(fits).cloned().collect();
-        Page { life: self.life, first, next: self.gone + self.ring.len() as u64, lines }
+        let lines = run.take_while(fits).cloned().collect();
+        Page { life: self.life, first, next: self.ring.next(), lines }
+    }
+
+    fn refused(&mut self) -> RefusedLines {
+        self.admission.counts
     }
 }

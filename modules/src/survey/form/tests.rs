@@ -1,6 +1,7 @@
 //! Looks survive their way, and bytes that are none are refused.
 
 use super::*;
+use crate::launch::Phase;
 use proptest::prelude::*;
 use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, FlowSecond, Latency, Type};
 
@@ -22,6 +23,7 @@ fn seen() -> Seen {
         state: Some(ModuleState::Error),
         restarts: 2,
         joined_ns: 5,
+        in_hand: None,
     };
     let module = ModuleSurvey {
         node: "base".into(),
@@ -39,6 +41,21 @@ fn seen() -> Seen {
         sent: 3,
         bytes_out: 30,
         depth: 1,
+        working: Some(Working { part: "`tick`".into(), lasts: Duration::from_millis(4200) }),
+        child: Some(ChildState {
+            module: "laser.0".into(),
+            phase: Phase::Waiting,
+            pid: None,
+            lives: 3,
+            restarts: 2,
+            attempt: 2,
+            attempts_max: 5,
+            starts_in_ms: Some(100),
+            last_end: "ended with 1".into(),
+            error: "no port".into(),
+            printed: String::new(),
+        }),
+        error: None,
     };
     let second = FlowSecond { second: 8, interval_ns: Some((1, 2)), bytes: (3, 4) };
     let flow = FlowInfo {

@@ -10,7 +10,7 @@ fn data(from: NodeIndex, to: NodeIndex) -> Head {
     head(module(50, to), module(200, from), 90)
 }
 
-use crate::frame::NodeIndex;
+use crate::frame::{Alive, FrameHead, Kind, NodeIndex};
 
 pub(super) fn check_silence() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
@@ -56,14 +56,16 @@ pub(super) fn check_restart() {
     let (mut first, mut second) = (lives(11), lives(12));
     let old: Vec<_> = (0..3).map(|_| first.send(START, data(1, 0), b"", true).unwrap().1).collect();
     base.take(START, 1, &old[0]);
-    let (_, new) = second.send(START, data(1, 0), b"", true).unwrap();
-    base.take(START, 1, &new);
+    let new: Vec<_> = (0..2).map(|_| second.send(START, data(1, 0), b"", true).unwrap().1).collect();
+    base.take(START, 1, &new[0]);
+    assert_eq!(base.log.events, [Event::Heard { peer: 1 }], "one datagram alone is doubted");
+    base.take(START, 1, &new[1]);
     assert_eq!(base.log.events, [Event::Heard { peer: 1 }, Event::Restarted { peer: 1 }]);
     base.take(START + MS, 1, &old[1]);
-    base.take(START + MS, 1, &new);
-    assert_eq!(base.log.ids(), [0, 0], "nothing of the old life, nothing twice");
+    base.take(START + MS, 1, &new[1]);
+    assert_eq!(base.log.ids(), [0, 1], "nothing of the old life, nothing twice");
     let received = &base.stats.peer(1).received;
-    assert_eq!((received.restarts.get(), received.old.get(), received.copies.get()), (1, 1, 1));
+    assert_eq!((received.restarts.get(), received.old.get(), received.copies.get()), (1, 2, 1));
     assert_eq!(received.lost.get(), 1, "the first life's first, which only said that it is there");
 
     // A second router that goes on as the same node is noticed, and kept out.
@@ -90,17 +92,17 @@ fn a_life_that_was_taken_for_over_comes_back() {
     let mut base = End::new(0, |_| {});
     let lives = |incarnation| End::new(1, |settings| settings.incarnation = incarnation);
     let (mut dead, mut living) = (lives(11), lives(12));
-    let (_, late) = dead.send(START, data(1, 0), b"", true).unwrap();
+    let late: Vec<_> = (0..2).map(|_| dead.send(START, data(1, 0), b"", true).unwrap().1).collect();
     let all: Vec<_> = (0..4).map(|_| living.send(START, data(1, 0), b"", true).unwrap().1).collect();
-    // We have just begun, and a datagram of the dead one comes after one of the living.
+    // We have just begun, and datagrams of the dead one come after one of the living.
     base.take(START, 1, &all[1]);
-    base.take(START, 1, &late);
+    late.iter().for_each(|late| base.take(START, 1, late));
     base.take(START + S - 1, 1, &all[2]);
-    assert_eq!(base.log.ids(), [1, 0]);
+    assert_eq!(base.log.ids(), [1, 1]);
     base.take(START + S, 1, &all[3]);
     base.take(START + S, 1, &all[0]);
     base.take(START + S, 1, &all[1]);
-    assert_eq!(base.log.ids(), [1, 0, 3], "and nothing that may have been delivered");
+    assert_eq!(base.log.ids(), [1, 1, 3], "and nothing that may have been delivered");
     base.assert_balanced();
 }
 
@@ -110,9 +112,9 @@ fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
     let lives = |incarnation| End::new(1, |settings| settings.incarnation = incarnation);
     let (mut first, mut second) = (lives(11), lives(12));
     let old: Vec<_> = (0..5).map(|_| first.send(START, data(1, 0), b"", true).unwrap().1).collect();
-    let new: Vec<_> = (0..2).map(|_| second.send(START, data(1, 0), b"", true).unwrap().1).collect();
+    let new: Vec<_> = (0..3).map(|_| second.send(START, data(1, 0), b"", true).unwrap().1).collect();
     old[1..4].iter().for_each(|datagram| base.take(START, 1, datagram));
-    base.take(START, 1, &new[0]);
+    new[..2].iter().for_each(|datagram| base.take(START, 1, datagram));
     let before = base.log.delivered.len();
     // The second life is silent, and the wire or a stranger has kept what the first one sent.
     let now_ns = START + 3 * S;
@@ -121,11 +123,11 @@ fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
     let received = &stats.peer(1).received;
     assert_eq!(
         (base.log.delivered.len(), received.old.get(), received.restarts.get()),
-        (before, 4, 1),
+        (before, 5, 1),
         "nothing twice"
     );
     assert!(!base.log.events.contains(&Event::Twice { peer: 1 }), "that router may have ended");
-    base.take(now_ns, 1, &new[1]);
+    base.take(now_ns, 1, &new[2]);
     assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 1, 1), "the second life goes on");
     base.take(now_ns + S, 1, &old[4]);
     assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 2, 2), "what goes on is no copy");
@@ -204,4 +206,78 @@ pub(super) fn check_socket() {
 #[test]
 fn what_waited_in_the_socket_is_not_delivered() {
     check_socket();
+}
+
+/// What a router of node 1 could have sent to node 0.
+fn forged(incarnation: u64, sequence: u64) -> Vec<u8> {
+    let said = Alive { heard_incarnation: 100, ..Alive::default() }.to_bytes();
+    let head = FrameHead { kind: Kind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation, sequence };
+    [&head.to_bytes(&[&said])[..], &said].concat()
+}
+
+/// It sends as fast as it is asked to.
+pub(super) fn quick(settings: &mut Settings) {
+    settings.network.rate_bytes_s = 1 << 40;
+}
+
+const LAST: u64 = (1 << 48) - 1;
+
+pub(super) fn check_jump() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, quick));
+    let mut send = || arm.send(START, data(1, 0), b"", true).unwrap().1;
+    (0..3).for_each(|_| base.take(START, 1, &send()));
+    // A copy of it says nothing more; nor does another one that is far from it.
+    [LAST, LAST, LAST / 2, 5000].iter().for_each(|sequence| base.take(START, 1, &forged(101, *sequence)));
+    base.take(START, 1, &send());
+    assert_eq!(base.log.delivered.len(), 4);
+    let stats = base.stats.clone();
+    let received = &stats.peer(1).received;
+    assert_eq!((received.missing(), received.old.get(), received.copies.get()), (0, 4, 0));
+    // Who was not reached for long is far ahead, and says so again.
+    (0..2 * WINDOW).for_each(|_| drop(send()));
+    (0..2).for_each(|_| base.take(START, 1, &send()));
+    assert_eq!((base.log.delivered.len(), received.old.get()), (5, 5));
+    base.assert_balanced();
+}
+
+#[test]
+fn one_datagram_that_is_far_ahead_changes_nothing() {
+    check_jump();
+}
+
+pub(super) fn check_forged_lives() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, quick));
+    let mut send = || arm.send(START, data(1, 0), b"", true).unwrap().1;
+    base.take(START, 1, &send());
+    for life in 0..1000 {
+        let now_ns = START + life * MS;
+        base.take(now_ns, 1, &forged(1000 + life, life % 7));
+        base.take(now_ns, 1, &send());
+    }
+    assert_eq!(base.log.delivered.len(), 1001, "nobody is taken for over");
+    assert_eq!(base.log.events, [Event::Heard { peer: 1 }]);
+    // Where each says so twice, one line comes in five seconds.
+    for life in 0..1000 {
+        (0..2).for_each(|sequence| base.take(START + 2 * S + life * 10 * MS, 1, &forged(5000 + life, sequence)));
+    }
+    assert_eq!(base.log.events[1..], [Event::Restarted { peer: 1 }; 2]);
+    assert_eq!(base.stats.peer(1).received.restarts.get(), 1000);
+}
+
+#[test]
+fn lives_that_one_datagram_each_tells_of_change_nothing() {
+    check_forged_lives();
+}
+
+#[test]
+fn the_first_datagram_that_is_heard_may_be_a_forged_one() {
+    for incarnation in [101, 9] {
+        let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
+        base.take(START, 1, &forged(incarnation, LAST));
+        for _ in 0..4 {
+            base.take(START, 1, &arm.send(START, data(1, 0), b"", true).unwrap().1);
+        }
+        assert_eq!(base.log.ids(), [1, 2, 3], "of its life or another: the second true one is believed");
+        assert_eq!(base.stats.peer(1).received.old.get(), 1);
+    }
 }

@@ -18,10 +18,17 @@ pub(crate) const CHECKS: &[fn()] = &[
     check_floor,
     lives::check_silence,
     lives::check_restart,
+    lives::check_jump,
+    lives::check_forged_lives,
+    check_whole,
     lives::check_one_way,
     lives::check_socket,
     refusals::check_digest,
     refusals::check_damaged,
+    names::check_names,
+    names::check_routers,
+    names::check_priority,
+    names::check_priority_of_parts,
 ];
 
 fn check_window() {
@@ -115,6 +122,35 @@ fn a_full_table_costs_packages_but_not_the_order() {
     check_floor();
 }
 
+/// A large package, then packages of so many flows besides, then its last part.
+fn check_whole() {
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, lives::quick));
+    let large = head(module(50, 0), module(200, 1), 90);
+    arm.queue(START, large, &[1; 4000]);
+    let parts: Vec<_> = arm.leave(START).into_iter().map(|(_, part)| part).collect();
+    let (last, others) = parts.split_last().unwrap();
+    others.iter().for_each(|part| base.take(START, 1, part));
+    for flow in 0..900 {
+        let other = head(module(50, 0).with_local(2 + (flow % 250) as u8), module(100, 1), (flow / 250) as u8);
+        base.take(START, 1, &arm.send(START, other, b"", true).unwrap().1);
+    }
+    base.take(START, 1, last);
+    assert_eq!(base.log.delivered.len(), 901, "nothing of its flow was delivered after it began");
+    // And where something was, it is late, though it is long forgotten what.
+    arm.queue(START, large, &[2; 4000]);
+    let parts: Vec<_> = arm.leave(START).into_iter().map(|(_, part)| part).collect();
+    base.take(START, 1, &parts[0]);
+    base.take(START, 1, &arm.send(START, large, b"newer", true).unwrap().1);
+    parts[1..].iter().for_each(|part| base.take(START, 1, part));
+    assert_eq!(base.log.causes(), [crate::stats::Cause::Late]);
+    base.assert_balanced();
+}
+
+#[test]
+fn a_package_in_parts_is_late_only_if_something_newer_of_its_flow_went_before_it() {
+    check_whole();
+}
+
 proptest! {
     #[test]
     fn a_window_does_what_a_set_does(
@@ -152,4 +188,27 @@ proptest! {
             }
         }
     }
+}
+
+/// Of two routers that claim one node, the one that is heard at the port of what is real time is heard at the other, too.
+#[test]
+fn who_lives_is_found_out_at_the_port_of_what_is_real_time() {
+    let mut end = End::new(0, |_| {});
+    let rest = Stats::of_rest(&end.settings, &end.stats);
+    let mut inbound = Inbound::new(&end.settings, rest.clone());
+    let mut hear = |end: &mut End, incarnation, sequence| {
+        let digest = end.settings.digest;
+        let head =
+            FrameHead { kind: crate::frame::Kind::Alive, system: 1, from: 1, to: 0, digest, incarnation, sequence };
+        let (told, before) = ([0; 24], rest.peer(1).received.datagrams.get());
+        let bytes = [&head.to_bytes(&[&told])[..], &told].concat();
+        let datagram = Datagram { source: crate::harness::address(1), arrived_ns: START, bytes: &bytes };
+        inbound.handle(START, &datagram, &mut end.log);
+        rest.peer(1).received.datagrams.get() > before
+    };
+    assert!(hear(&mut end, 5, 0), "nobody is known yet");
+    end.stats.peer(1).link.incarnation.set(6);
+    assert!(!hear(&mut end, 5, 1), "another was heard there");
+    assert!(hear(&mut end, 6, 0));
+    assert_eq!(rest.peer(1).received.old.get(), 1);
 }

@@ -1,13 +1,14 @@
 //! Whose names come from whom, and who may command whom.
 
-use crate::access::Access;
-use crate::frame::{FrameHead, Kind};
+use crate::admission::{Access, Admission, PACKET, v4};
+use crate::frame::{Fragment, FrameHead, Kind};
 use crate::harness::{End, START, address, head, module};
 use crate::inbound::Came;
 use crate::link::State;
 use crate::stats::Cause;
-use rohrpost_config::{self as config, Security};
-use rohrpost_mailbox::{Class, Head, Name, Type};
+use rohrpost_config::{self as config, Security, Tunnel};
+use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
+use std::net::Ipv4Addr;
 
 /// A datagram of node 1 with one package: its head, and what follows.
 fn datagram(sequence: u64, package: &Head) -> (FrameHead, Vec<u8>) {
@@ -31,6 +32,10 @@ fn causes(end: &mut End, packages: &[Head]) -> Vec<Option<Cause>> {
 
 #[test]
 fn a_node_speaks_for_its_own_names_alone() {
+    check_names();
+}
+
+pub(super) fn check_names() {
     let mut end = End::new(0, |settings| settings.network.security = Security::Keys);
     let of = |from: Name| head(module(200, 0), from, 60);
     let foreign = Some(Cause::ForeignName);
@@ -44,12 +49,92 @@ fn only_classes_that_are_listed_may_command_from_another_node() {
     let rule = config::Access { class: Class(200), callers: vec![Class(60)], line: 7 };
     let mut end = End::new(0, |settings| {
         settings.network.security = Security::Keys;
-        settings.access = Access::new(&[rule]);
+        settings.admission.access = Access::new(&[rule]);
     });
     let command = |to, from| Head { kind: Type::command(16), ..head(module(to, 0), module(from, 1), 60) };
-    let data = head(module(200, 0), module(61, 1), 60);
+    let data = head(module(200, 0).with_local(local::DATA), module(61, 1), 60);
     let packages = [command(200, 60), command(200, 61), command(199, 61), data];
     assert_eq!(causes(&mut end, &packages), [None, Some(Cause::NotAllowed), None, None]);
+}
+
+/// Of node 0, with a tunnel: routers are of class 250.
+fn guarded() -> End {
+    End::new(0, |settings| {
+        let tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
+        settings.network.security = Security::Keys;
+        settings.admission = Admission { router: Some(Class(250)), tunnel: Some((tunnel, 0)), ..Admission::default() };
+    })
+}
+
+#[test]
+fn a_routers_own_mailboxes_take_nothing_but_packets_of_the_tunnel() {
+    check_routers();
+}
+
+pub(super) fn check_routers() {
+    let mut end = guarded();
+    let router = |node, local| module(250, node).with_local(local);
+    let packet = Head { kind: PACKET, ..head(router(0, 4), router(1, 4), 0) };
+    let (own, bad) = (Some(Cause::RoutersOwn), Some(Cause::BadPacket));
+    let packages = [
+        head(router(0, 3), module(60, 1), 60),
+        head(router(0, 4), module(60, 1), 60),
+        head(module(60, 0), router(1, 3), 60),
+        packet,
+        Head { kind: Type::command(4), ..head(router(0, 0), module(60, 1), 60) },
+    ];
+    assert_eq!(causes(&mut end, &packages), [own, own, own, bad, None]);
+    let (addresses, mut end) = ([2, 1].map(|last| Ipv4Addr::new(10, 78, 0, last)), guarded());
+    let body = v4(addresses[0], addresses[1], b"ping");
+    let (head, mut text) = datagram(0, &Head { len: body.len() as u16, ..packet });
+    text.extend_from_slice(&body);
+    let came = Came { source: address(1), arrived_ns: START, bytes: 68 };
+    end.inbound.handle_opened(START, &came, (&head, &text, 0), &mut end.log);
+    assert_eq!((end.log.delivered.len(), end.log.causes()), (1, vec![]));
+    end.assert_balanced();
+}
+
+#[test]
+fn no_package_of_another_node_hurries_more_than_it_may() {
+    check_priority();
+}
+
+pub(super) fn check_priority() {
+    let mut end = End::new(0, |_| {});
+    let of = |kind, from, to| Head { kind, ..head(module(to, 0).with_local(local::DATA), module(from, 1), 255) };
+    let (command, reply, data) = (Type::command(16), Type::reply(16), Type::data(1));
+    let packages = [
+        of(command, 60, 200),
+        of(reply, 200, 60),
+        of(reply, 60, 200),
+        of(data, 60, 200),
+        of(data, 200, 60),
+        of(data, 9, 8),
+    ];
+    assert_eq!(causes(&mut end, &packages), [None; 6]);
+    let delivered: Vec<u8> = end.log.delivered.iter().map(|(_, head, _)| head.priority.0).collect();
+    assert_eq!(delivered, [60, 60, 200, 200, 200, 9]);
+    assert_eq!(end.stats.inn.class(Priority(255)).packages.get(), 0, "and it is counted as what it is");
+}
+
+#[test]
+fn nor_does_one_that_comes_in_parts() {
+    check_priority_of_parts();
+}
+
+pub(super) fn check_priority_of_parts() {
+    let mut end = End::new(0, |_| {});
+    let package = Head { len: 4, ..head(module(90, 0).with_local(local::DATA), module(60, 1), 255) };
+    for (index, bytes) in [(0, b"ab"), (1, b"cd")] {
+        let part = Fragment { first: 0, index, count: 2, offset: 2 * u32::from(index), head: package, bytes };
+        let head = FrameHead { kind: Kind::Fragment, sequence: index.into(), ..datagram(0, &package).0 };
+        let text = [&part.head_bytes()[..], bytes].concat();
+        let came = Came { source: address(1), arrived_ns: START, bytes: 68 };
+        end.inbound.handle_opened(START, &came, (&head, &text, 0), &mut end.log);
+        end.assert_balanced();
+    }
+    let delivered: Vec<u8> = end.log.delivered.iter().map(|(_, head, _)| head.priority.0).collect();
+    assert_eq!(delivered, [90]);
 }
 
 #[test]

@@ -74,7 +74,8 @@ fn a_datagram_that_is_held_for_another_slot_is_measured_with_its_later_time() {
     });
     end.queue(START, to(1, 90), b"made in one slot");
     let mut datagram = [0; 1472];
-    let mut make = |end: &mut End, now_ns| end.outbound.poll_slot(now_ns, 1472, &mut datagram, &mut end.log).unwrap();
+    let mut make =
+        |end: &mut End, now_ns| end.outbound.poll_slot(now_ns, (1472, &mut datagram), None, &mut end.log).unwrap();
     make(&mut end, START + MS);
     // It missed the end. Until the next slot others come, and what waits is looked through.
     end.queue(START + 2 * MS, to(1, 90), b"came meanwhile");

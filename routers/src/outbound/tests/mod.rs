@@ -1,4 +1,5 @@
 use super::*;
+use crate::broken::{Broken, with};
 use crate::frame::{Alive, Frame};
 use crate::harness::{ENVELOPE, End, MS, S, START, head, module};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
@@ -14,12 +15,13 @@ pub(crate) const CHECKS: &[fn()] = &[
     check_what_does_not_go,
     check_pace,
     check_advance,
-    check_commands_do_not_hurry,
+    check_packages_do_not_hurry,
     check_order_on_the_wire,
     check_waiting_too_long,
     slot::check_strict_order,
     slot::check_room,
     slot::check_company,
+    slot::check_company_behind,
 ];
 
 /// The packages of a datagram, by their ids; a part stands for its package.
@@ -208,15 +210,15 @@ fn what_waits_too_long_is_dropped() {
     check_waiting_too_long();
 }
 
-fn check_commands_do_not_hurry() {
+fn check_packages_do_not_hurry() {
     let mut end = End::new(0, |_| {});
     for (kind, priority, leaves) in [
         (Type::command(16), 250, 100),
         (Type::command(16), 40, 40),
-        (Type::reply(16), 250, 250),
-        (Type::data(1), 250, 250),
+        (Type::reply(16), 250, 50),
+        (Type::data(1), 250, 100),
     ] {
-        let head = Head { kind, ..head(module(50, 1), module(100, 0), priority) };
+        let head = Head { kind, ..head(module(50, 1).with_local(1), module(100, 0), priority) };
         let (_, datagram) = end.send(START, head, b"", true).unwrap();
         let Frame::Packages(mut packages) = Frame::parse(&datagram).unwrap().1 else { panic!() };
         assert_eq!(packages.next().unwrap().0.priority.0, leaves, "{kind:?}");
@@ -224,8 +226,8 @@ fn check_commands_do_not_hurry() {
 }
 
 #[test]
-fn a_command_is_no_more_urgent_than_its_sender() {
-    check_commands_do_not_hurry();
+fn a_package_is_no_more_urgent_than_its_sender_or_who_asked_for_it() {
+    check_packages_do_not_hurry();
 }
 
 fn check_pace() {
@@ -394,4 +396,59 @@ proptest! {
         prop_assert_eq!((end.stats.waiting_in_all(), end.stats.waiting_bytes.get()), (0, 0));
         end.assert_balanced();
     }
+}
+
+#[test]
+fn a_way_without_room_is_passed_over() {
+    check_one_way_without_room();
+    let broken = || with(Broken::WaitsForOne, check_one_way_without_room);
+    assert!(std::panic::catch_unwind(broken).is_err(), "a mistake is noticed");
+}
+
+/// What is for the one waits, in its order; what is for the other leaves meanwhile, also at once, and it is told that we are there.
+fn check_one_way_without_room() {
+    let mut end = End::new(0, |_| {});
+    end.hears(1, START);
+    end.hears(2, START);
+    end.outbound.pass_over(0b10);
+    end.queue(START, to(1, 200), b"for the one");
+    assert_eq!(end.send(START, to(1, 200), b"and another", true), None, "it does not leave at once either");
+    end.queue(START, to(2, 90), b"for the other");
+    let left = sent(&mut end, START + MS);
+    assert_eq!(left.iter().map(|(to, _)| *to).collect::<Vec<_>>(), [2], "although the other is more important");
+    let alive: Vec<_> = end.leave(START + ALIVE_EVERY_NS + 2 * MS).into_iter().map(|(to, _)| to).collect();
+    assert_eq!(alive, [2], "it is told that we are there");
+    end.hears(1, START + ALIVE_EVERY_NS);
+    end.outbound.pass_over(0);
+    let left = sent(&mut end, START + ALIVE_EVERY_NS + 3 * MS);
+    assert_eq!(left.iter().map(|(to, _)| *to).collect::<Vec<_>>(), [1]);
+    assert_eq!(left[0].1.len(), 2, "both, in one datagram");
+    end.assert_balanced();
+}
+
+#[test]
+fn what_is_not_real_time_leaves_at_the_rate_that_is_left() {
+    let slow = |settings: &mut Settings| settings.network.rate_bytes_s = 1_000_000;
+    let (mut first, mut rest) = (End::new(0, slow), End::new(0, slow));
+    rest.outbound = Outbound::new(&rest.settings, rest.stats.clone()).behind(&first.stats);
+    for end in [&mut first, &mut rest] {
+        end.hears(1, START);
+    }
+    // Each sends what it can for 100 ms.
+    let mut bytes = [0; 2];
+    for now_ns in (0..1000).map(|step| START + 10 * MS + step * MS / 10) {
+        for (end, bytes) in [&mut first, &mut rest].into_iter().zip(&mut bytes) {
+            let heads = end.settings.overhead_bytes();
+            let mut count = |datagram: &[u8]| *bytes += datagram.len() + heads;
+            while end.stats.waiting_in_all() < 3 {
+                let at_once = end.send(now_ns, to(1, 90), &[0; 1000], false);
+                at_once.iter().for_each(|(_, datagram)| count(datagram));
+            }
+            while let Ok((_, datagram)) = end.poll(now_ns) {
+                count(&datagram);
+            }
+        }
+    }
+    assert!(bytes[0] > 90_000, "what is real time is not held up: {bytes:?}");
+    assert!(bytes[0] + bytes[1] < 110_000, "and both do not leave faster than the rate: {bytes:?}");
 }

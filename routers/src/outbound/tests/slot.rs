@@ -8,6 +8,7 @@ use crate::outbound::{DIRECT_HEAD_BYTES, WAIT_MAX_NS};
 use crate::settings::Settings;
 use crate::stats::Cause;
 use rohrpost_config::{Tdma, TimeSlot};
+use rohrpost_mailbox::Priority;
 use std::time::Duration;
 
 /// Slots of node 0 of these lengths, µs, on a wire of 100 Mbit/s.
@@ -37,10 +38,22 @@ fn in_slots(lengths_us: &'static [u64]) -> End {
 
 impl End {
     /// What leaves in a slot in which each datagram may have so many bytes, and all together so many.
-    fn slot(&mut self, now_ns: u64, mut room_bytes: usize) -> Vec<(NodeIndex, Vec<u8>)> {
+    fn slot(&mut self, now_ns: u64, room_bytes: usize) -> Vec<(NodeIndex, Vec<u8>)> {
+        self.slot_before(now_ns, room_bytes, None)
+    }
+
+    /// The same while the first in the mailbox is as important as this.
+    fn slot_before(
+        &mut self,
+        now_ns: u64,
+        mut room_bytes: usize,
+        behind: Option<Priority>,
+    ) -> Vec<(NodeIndex, Vec<u8>)> {
         let mut all = Vec::new();
         let mut datagram = vec![0; self.settings.network.datagram_bytes_max];
-        while let Some((to, bytes)) = self.outbound.poll_slot(now_ns, room_bytes, &mut datagram, &mut self.log) {
+        while let Some((to, bytes)) =
+            self.outbound.poll_slot(now_ns, (room_bytes, &mut datagram), behind, &mut self.log)
+        {
             assert!(bytes <= room_bytes, "{bytes} B in {room_bytes} B");
             all.push((to, datagram[..bytes].to_vec()));
             room_bytes -= bytes;
@@ -108,6 +121,23 @@ pub(super) fn check_company() {
 #[test]
 fn company_is_no_less_important_than_what_waits_for_others() {
     check_company();
+}
+
+pub(super) fn check_company_behind() {
+    let mut end = in_slots(&[1000]);
+    for priority in [200, 90, 88, 40] {
+        end.queue(START, to(1, priority), b"small");
+    }
+    let all = end.slot_before(START, 1472, Some(Priority(90)));
+    let ids: Vec<_> = all.iter().map(|(_, datagram)| ids(datagram)).filter(|ids| !ids.is_empty()).collect();
+    // What is of the level of the first in the mailbox goes along; the rest is asked for again when that was taken.
+    assert_eq!(ids, [vec![0, 1, 2], vec![3]]);
+    end.assert_balanced();
+}
+
+#[test]
+fn company_is_no_less_important_than_what_waits_in_the_mailbox() {
+    check_company_behind();
 }
 
 #[test]

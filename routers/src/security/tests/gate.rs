@@ -1,12 +1,12 @@
 //! The gate asks as often as it must, and no more often.
 
 use super::*;
-use crate::frame::BadFrame;
+use crate::frame::{BadFrame, Reason};
 use crate::harness::{End, MS, S, START, address};
 use crate::inbound::Came;
 use crate::inbound::TICK_EVERY_NS;
 use crate::link::State;
-use crate::report::Event;
+use crate::report::{Event, Mismatch};
 use rohrpost_config::Security;
 
 struct Router {
@@ -25,7 +25,11 @@ impl Router {
             settings.network.security = Security::Keys;
             settings.digest = digest;
         });
-        let all = Acquaintances::new(Who::of(&end.settings), ring(&[1]));
+        Self::with_keys(end, ring(&[1]), own)
+    }
+
+    fn with_keys(end: End, keys: KeyRing, own: u8) -> Self {
+        let all = Acquaintances::new(Who::of(&end.settings), keys);
         Self { gate: Gate::new(&all, [own; 32]), all, end }
     }
 
@@ -162,6 +166,52 @@ fn who_sends_what_others_said_from_an_address_of_a_third_parts_nobody_from_it() 
     assert_eq!(b.all.rejections(Port::Packages).of(Some(2), Rejection::Address), 1);
     b.take(START, 0, &recorded);
     assert!(matches!(state(&b, 0), State::Refused(_)), "from its own, it may have another configuration");
+}
+
+/// Anybody can write a peer's address on a datagram that nobody can open.
+pub(super) fn check_a_cause_is_believed_of_the_silent_alone() {
+    let mut b = Router::new(1);
+    let keyed = |keys| Router::with_keys(End::new(0, |settings| settings.network.security = Security::Keys), keys, 0);
+    let (mut other_id, mut other_key) = (keyed(ring(&[2])), keyed(KeyRing::new(key_of(1, [9; KEY_BYTES]), None)));
+    let (other_id, other_key) = (other_id.ask(START)[0].1.clone(), other_key.ask(START)[0].1.clone());
+    let mut version = other_id.clone();
+    version[2] = 2;
+    crate::frame::write_check(&mut version);
+    let unsealed = {
+        let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
+        let kind = Kind::Alive;
+        let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence: 0 };
+        [&head.to_bytes(&[&told])[..], &told].concat()
+    };
+    let state = |b: &Router, now_ns| b.end.stats.state(0, now_ns);
+    b.take(START, 0, &other_key);
+    assert_eq!(state(&b, START), State::Unknown, "it may be heard yet, and packages go to it");
+    let mut now_ns = START + 2 * S;
+    for (datagram, reason, wire) in [
+        (&other_id, Reason::Key, crate::frame::VERSION),
+        (&other_key, Reason::Key, crate::frame::VERSION),
+        (&version, Reason::Version, 2),
+        (&unsealed, Reason::Sealed, crate::frame::VERSION),
+    ] {
+        now_ns += 10 * S;
+        assert_eq!(state(&b, now_ns), State::Silent, "what was said is over");
+        b.take(now_ns, 0, datagram);
+        let mismatch = Mismatch { reason, version: wire, digest: None };
+        assert_eq!(state(&b, now_ns), State::Refused(mismatch));
+        assert_eq!(b.end.stats.state(2, now_ns), State::Silent, "of the others nothing is said");
+    }
+    // With the right key it is heard, and what seems to come from it beside that changes nothing.
+    let mut a = Router::new(0);
+    acquaint_at(now_ns, &mut a, &mut b);
+    b.take(now_ns, 0, &sealed_alive(&mut Sealing::new(&a.all, Port::Packages), 0));
+    assert_eq!(state(&b, now_ns), State::Alive);
+    b.take(now_ns, 0, &other_key);
+    assert_eq!(state(&b, now_ns), State::Alive);
+}
+
+#[test]
+fn a_cause_is_believed_of_the_silent_alone() {
+    check_a_cause_is_believed_of_the_silent_alone();
 }
 
 #[test]

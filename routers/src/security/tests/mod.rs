@@ -37,9 +37,9 @@ pub(super) struct Router {
     pub(super) all: Arc<Acquaintances>,
     pub(super) greeter: Greeter,
     /// By port.
-    pub(super) sealing: [Sealing; 2],
-    pub(super) opening: [Opening; 2],
-    pub(super) next: [u64; 2],
+    pub(super) sealing: [Sealing; 3],
+    pub(super) opening: [Opening; 3],
+    pub(super) next: [u64; 3],
 }
 
 impl Router {
@@ -56,9 +56,9 @@ impl Router {
             own,
             incarnation,
             greeter: Greeter::new(&all, seed),
-            sealing: [Port::Packages, Port::Time].map(|port| Sealing::new(&all, port)),
-            opening: [Port::Packages, Port::Time].map(|port| Opening::new(&all, port)),
-            next: [0; 2],
+            sealing: Port::ALL.map(|port| Sealing::new(&all, port)),
+            opening: Port::ALL.map(|port| Opening::new(&all, port)),
+            next: [0; 3],
             all,
         }
     }
@@ -135,8 +135,9 @@ pub(super) fn checked(mut datagram: Vec<u8>) -> Vec<u8> {
 
 #[test]
 fn mistakes_are_noticed() {
-    let checks: [(Broken, fn()); 2] = [
+    let checks: [(Broken, fn()); 3] = [
         (Broken::OpensTwice, sealed::check_each_opens_once),
+        (Broken::BelievesUnopened, gate::check_a_cause_is_believed_of_the_silent_alone),
         (Broken::BeginsUnproven, acquaintance::check_only_who_lives_begins),
     ];
     for (broken, check) in checks {

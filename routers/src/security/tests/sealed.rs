@@ -68,7 +68,9 @@ fn what_is_for_another_node_port_or_life_does_not_open() {
     let mut readdressed = for_b.clone();
     readdressed[6] = 2;
     assert_eq!(c.open(Port::Packages, &checked(readdressed)), rejected(Rejection::Forged));
-    assert_eq!(b.open(Port::Time, &for_b), rejected(Rejection::Forged), "at the other port");
+    for port in [Port::Time, Port::Rest] {
+        assert_eq!(b.open(port, &for_b), rejected(Rejection::Forged), "at another port");
+    }
     let mut later = Router::new(1, 201);
     acquaint(&mut a, &mut later);
     assert_eq!(later.open(Port::Packages, &for_b), rejected(Rejection::Replay), "said before this life was known");
@@ -102,7 +104,7 @@ fn no_two_derived_keys_are_the_same() {
     let mut seen = BTreeSet::new();
     let mut number = 0;
     for place in [0, 1] {
-        for purpose in [Purpose::Hello, Purpose::Packages, Purpose::Time] {
+        for purpose in [Purpose::Hello, Purpose::Packages, Purpose::Time, Purpose::Rest] {
             for (system, from, from_life, to, to_life) in [
                 (1, 0, 5, 1, 6),
                 (2, 0, 5, 1, 6),
@@ -153,4 +155,35 @@ fn what_could_not_be_sent_can_be_read_again_whoever_lives_by_then() {
     acquaint(&mut Router::new(1, 201), &mut a);
     a.sealing[0].reopen(&mut datagram);
     assert_eq!(&datagram[HEAD_BYTES..][..9], b"a package");
+}
+
+/// At the port of what is not real time no hello says what comes first; still nothing is opened twice, also when a life begins again, and when
+/// another was taken for its successor meanwhile.
+#[test]
+fn what_is_not_real_time_opens_once_however_often_its_life_begins() {
+    let (mut a, mut b) = pair();
+    let seal = |a: &mut Router| a.seal(Port::Rest, 1, b"text").unwrap();
+    let early = seal(&mut a);
+    let datagrams: Vec<_> = (0..5).map(|_| seal(&mut a)).collect();
+    for datagram in &datagrams {
+        assert!(b.open(Port::Rest, datagram).is_ok());
+    }
+    assert_eq!(b.opening[Port::Rest as usize].first(0), 1, "what it sent before is not missed");
+    assert!(b.open(Port::Rest, &early).is_ok(), "it was overtaken");
+    let again = |a: &mut Router, b: &mut Router, why: &str| {
+        for datagram in datagrams.iter().chain([&early]) {
+            assert_eq!(b.open(Port::Rest, datagram), Err(Rejection::Replay.into()), "{why}");
+        }
+        let next = a.seal(Port::Rest, 1, b"text").unwrap();
+        assert!(b.open(Port::Rest, &next).is_ok(), "{why}");
+    };
+    again(&mut a, &mut b, "the same life");
+    acquaint(&mut a, &mut b);
+    again(&mut a, &mut b, "it is greeted again");
+    let mut other = Router::new(0, 101);
+    acquaint(&mut other, &mut b);
+    let of_other = other.seal(Port::Rest, 1, b"text").unwrap();
+    assert!(b.open(Port::Rest, &of_other).is_ok());
+    acquaint(&mut a, &mut b);
+    again(&mut a, &mut b, "another was taken for its successor");
 }

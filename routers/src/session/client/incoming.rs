@@ -2,6 +2,7 @@
 
 use super::asking::Asking;
 use super::{Client, Event, Host, Package, REGISTER_AGAIN_NS, Registration, State, Told};
+use crate::admission::{Refused, Way, capped};
 use crate::broken::broken;
 use crate::session::counts::Cause;
 use crate::session::frame::{BadFrame, Carried, LENGTH_MAX, Message, Reason, Refusal, VERSION, Verdict, Welcome};
@@ -75,26 +76,40 @@ impl Client {
     }
 
     fn take(&mut self, now_ns: u64, carried: &Carried<'_>, host: &mut impl Host) {
-        self.inn.came(carried.head.priority);
+        let head = if broken!(AdmitsHurry) { carried.head } else { capped(&carried.head) };
+        let carried = Carried { head, ..*carried };
+        self.inn.came(head.priority);
         let Some(session) = self.session(now_ns) else { return };
         // As old as it may be at most: a command that came too late must not be run.
         let oldest_ns = session.ns.saturating_add(session.error_ns).saturating_sub(carried.published_ns);
         let shift = i128::from(now_ns) - i128::from(session.ns);
         let published_ns = u64::try_from(i128::from(carried.published_ns) + shift).unwrap_or(0).min(now_ns);
-        let delivered = if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) {
-            Err(Cause::Stale)
-        } else {
-            host.deliver(&Carried { published_ns, ..*carried }).map_err(Cause::from)
+        let delivered = match self.judge(&carried, host) {
+            Err(cause) => Err(cause),
+            Ok(()) if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) => Err(Cause::Stale),
+            Ok(()) => host.deliver(&Carried { published_ns, ..carried }).map_err(Cause::from),
         };
         match delivered {
-            Ok(()) => self.inn.passed(carried.head.priority),
+            Ok(()) => self.inn.passed(head.priority),
             Err(cause) => {
-                self.inn.lost(carried.head.priority, cause);
-                if let Some((head, body)) = answer_to(&carried.head, carried.body, cause, None, host) {
+                self.inn.lost(head.priority, cause);
+                if let Some((head, body)) = answer_to(&head, carried.body, cause, None, host) {
                     self.send(now_ns, &Package { head, body: &body, published_ns: now_ns, hops: 0 }, host);
                 }
             }
         }
+    }
+
+    fn judge(&self, carried: &Carried<'_>, host: &mut impl Host) -> Result<(), Cause> {
+        let (head, admission) = (&carried.head, &self.settings.admission);
+        // The server knows who hosts a name, and brings nothing back to who sent it.
+        let is_our_name = self.ranges.iter().any(|range| range.has(head.from));
+        admission.judge(Way::Beyond { is_our_name }, head, carried.body).map_err(|why| {
+            if why == Refused::NotAllowed {
+                host.not_allowed(admission.access.line(head.to.class()));
+            }
+            why.into()
+        })
     }
 
     fn refused(&mut self, now_ns: u64, refusal: &Refusal<'_>, host: &mut impl Host) {

@@ -19,6 +19,7 @@ use super::outgoing::Outgoing;
 use super::reckoning::{Bounded, Reckoning};
 use super::splitter::Splitter;
 use super::{Answers, GREETING_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
+use crate::admission::Admission;
 use crate::broken::broken;
 use crate::report::NotDelivered;
 use asking::Asking;
@@ -53,6 +54,8 @@ pub struct ClientSettings {
     pub quota_bytes: usize,
     /// Level of each priority; 0 goes first.
     pub levels: [u8; 256],
+    /// What is admitted of what the server brings.
+    pub admission: Admission,
 }
 
 /// A package that is to go to the server.
@@ -106,6 +109,9 @@ pub trait Host: Answers {
     /// # Errors
     /// [`NotDelivered`]
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered>;
+
+    /// A command that came is not allowed, by the rule in this line of the configuration; its answer is asked for next.
+    fn not_allowed(&mut self, _line: Option<usize>) {}
 
     /// Something happened.
     fn event(&mut self, event: Event<'_>);
@@ -252,6 +258,11 @@ impl Client {
     /// System time as the server has it, with what the way adds to its bound.
     pub fn system_time(&self, now_ns: u64) -> Option<TimeRecord> {
         self.reckoning.system(now_ns)
+    }
+
+    /// What was heard of the server's clocks does not count any more: this computer slept, or its clock is slewed.
+    pub fn forget_time(&mut self) {
+        self.reckoning.forget();
     }
 
     /// How many answers the server gave about its clocks in this life of it.

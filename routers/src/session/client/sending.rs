@@ -1,18 +1,20 @@
 //! What goes to the server: packages, questions for the time, and what becomes of each.
 
 use super::{Client, Host, Package, Registration, State};
+use crate::admission::capped;
+use crate::queue::Share;
 use crate::report::NotDelivered;
+use crate::session::WAIT_MAX_NS;
 use crate::session::counts::Cause;
 use crate::session::frame::{Carried, Message, Ranges};
 use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
-use crate::session::{WAIT_MAX_NS, without_hurry};
 use rohrpost_mailbox::{Name, Priority};
 
 impl Client {
     /// A package is to go to the server.
     pub fn send(&mut self, now_ns: u64, package: &Package<'_>, host: &mut impl Host) {
-        let head = without_hurry(&package.head);
+        let head = capped(&package.head);
         self.out.came(head.priority);
         let is_long_down = !self.is_up() && now_ns.saturating_sub(self.down_ns) > WAIT_MAX_NS;
         let lost = is_long_down.then_some(Cause::Offline);
@@ -23,7 +25,9 @@ impl Client {
             Some(cause) => ledger.lost(&head, package.body, cause),
             None => {
                 let Package { body, published_ns, hops, .. } = *package;
-                outgoing.accept(shift_ns, &Parcel { head: &head, body, published_ns, hops, level }, ledger);
+                // Of the node's modules each has its part of memory. Which goes first is for their importance to say.
+                let share = Share { sender: head.from.with_local(0).raw(), party: 0 };
+                outgoing.accept(shift_ns, &Parcel { head: &head, body, published_ns, hops, level, share }, ledger);
             }
         });
     }

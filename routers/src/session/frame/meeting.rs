@@ -209,8 +209,14 @@ impl std::fmt::Display for Refusal<'_> {
                 "the system's digest here is {yours:016x}, that of {text} {ours:016x}; start all of a system from the same file \
                  (`rohrpost check`, on both)"
             ),
-            Reason::Full => write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some"),
-            Reason::Replaced => write!(f, "a later connection of this client has taken its place"),
+            Reason::Full if text.is_empty() => {
+                write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some")
+            }
+            Reason::Full => {
+                write!(f, "the TCP router has as many clients as it takes, and {text}; raise `clients`, or end some")
+            }
+            Reason::Replaced if text.is_empty() => write!(f, "a later connection of this client has taken its place"),
+            Reason::Replaced => write!(f, "another client has taken its place: {text}"),
             Reason::Damaged => write!(f, "the TCP router could not read what came: {text}"),
             Reason::Silent => write!(f, "the TCP router heard nothing for too long"),
             Reason::Stalled => write!(f, "nothing was read here for too long"),

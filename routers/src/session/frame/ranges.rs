@@ -101,13 +101,14 @@ impl ExactSizeIterator for Ranges<'_> {}
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
 pub enum Objection {
-    /// Another client hosts the same.
+    /// Another client hosts the same, or what it lies in.
     Taken = 1,
-    /// It has names in common with another range, and neither lies in the other.
+    /// It has names in common with what another client hosts, and does not lie in it; or crosses another range of its
+    /// own.
     Crosses = 2,
-    /// Not of the client's system, or the first behind the last, or not of its node, if the server knows what that hosts.
+    /// Not of the client's system, or the first behind the last, or given to another node by the server's file.
     NotOwn = 3,
-    /// The server has no room for more ranges.
+    /// The server has no room for more ranges, or not of this principal.
     TooMany = 4,
 }
 
@@ -155,13 +156,16 @@ impl std::fmt::Display for Verdict<'_> {
                 write!(f, "{range} is hosted by {holder}; end it, or give one of both another name")
             }
             Some(Objection::Crosses) => {
-                write!(f, "{range} crosses what {holder} hosts; ranges lie in each other or have no name in common")
+                write!(f, "{range} has names in common with what {holder} hosts; register none of those, or end it")
             }
             Some(Objection::NotOwn) => write!(
                 f,
-                "{range} is no range of names of this client's system, or of its node, if the file of the TCP router has that"
+                "{range} is no range of names of this client's system, or of its node, if the file of the TCP router has that; start it from that \
+                 file, or take other names"
             ),
-            Some(Objection::TooMany) => write!(f, "the TCP router has no room for more ranges; register wider ones"),
+            Some(Objection::TooMany) => {
+                write!(f, "the TCP router has no room for more ranges from here; register wider ones")
+            }
         }
     }
 }

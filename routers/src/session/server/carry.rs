@@ -2,18 +2,20 @@
 
 use super::member::{Asked, Member, RoundTrip};
 use super::{Host, Server};
+use crate::admission::capped;
 use crate::broken::broken;
+use crate::queue::Share;
 use crate::session::counts::Cause;
 use crate::session::frame::{Carried, HOPS_MAX, Message, Refusal, TimeAnswer, VERSION, Verdict, Welcome};
 use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Outgoing, Parcel, is_stale};
-use crate::session::{ClientIndex, answer_to, in_system, without_hurry};
+use crate::session::{ClientIndex, answer_to, in_system};
 use rohrpost_mailbox::{ALL_SYSTEMS, ERROR_UNKNOWN_NS, Head, TimeRecord};
 
 impl Server {
     /// Hands a package of a client on.
     pub(super) fn carry(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
-        let head = without_hurry(&carried.head);
+        let head = capped(&carried.head);
         // Who does not know when, or says in the future, has published it now.
         let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
         let hops = if broken!(KeepsHops) { carried.hops } else { carried.hops.saturating_add(1) };
@@ -40,7 +42,7 @@ impl Server {
         match to {
             Some(to) => {
                 self.counts.came(carried.head.priority);
-                self.hand_over(now_ns, to, carried, host);
+                self.hand_over(now_ns, from, to, carried, host);
             }
             None => self.lose(now_ns, carried, Cause::NoRoute, host),
         }
@@ -64,7 +66,7 @@ impl Server {
             }
             self.counts.came(carried.head.priority);
             let copy = Carried { head: Head { to, ..carried.head }, ..*carried };
-            self.hand_over(now_ns, client, &copy, host);
+            self.hand_over(now_ns, from, client, &copy, host);
         }
         if !is_reached {
             self.lose(now_ns, carried, Cause::NoRoute, host);
@@ -79,13 +81,23 @@ impl Server {
         self.say_all(now_ns, answer.into_iter().collect(), host);
     }
 
-    fn hand_over(&mut self, now_ns: u64, to: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+    /// `from`: whose part of the queue it takes up.
+    fn hand_over(
+        &mut self,
+        now_ns: u64,
+        from: ClientIndex,
+        to: ClientIndex,
+        carried: &Carried<'_>,
+        host: &mut impl Host,
+    ) {
+        let share = self.member(from).map(|member| Share { sender: member.principal_id, party: member.party });
+        let share = share.unwrap_or_default();
         let level = self.settings.levels[usize::from(carried.head.priority.0)];
         // Behind a stream that stands still all waits in the queue, where the most important goes first.
         let shift_ns = self.member(to).filter(|member| !member.is_blocked).map(|_| 0);
         self.with_ledger(now_ns, to, host, |outgoing, ledger| {
             let Carried { hops, published_ns, ref head, body } = *carried;
-            outgoing.accept(shift_ns, &Parcel { head, body, published_ns, hops, level }, ledger);
+            outgoing.accept(shift_ns, &Parcel { head, body, published_ns, hops, level, share }, ledger);
         });
         self.is_due(to);
     }
@@ -123,7 +135,7 @@ impl Server {
     ) {
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return };
         let Member { outgoing, name, .. } = &mut **member;
-        let mut ledger = Ledger::new(&self.counts, &mut *host, Some(name));
+        let mut ledger = Ledger::new(&self.counts, &mut *host, Some(name)).by_principal(&mut self.places.principals);
         work(outgoing, &mut ledger);
         let answers = ledger.into_answers();
         self.say_all(now_ns, answers, host);
@@ -136,7 +148,8 @@ impl Server {
             match self.table.client_of(head.to) {
                 Some(to) => {
                     self.counts.came(head.priority);
-                    self.hand_over(now_ns, to, &carried, host);
+                    // Whoever sent the command has brought it about.
+                    self.hand_over(now_ns, to, to, &carried, host);
                 }
                 None => self.lose(now_ns, &carried, Cause::NoRoute, host),
             }

@@ -77,18 +77,17 @@ impl Server {
         if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
             return self.refuse(now_ns, client, reason, digests, &holder, host);
         }
-        let same = self.present().find(|(_, member)| member.is_member() && member.life == hello.life);
-        if let Some((older, attempt)) = same.map(|(index, member)| (index, member.attempt)) {
+        let older = self.places.of_life(hello.life);
+        if let Some((older, attempt)) = older.and_then(|older| Some((older, self.member(older)?.attempt))) {
             if attempt >= hello.attempt {
                 return self.refuse(now_ns, client, Reason::Replaced, (0, 0), "", host);
             }
             self.refuse(now_ns, older, Reason::Replaced, (0, 0), "", host);
         }
-        if self.present().filter(|(_, member)| member.is_member()).count() >= self.settings.clients_max.into() {
+        if !self.take_in(now_ns, client, hello, host) {
             return self.refuse(now_ns, client, Reason::Full, (0, 0), "", host);
         }
-        if let Some(member) = self.member_mut(client) {
-            member.joins(now_ns, hello);
+        if let Some(member) = self.member(client) {
             host.event(Event::Joined { name: &member.name });
         }
         self.is_due(client);
@@ -102,8 +101,8 @@ impl Server {
         }
         let own = settings.system.filter(|(system, _)| *system == hello.system);
         let own = own.map(|(_, digest)| (settings.name.as_str(), digest));
-        let first = || self.present().find(|(_, member)| member.is_member() && member.system == hello.system);
-        let held = own.or_else(|| first().map(|(_, member)| (member.name.as_str(), member.system_digest)));
+        let first = || self.places.of_system(hello.system).and_then(|first| self.member(first));
+        let held = own.or_else(|| first().map(|member| (member.name.as_str(), member.system_digest)));
         let (holder, digest) = held.filter(|(_, digest)| *digest != hello.system_digest)?;
         (!broken!(TakesOtherSystems)).then(|| Difference {
             reason: Reason::System,
@@ -127,10 +126,13 @@ impl Server {
         text: &str,
         host: &mut impl Host,
     ) {
-        let Some(member) = self.member(client) else { return };
+        let Some(Some(member)) = self.members.get(usize::from(client.0)) else { return };
         match member.state {
             State::Leaving { .. } => return,
-            State::Greeting => host.event(Event::Refused { name: &member.name, reason, digests, text }),
+            State::Greeting => {
+                self.places.greets_no_more(client, member);
+                host.event(Event::Refused { name: &member.name, reason, digests, text });
+            }
             State::Member => self.leave(now_ns, client, Some(reason), host),
         }
         let Some(member) = self.member_mut(client) else { return };

@@ -1,6 +1,7 @@
 //! What time alone brings about: who is silent, stands still or takes too long; and what waited in vain.
 
 use super::member::{Member, State};
+use super::registering::WORK_SHARE;
 use super::{Event, Host, Server};
 use crate::broken::broken;
 use crate::session::counts::Cause;
@@ -32,15 +33,22 @@ impl Server {
                 self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.look(now_ns, Cause::Stale, ledger));
             }
         }
+        self.places.principals.look(now_ns, WORK_SHARE);
         self.look_at_registrations(now_ns, host);
     }
 
     /// A member is none any more: nobody else waits for it from now on.
     pub(super) fn leave(&mut self, now_ns: u64, client: ClientIndex, why: Option<Reason>, host: &mut impl Host) {
-        let Some(member) = self.member(client).filter(|member| member.is_member()) else { return };
+        let member = self.members.get(usize::from(client.0)).and_then(Option::as_deref);
+        let Some(member) = member.filter(|member| member.is_member()) else { return };
         host.event(Event::Left { name: &member.name, why });
-        if member.registrations.ranges > 0 && !broken!(KeepsNames) {
+        self.places.leaves(now_ns, client, member);
+        let (principal, ranges) = (member.principal_id, member.registrations.ranges);
+        if ranges > 0 && !broken!(KeepsNames) {
             self.table.remove(client);
+        }
+        if let Some(uses) = self.places.principals.uses_mut(principal) {
+            uses.ranges = uses.ranges.saturating_sub(ranges);
         }
         if !broken!(ForgetsGone) {
             self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));

@@ -1,10 +1,11 @@
 //! One connection, as the server knows it.
 
+use super::principal::{Principal, PrincipalId};
 use super::registering::Registrations;
-use crate::session::frame::{Hello, Range, Reason, Verdict};
+use super::rights::Rights;
+use crate::session::frame::{Hello, Reason, Verdict};
 use crate::session::outgoing::Outgoing;
 use crate::session::splitter::Splitter;
-use std::sync::Arc;
 
 /// How far a connection has come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -65,8 +66,19 @@ pub(super) struct Member {
     pub(super) system: u8,
     /// The system that it has proven to be of; none: it need not.
     pub(super) certified: Option<u8>,
-    /// It may host names in these alone; none: any of its system.
-    pub(super) may_host: Option<Arc<[Range]>>,
+    /// It has shown no certificate, says that it is a node of the file, and comes from where the file says that is.
+    pub(super) is_at_home: bool,
+    /// Which names of its system it may host.
+    pub(super) rights: Rights,
+    /// Where it comes from.
+    pub(super) address: Principal,
+    /// Whose it is: that, or its certificate's.
+    pub(super) principal: Principal,
+    /// The same by its number, as long as it takes part.
+    pub(super) principal_id: PrincipalId,
+    /// With whom it takes turns on lines: the nodes of a system, which trust each other, are one party, and anybody
+    /// else is one by itself.
+    pub(super) party: u32,
     pub(super) system_digest: u64,
     pub(super) reaches_own: bool,
     pub(super) life: u64,
@@ -91,13 +103,18 @@ pub(super) struct Member {
 }
 
 impl Member {
-    pub(super) fn new(now_ns: u64, peer: &str, quota_bytes: usize) -> Self {
+    pub(super) fn new(now_ns: u64, name: String, address: Principal, quota_bytes: usize) -> Self {
         Self {
             state: State::Greeting,
-            name: peer.to_owned(),
+            name,
             system: 0,
             certified: None,
-            may_host: None,
+            is_at_home: false,
+            rights: Rights::any(),
+            principal: address.clone(),
+            address,
+            principal_id: 0,
+            party: 0,
             system_digest: 0,
             reaches_own: false,
             life: 0,

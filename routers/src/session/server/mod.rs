@@ -7,23 +7,31 @@
 //! ```
 
 mod carry;
+mod crowd;
 mod intake;
 mod look;
 mod member;
+mod places;
+mod principal;
 mod registering;
+mod rights;
 
 pub use member::State;
+pub use places::Crowded;
+pub(super) use principal::Principals;
+pub use rights::{Names, OwnNode, OwnNodes, Rights};
 
 use super::ClientIndex;
 use super::counts::Counts;
-use super::frame::{Range, Reason, Verdict};
+use super::frame::{Reason, Verdict};
 use super::table::Table;
 use super::{Answers, LOOK_EVERY_NS};
 use member::{Member, RoundTrip};
+use places::Places;
+use principal::Principal;
 use registering::Registering;
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 /// What the server knows before the first client.
 #[derive(Clone, Debug)]
@@ -34,6 +42,9 @@ pub struct ServerSettings {
     pub common: u64,
     /// Its own system, and the digest of what must be equal inside it. Of other systems the first client says it.
     pub system: Option<(u8, u64)>,
+    /// What the file gives the nodes of that. A client that has shown a certificate has [other
+    /// rights](Server::certify).
+    pub own_nodes: OwnNodes,
     /// Tells this life from others; not 0.
     pub life: u64,
     /// Clients that may take part at a time.
@@ -63,6 +74,9 @@ pub struct View<'a> {
     pub began_ns: u64,
     /// When something came last, ns.
     pub heard_ns: u64,
+    /// Packages of it, or of others that connect as the same principal, that were lost since it had more in a queue
+    /// than its share.
+    pub lost: u64,
     /// Bytes of memory that it takes up; what all share is not counted.
     pub bytes: usize,
 }
@@ -127,6 +141,7 @@ pub trait Host: Answers {
 pub struct Server {
     settings: ServerSettings,
     members: Vec<Option<Box<Member>>>,
+    places: Places,
     table: Table,
     counts: Counts,
     /// Clients for which something is to be done.
@@ -143,6 +158,7 @@ impl Server {
         Self {
             settings,
             members: Vec::new(),
+            places: Places::default(),
             table: Table::default(),
             counts: Counts::default(),
             due: VecDeque::new(),
@@ -168,6 +184,11 @@ impl Server {
         self.registering.overtaken
     }
 
+    /// How often somebody had more of something than its share.
+    pub fn crowded(&self) -> Crowded {
+        self.places.crowded
+    }
+
     /// System time, as answers tell it from now on.
     pub fn set_time(&mut self, time: Option<TimeRecord>) {
         self.time = time;
@@ -188,6 +209,7 @@ impl Server {
             ranges: member.registrations.ranges,
             began_ns: member.began_ns,
             heard_ns: member.heard_ns,
+            lost: self.places.principals.uses(member.principal_id).map_or(0, |uses| uses.lost),
             bytes: member.bytes(),
         })
     }
@@ -210,35 +232,14 @@ impl Server {
         self.present().map(|(_, member)| member.outgoing.waiting()).sum()
     }
 
-    /// A connection was made. `peer` is for people. None: so many are there that it must be closed.
-    pub fn accept(&mut self, now_ns: u64, peer: &str, host: &mut impl Host) -> Option<ClientIndex> {
-        let is_greeting = |member: &&Member| member.state == State::Greeting;
-        let greetings = self.present().map(|(_, member)| member).filter(is_greeting).count();
-        if greetings >= self.settings.greetings_max.into() {
-            let oldest =
-                self.present().filter(|(_, member)| is_greeting(member)).min_by_key(|(_, member)| member.began_ns);
-            let oldest = oldest.map(|(index, _)| index)?;
-            self.refuse(now_ns, oldest, Reason::Silent, (0, 0), "others wait to be let in", host);
-        }
-        let index = match self.members.iter().position(Option::is_none) {
-            Some(free) => free,
-            None if self.members.len() < self.places_max() => {
-                self.members.push(None);
-                self.members.len() - 1
-            }
-            None => return None,
-        };
-        self.members[index] = Some(Box::new(Member::new(now_ns, peer, self.settings.quota_bytes)));
-        Some(ClientIndex(index as u16))
-    }
-
-    /// A client has proven, before its hello, of which system it is, and what people call it: it may say no other in its hello. If it is known which names
-    /// it hosts it may register no others.
-    pub fn certify(&mut self, client: ClientIndex, system: u8, name: &str, may_host: Option<Arc<[Range]>>) {
+    /// A client has proven, before its hello, of which system it is, and what people call it: it may say no other in
+    /// its hello, and all that shows the same is one principal. `rights`: which names of that system it may host.
+    pub fn certify(&mut self, client: ClientIndex, system: u8, name: &str, rights: Rights) {
         if let Some(member) = self.member_mut(client) {
             name.clone_into(&mut member.name);
             member.certified = Some(system);
-            member.may_host = may_host;
+            member.principal = Principal::Certificate(name.to_owned());
+            member.rights = rights;
         }
     }
 
@@ -325,10 +326,6 @@ impl Server {
         Output::Wait { until_ns: self.look_ns }
     }
 
-    fn places_max(&self) -> usize {
-        usize::from(self.settings.clients_max) + usize::from(self.settings.greetings_max)
-    }
-
     fn present(&self) -> impl Iterator<Item = (ClientIndex, &Member)> {
         let all = self.members.iter().enumerate();
         all.filter_map(|(index, member)| member.as_deref().map(|member| (ClientIndex(index as u16), member)))
@@ -346,14 +343,6 @@ impl Server {
         if let Some(member) = self.member_mut(client).filter(|member| !member.is_due) {
             member.is_due = true;
             self.due.push_back(client);
-        }
-    }
-
-    /// The place is free; whoever comes into it is another.
-    fn free(&mut self, client: ClientIndex) {
-        if let Some(place) = self.members.get_mut(usize::from(client.0)) {
-            *place = None;
-            self.due.retain(|due| *due != client);
         }
     }
 }

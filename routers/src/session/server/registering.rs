@@ -1,13 +1,14 @@
-//! Registrations: of each client the last one, and of all together no more than leaves the others their time.
+//! Registrations: of each client the last one, of each principal a share of the work, and of all together no more than
+//! leaves the others their time.
 //!
 //! ```text
-//!  register ─┬─ its turn, and work is left ──────────▶ Table ─▶ verdict
+//!  register ─┬─ its turn, and work is left for it ───▶ Table ─▶ verdict
 //!            └─ else it waits; a later one takes its place ──▲ at each look, in turn
 //! ```
 
 use super::{Event, Host, Server};
 use crate::broken::broken;
-use crate::session::frame::{Range, Ranges, Verdict};
+use crate::session::frame::{Objection, RANGES_MAX, Range, Ranges, Reason, Verdict};
 use crate::session::server::member::{Judged, Member};
 use crate::session::table::ENTRIES_MAX;
 use crate::session::{ClientIndex, LOOK_EVERY_NS};
@@ -15,8 +16,16 @@ use rohrpost_mailbox::Name;
 
 /// Of one client's registrations one is looked at in so long.
 const REGISTER_EVERY_NS: u64 = LOOK_EVERY_NS;
-/// Ranges that registrations may go through from one look to the next; each goes through those of all clients.
-const WORK_MAX: usize = 2 * ENTRIES_MAX;
+/// Ranges that registrations may bring and replace from one look to the next: a fifth of the thread's time.
+const WORK_MAX: usize = ENTRIES_MAX;
+/// Of these, for one principal: others have their turn beside it.
+pub(super) const WORK_SHARE: usize = WORK_MAX / 8;
+/// What a registration costs besides its ranges, in ranges.
+const WORK_OF_ONE: usize = 16;
+/// Ranges that one principal may have in the table.
+pub(super) const RANGES_SHARE: usize = ENTRIES_MAX / 8;
+const _: () = assert!(2 * RANGES_MAX + WORK_OF_ONE <= WORK_SHARE, "each registration has its turn some time");
+const _: () = assert!(RANGES_MAX <= RANGES_SHARE, "a client that is alone in its share has as many as it may say");
 
 /// What registering costs all others, and what was spared them.
 #[derive(Debug)]
@@ -63,19 +72,17 @@ impl Server {
         let waiting = |member: &Member| {
             let waiting = member.registrations.waiting.as_ref();
             let has = |waiting: &Waiting| waiting.ranges.iter().any(|range| range.has(name));
-            let may = member.may_host.as_deref().is_none_or(|may| may.iter().any(|range| range.has(name)));
-            may && name.system() == member.system && waiting.is_some_and(has)
+            name.system() == member.system && member.rights.may_host(name) && waiting.is_some_and(has)
         };
         self.member(client).is_some_and(waiting) && self.table.client_of(name).is_none()
     }
 
     /// A client says what it hosts from now on.
     pub(super) fn register(&mut self, now_ns: u64, client: ClientIndex, ranges: Ranges<'_>, host: &mut impl Host) {
-        let work = self.work_of(ranges.len());
-        let left = self.registering.left;
+        let is_left = self.is_left(client, ranges.len());
         let Some(member) = self.member_mut(client) else { return };
         let of_client = &mut member.registrations;
-        let is_its_turn = now_ns >= of_client.next_ns && of_client.waiting.is_none() && work <= left;
+        let is_its_turn = now_ns >= of_client.next_ns && of_client.waiting.is_none() && is_left;
         if is_its_turn || broken!(RegistersAtOnce) {
             return self.judge(now_ns, client, ranges.number, ranges, host);
         }
@@ -98,9 +105,12 @@ impl Server {
             let Some(count) = member.registrations.waiting.as_ref().map(|waiting| waiting.ranges.len()) else {
                 continue;
             };
-            if self.work_of(count) > self.registering.left {
+            if self.work_of(client, count) > self.registering.left {
                 self.registering.first = index;
                 return;
+            }
+            if !self.is_left(client, count) {
+                continue;
             }
             let waiting = self.member_mut(client).and_then(|member| member.registrations.waiting.take());
             if let Some(Waiting { number, ranges }) = waiting {
@@ -109,8 +119,24 @@ impl Server {
         }
     }
 
-    fn work_of(&self, ranges: usize) -> usize {
-        self.table.len() + ranges
+    /// Work on a registration, in ranges.
+    fn work_of(&self, client: ClientIndex, ranges: usize) -> usize {
+        ranges + self.table.count_of(client) + WORK_OF_ONE
+    }
+
+    /// Whether so much work is left before the next look, for all and for this client's principal.
+    fn is_left(&self, client: ClientIndex, ranges: usize) -> bool {
+        let principal = self.member(client).and_then(|member| self.places.principals.uses(member.principal_id));
+        let left = principal.map_or(0, |uses| uses.work_left);
+        self.work_of(client, ranges) <= self.registering.left.min(left)
+    }
+
+    /// A holder of names that gives way: both say that they are nodes of the file, and the other alone comes from where
+    /// the file says it is.
+    fn impostor(&self, client: ClientIndex, holder: ClientIndex) -> Option<ClientIndex> {
+        let is_known = |index| self.member(index).is_some_and(|member| member.certified.is_some() || member.is_at_home);
+        let comes_home = self.member(client).is_some_and(|member| member.is_at_home);
+        (comes_home && !is_known(holder) && client != holder).then_some(holder)
     }
 
     fn judge(
@@ -122,23 +148,37 @@ impl Server {
         host: &mut impl Host,
     ) {
         let Some(member) = self.member(client).filter(|member| member.is_member()) else { return };
-        let (system, may_host) = (member.system, member.may_host.clone());
-        let count = ranges.len();
-        self.registering.left = self.registering.left.saturating_sub(self.work_of(count));
+        let (system, rights, principal) = (member.system, member.rights.clone(), member.principal_id);
+        let may = |range: &Range| range.first.system() == system && range.last.system() == system && rights.may(range);
+        let (before, work) = (self.table.count_of(client), self.work_of(client, ranges.len()));
+        let used = self.places.principals.uses(principal).map_or(0, |uses| uses.ranges);
+        let room = if broken!(FillsTable) { ENTRIES_MAX } else { (RANGES_SHARE + before).saturating_sub(used) };
+        let ranges: Vec<Range> = ranges.collect();
+        let mut conflict = self.table.register(client, room, may, ranges.iter().copied()).err();
+        while let Some(impostor) = conflict.and_then(|conflict| self.impostor(client, conflict.holder?)) {
+            let text = "the node of that name has come, from its own address";
+            self.refuse(now_ns, impostor, Reason::Replaced, (0, 0), text, host);
+            conflict = self.table.register(client, room, may, ranges.iter().copied()).err();
+        }
+        let count = self.table.count_of(client);
+        self.registering.left = self.registering.left.saturating_sub(work);
+        if let Some(uses) = self.places.principals.uses_mut(principal) {
+            uses.work_left = uses.work_left.saturating_sub(work);
+            uses.ranges = (uses.ranges + count).saturating_sub(before);
+        }
         let nothing = Range { first: Name::NONE, last: Name::NONE };
         let mut verdict = Verdict { number, objection: None, range: nothing, holder: "" };
         let mut holder = String::new();
-        let conflict = self.table.register(client, (system, may_host.as_deref()), ranges).err();
         if let Some(conflict) = &conflict {
             verdict = Verdict { objection: Some(conflict.objection), range: conflict.range, ..verdict };
             let held_by = conflict.holder.and_then(|holder| self.member(holder));
             holder = held_by.map(|member| member.name.clone()).unwrap_or_default();
+            self.places.crowded.ranges += u64::from(conflict.objection == Objection::TooMany);
         }
         if let Some(member) = self.member_mut(client) {
             member.registrations.next_ns = now_ns + REGISTER_EVERY_NS;
-            if conflict.is_none() {
-                member.registrations.ranges = count;
-            } else {
+            member.registrations.ranges = count;
+            if conflict.is_some() {
                 host.event(Event::Objected { name: &member.name, verdict: &Verdict { holder: &holder, ..verdict } });
             }
             member.judged = Some(Judged { verdict, holder });

@@ -1,10 +1,11 @@
 //! What is true, which neither end knows: every package with its fate, and what must hold of them.
 
+use super::plan::ROUTER;
 use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
 use crate::session::{AGE_MAX_NS, Answers, Cause, client, server};
 use crate::sim::chance::Chance;
-use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options};
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options, local};
 use std::collections::BTreeMap;
 
 /// What clocks of different pace make of two seconds.
@@ -46,6 +47,8 @@ pub(super) struct Book {
     pub(super) log: Vec<(u64, usize, usize)>,
     pub(super) problems: Vec<String>,
     pub(super) seen: BTreeMap<&'static str, u64>,
+    /// Whoever sends too much. What others send it must not cost anything.
+    pub(super) flooder: Option<usize>,
 }
 
 impl Book {
@@ -91,6 +94,7 @@ impl Book {
         };
         check(is_unchanged, "changed");
         check(!package.is_forged, "in the name of another");
+        check(head.to.class() != ROUTER || head.to.local() < local::TRANSIT, "to a router's own mailbox");
         check(!package.said_lost, "was said to be lost");
         check(age_ns <= AGE_MAX_NS + SLACK_NS, "too old");
         check(self.clients[to].ranges.iter().any(|range| range.has(head.to)), "does not host it");
@@ -127,6 +131,14 @@ impl Answers for Teller<'_> {
         self.book.saw(why.word());
         let package = &mut self.book.packages[number];
         // What goes to all systems each of them answers for itself.
+        let is_lack = matches!(why, Cause::Full | Cause::Share | Cause::Stale);
+        if is_lack && self.book.flooder.is_some_and(|flooder| flooder != package.from) {
+            self.book.problems.push(format!(
+                "{number} of client {} is lost by another's flood: {}",
+                package.from,
+                why.word()
+            ));
+        }
         package.said_lost = package.head.to.system() != ALL_SYSTEMS;
         if package.said_lost && !package.delivered.is_empty() {
             self.book.broken(format!("{number} was delivered, and is said to be lost: {}", why.word()));

@@ -1,7 +1,7 @@
 //! Both ends by hand: what a table shows better than chance.
 
 use super::ground::Ground;
-use super::plan::{COMMON, QUOTA, client_settings, module, ranges};
+use super::plan::{COMMON, QUOTA, address, client_settings, module, ranges};
 use super::world::{MS, S};
 use crate::report::NotDelivered;
 use crate::session::client::{self, Package};
@@ -13,7 +13,7 @@ use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
 pub(super) const CHECKS: &[fn()] = &[
     check_digests,
     check_a_name_is_hosted_once,
-    check_the_narrowest_range,
+    check_who_hosts_the_name,
     check_hops,
     check_slow_greetings,
     check_silence,
@@ -63,31 +63,33 @@ fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
     check_a_name_is_hosted_once();
 }
 
-fn check_the_narrowest_range() {
+fn check_who_hosts_the_name() {
     let mut ground = Ground::clients(4);
-    let (narrow, wide) = (Name::new(1, 105, 0, 0), Name::new(1, 105, 1, 0));
-    ground.send(1, narrow, 0);
-    ground.send(1, wide, 0);
-    assert_eq!((ground.delivered(0), ground.delivered(3)), (vec![wide], vec![narrow]));
+    let (between, behind) = (Name::new(1, 105, 0, 0), Name::new(1, 106, 1, 0));
+    ground.send(1, between, 0);
+    ground.send(1, behind, 0);
+    assert_eq!((ground.delivered(0), ground.delivered(3)), (vec![behind], vec![between]));
     // What its host cannot deliver itself does not come back to it.
-    ground.send(0, wide, 0);
-    assert_eq!(ground.delivered(0), [wide]);
+    ground.send(0, behind, 0);
+    assert_eq!(ground.delivered(0), [behind]);
     assert_eq!(ground.said.lost, [Cause::NoRoute]);
     let (answer, _) = ground.ends[0].2.delivered.last().unwrap();
-    assert_eq!((answer.from, answer.to, answer.kind), (wide, module(0).with_local(1), Type::reply(16)));
+    assert_eq!((answer.from, answer.to, answer.kind), (behind, module(0).with_local(1), Type::reply(16)));
 }
 
 #[test]
-fn packages_go_to_who_hosts_the_narrowest_range_and_never_back() {
-    check_the_narrowest_range();
+fn packages_go_to_who_hosts_the_name_and_never_back() {
+    check_who_hosts_the_name();
 }
 
 fn check_hops() {
     let mut ground = Ground::clients(3);
     ground.send(0, module(1), 3);
     assert_eq!(ground.ends[1].2.delivered[0].1, 4, "one further");
+    ground.send(0, module(1), HOPS_MAX - 1);
+    assert_eq!(ground.ends[1].2.delivered[1].1, HOPS_MAX, "as far as it may go");
     ground.send(0, module(1), HOPS_MAX);
-    assert_eq!(ground.delivered(1).len(), 1);
+    assert_eq!(ground.delivered(1).len(), 2);
     assert_eq!(ground.said.lost, [Cause::Hops]);
 }
 
@@ -98,7 +100,7 @@ fn a_package_that_goes_round_is_stopped() {
 
 fn check_slow_greetings() {
     let mut ground = Ground::clients(1);
-    let slow = ground.server.accept(ground.now_ns, "slow", &mut ground.said).unwrap();
+    let slow = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said).unwrap();
     // Bytes come all the time, and never a whole hello.
     let mut waited_ns = 0;
     while ground.server.clients().any(|(index, _, _)| index == slow) {
@@ -115,7 +117,7 @@ fn check_slow_greetings() {
     }
     // Many of them do not keep others out: the oldest gives way.
     for _ in 0..20 {
-        let _ = ground.server.accept(ground.now_ns, "slow", &mut ground.said);
+        let _ = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said);
     }
     ground.settle();
     let greeting = ground.server.clients().filter(|(_, _, state)| *state == State::Greeting).count();
@@ -176,7 +178,7 @@ fn what_goes_to_all_systems_is_lost_where_its_own_node_hosts_the_name_and_nobody
         let class = ground.ends[0].0.out().class(Priority(60));
         (class.packages.get(), class.passed.get(), class.lost(Cause::NoMailbox))
     };
-    let (hosted, other, nobody) = (Name::new(1, 105, 0, 0), Name::new(1, 30, 0, 0), Err(NotDelivered::NoMailbox));
+    let (hosted, other, nobody) = (Name::new(1, 106, 0, 0), Name::new(1, 30, 0, 0), Err(NotDelivered::NoMailbox));
     ground.ends[0].0.reached_itself(other, Priority(60), nobody);
     assert_eq!(counts(&ground), (0, 0, 0), "another client hosts it, or nobody: the server counts that");
     ground.ends[0].0.reached_itself(hosted, Priority(60), nobody);
@@ -240,7 +242,7 @@ fn what_a_stranger_says_takes_no_memory_and_is_told_to_him() {
         (vec![8, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], "not for now"),
     ] {
         let mut ground = Ground::new([]);
-        let place = ground.server.accept(ground.now_ns, "stranger", &mut ground.said).unwrap();
+        let place = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said).unwrap();
         ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
         assert!(ground.said.events[0].contains(words), "{:?}", ground.said.events);
         assert!(ground.server.bytes_of(place) < 4096);
@@ -316,7 +318,7 @@ fn names_of_others_are_sent_by_nobody() {
 fn a_later_connection_of_the_same_life_takes_the_place_of_the_earlier() {
     let mut ground = Ground::clients(2);
     let old = ground.ends[0].1.unwrap();
-    let place = ground.server.accept(ground.now_ns, "again", &mut ground.said).unwrap();
+    let place = ground.server.accept(ground.now_ns, address(0, 2), &mut ground.said).unwrap();
     let hello = Hello {
         system: 1,
         reaches_own: true,

@@ -1,6 +1,6 @@
 //! A server and clients that are joined to it without delay, and what each of them was told.
 
-use super::plan::{client_settings, module, ranges, server_settings};
+use super::plan::{address, client_settings, module, ranges, server_settings};
 use super::world::S;
 use crate::report::NotDelivered;
 use crate::session::client::{self, Client, Package};
@@ -15,6 +15,8 @@ pub(super) struct Notes {
     pub(super) events: Vec<String>,
     pub(super) delivered: Vec<(Head, u8)>,
     pub(super) lost: Vec<Cause>,
+    /// Lines of the rules by which commands are not allowed.
+    pub(super) rules: Vec<Option<usize>>,
 }
 
 impl Answers for Notes {
@@ -29,6 +31,10 @@ impl client::Host for Notes {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
         self.delivered.push((carried.head, carried.hops));
         Ok(())
+    }
+
+    fn not_allowed(&mut self, line: Option<usize>) {
+        self.rules.push(line);
     }
 
     fn event(&mut self, event: client::Event<'_>) {
@@ -63,8 +69,15 @@ impl Ground {
         (clients_max, greetings_max): (u16, u16),
         clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
     ) -> Self {
+        Self::with(server::ServerSettings { clients_max, greetings_max, ..server_settings(5) }, clients)
+    }
+
+    pub(super) fn with(
+        settings: server::ServerSettings,
+        clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
+    ) -> Self {
         let now_ns = 100 * S;
-        let server = Server::new(server::ServerSettings { clients_max, greetings_max, ..server_settings(5) });
+        let server = Server::new(settings);
         let end = |(settings, ranges)| (Client::new(settings, ranges, now_ns), None, Notes::default());
         let mut ground = Self { now_ns, server, said: Notes::default(), ends: clients.into_iter().map(end).collect() };
         ground.settle();
@@ -78,11 +91,12 @@ impl Ground {
     /// Until nobody has anything to do.
     pub(super) fn settle(&mut self) {
         for _ in 0..20 {
-            for (client, place, notes) in &mut self.ends {
+            for (index, (client, place, notes)) in self.ends.iter_mut().enumerate() {
                 loop {
                     match client.poll(self.now_ns, notes) {
                         client::Output::Connect => {
-                            *place = self.server.accept(self.now_ns, "somewhere", &mut self.said);
+                            *place =
+                                self.server.accept(self.now_ns, address(index, client.connections()), &mut self.said);
                             client.connected(self.now_ns);
                         }
                         client::Output::Write => {

@@ -1,19 +1,23 @@
 //! Sessions in simulated networks, and the same with a mistake switched on: `ROHRPOST_SIM_SEEDS=1000` for more of them.
 
+mod admitted;
 mod book;
 mod ends;
 mod ground;
 mod newest;
 mod pipe;
 mod plan;
+mod registering;
+mod shares;
 mod strain;
 mod world;
 
 use crate::broken::{Broken, with};
+use crate::session::Cause;
 use crate::session::client::BACKOFF_MAX_NS;
 use ends::CHECKS;
 use plan::{Plan, module};
-use rohrpost_mailbox::{Head, Priority, Type};
+use rohrpost_mailbox::{ALL_SYSTEMS, Head, Priority, Type};
 use std::collections::BTreeMap;
 use world::{MS, S, World};
 
@@ -22,7 +26,8 @@ use world::{MS, S, World};
 const WELL_NS: u64 = 10 * S;
 const SEEDS: u64 = 30;
 /// What must have been seen in each ten networks.
-const SEEN_IN_TEN: [(&str, u64); 18] = [
+const SEEN_IN_TEN: [(&str, u64); 19] = [
+    ("routers-own", 50),
     ("delivered", 5000),
     ("to all", 300),
     ("answered", 300),
@@ -123,6 +128,29 @@ fn a_client_that_stands_still_changes_nothing_for_the_others() {
 }
 
 #[test]
+fn a_flood_of_one_client_costs_the_commands_of_others_nothing() {
+    check_flood();
+}
+
+fn check_flood() {
+    for seed in 0..4 {
+        let mut world = World::new(Plan::flooded(seed));
+        world.run(8 * S);
+        world.may_post = false;
+        world.run(3 * S);
+        assert_eq!(world.book.problems, [""; 0], "seed {seed}");
+        let flooder = world.plan.flooder.unwrap();
+        let lost = world.server.counts().lost_for(Cause::Full) + world.server.counts().lost_for(Cause::Share);
+        assert!(lost > 1000, "seed {seed}: {lost} lost of what was too much");
+        // What goes to all systems nobody says to be lost.
+        let is_one = |package: &&book::Posted| package.head.to.system() != ALL_SYSTEMS;
+        let mut others = world.book.packages.iter().filter(|package| package.from != flooder).filter(is_one);
+        assert!(others.clone().count() > 100);
+        assert!(others.all(|package| !package.delivered.is_empty() || package.said_lost), "seed {seed}");
+    }
+}
+
+#[test]
 fn who_finds_no_server_tries_ever_less_often() {
     check_backoff();
 }
@@ -159,13 +187,16 @@ fn check_slow_line() {
 #[test]
 fn every_mistake_is_noticed() {
     let mut missed = Vec::new();
-    for broken in Broken::SESSION {
+    let at_clients = [Broken::AdmitsHurry, Broken::AdmitsForeignNames, Broken::AdmitsRoutersOwn];
+    for broken in Broken::SESSION.into_iter().chain(at_clients) {
         let fails = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
         let by_check = CHECKS
             .iter()
             .chain(strain::CHECKS)
             .chain(newest::CHECKS)
-            .chain(&[check_backoff as fn(), check_slow_line])
+            .chain(admitted::CHECKS)
+            .chain(shares::CHECKS)
+            .chain(&[check_backoff as fn(), check_slow_line, check_flood, registering::check_growth])
             .any(fails);
         let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).book.problems.is_empty());
         let by_network = (!by_check).then(|| (0..SEEDS).find(breaks)).flatten();

@@ -2,6 +2,7 @@
 
 use super::plan::{QUOTA, module};
 use super::world::{MS, S};
+use crate::queue::Share;
 use crate::session::counts::Cause;
 use crate::session::frame::{FrameHead, HEAD_BYTES, LENGTH_MAX, Message};
 use crate::session::outgoing::{Fates, Outgoing, Parcel};
@@ -49,7 +50,8 @@ impl Stalled {
     fn send(&mut self, head: Head, value: u8, len: usize) {
         let head = Head { to: module(0), priority: Priority(60), len: len as u16, ..head };
         let body = vec![value; len];
-        let parcel = Parcel { head: &head, body: &body, published_ns: self.now_ns, hops: 0, level: 8 };
+        let parcel =
+            Parcel { head: &head, body: &body, published_ns: self.now_ns, hops: 0, level: 8, share: Share::default() };
         self.outgoing.accept(None, &parcel, &mut self.log);
     }
 

@@ -1,10 +1,12 @@
 //! What a seed decides: who takes part, with which clocks and lines, and what goes wrong.
 
+use crate::admission::Admission;
 use crate::session::client::ClientSettings;
 use crate::session::frame::Range;
-use crate::session::server::ServerSettings;
+use crate::session::server::{OwnNodes, ServerSettings};
 use crate::sim::chance::Chance;
-use rohrpost_mailbox::Name;
+use rohrpost_mailbox::{Class, Name};
+use std::net::SocketAddr;
 
 pub(super) const QUOTA: usize = 80 * 1024;
 pub(super) const COMMON: u64 = 7;
@@ -40,6 +42,9 @@ pub(super) struct Plan {
     pub(super) held_bytes: Option<usize>,
     /// Packages that all clients send together, a second.
     pub(super) per_s: u64,
+    /// This one sends what is urgent, more than the lines of all others carry. The others send commands, and their
+    /// lines hold little.
+    pub(super) flooder: Option<usize>,
 }
 
 impl Plan {
@@ -47,11 +52,22 @@ impl Plan {
         let mut chance = Chance::new(seed);
         let clients = chance.between(3, 7) as usize;
         let lines = (0..clients).map(|_| chance.scale(20, 100_000)).collect();
-        Self { seed, clients, calm: false, stalled: None, lines, held_bytes: None, per_s: chance.scale(100, 3000) }
+        let per_s = chance.scale(100, 3000);
+        Self { seed, clients, calm: false, stalled: None, lines, held_bytes: None, per_s, flooder: None }
     }
 
     pub(super) fn calm(seed: u64) -> Self {
         Self { calm: true, lines: vec![100_000; 7], per_s: 500, ..Self::rough(seed) }
+    }
+
+    /// One client floods all others, whose lines take some hundred kB a second.
+    pub(super) fn flooded(seed: u64) -> Self {
+        let mut chance = Chance::new(seed ^ 0xf10);
+        let plan = Self::calm(seed);
+        let flooder = chance.below(plan.clients as u64) as usize;
+        let line = |client: usize| if client == flooder { 100_000 } else { chance.scale(100, 1000) };
+        let lines = (0..plan.clients).map(line).collect();
+        Self { lines, per_s: 40, flooder: Some(flooder), ..plan }
     }
 
     /// The first client's line takes 64 kbit/s, and holds what a kernel does that knows of it.
@@ -59,6 +75,14 @@ impl Plan {
         let lines = vec![8, 100_000, 100_000];
         Self { clients: 3, lines, held_bytes: Some(8 * 1024), per_s: 30, ..Self::calm(seed) }
     }
+}
+
+/// Of what a client hosts, this class is one of routers.
+pub(super) const ROUTER: Class = Class(103);
+
+/// Where a client comes from, at its so many-th connection.
+pub(super) fn address(client: usize, connection: u64) -> SocketAddr {
+    ([10, 0, 0, client as u8], 1024 + connection as u16).into()
 }
 
 pub(super) fn system_of(client: usize) -> u8 {
@@ -75,17 +99,27 @@ pub(super) fn shared(system: u8) -> Name {
     Name::new(system, 40, 0, 0)
 }
 
+/// The module of a client that is the most urgent of all.
+pub(super) fn loud(client: usize) -> Name {
+    Name::new(system_of(client), 250, client as u8, 0)
+}
+
 pub(super) fn ranges(client: usize) -> Vec<Range> {
-    let mut ranges = vec![Range::module(module(client))];
+    let mut ranges = vec![Range::module(module(client)), Range::module(loud(client))];
     if client < 3 {
         ranges.push(Range::module(shared(system_of(client))));
     }
     match client {
-        0 => ranges.push(Range { first: Name::new(1, 100, 0, 0), last: Name::new(1, 110, 255, 255) }),
+        0 => ranges.extend([classes(100, 104), classes(106, 110)]),
         3 => ranges.push(Range::module(Name::new(1, 105, 0, 0))),
         _ => {}
     }
     ranges
+}
+
+/// All names of system 1 from one class to another.
+pub(super) fn classes(first: u8, last: u8) -> Range {
+    Range { first: Name::new(1, first, 0, 0), last: Name::new(1, last, 255, 255) }
 }
 
 pub(super) fn levels() -> [u8; 256] {
@@ -102,6 +136,7 @@ pub(super) fn client_settings(client: usize, life: u64) -> ClientSettings {
         life,
         quota_bytes: QUOTA,
         levels: levels(),
+        admission: Admission { router: Some(ROUTER), ..Admission::default() },
     }
 }
 
@@ -110,6 +145,7 @@ pub(super) fn server_settings(life: u64) -> ServerSettings {
         name: "the server".into(),
         common: COMMON,
         system: Some((1, 11)),
+        own_nodes: OwnNodes::default(),
         life,
         clients_max: 16,
         greetings_max: 4,

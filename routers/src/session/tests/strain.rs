@@ -5,19 +5,20 @@ use super::plan::{module, system_of};
 use super::world::{MS, S};
 use crate::session::client::{self, Package};
 use crate::session::frame::{Carried, FrameHead, HEAD_BYTES, Kind, LENGTH_MAX, Message, RANGES_MAX, Range, Ranges};
+use crate::session::server::Rights;
 use crate::session::{Cause, LOOK_EVERY_NS};
 use rohrpost_mailbox::{Head, Name};
 
 pub(super) const CHECKS: &[fn()] = &[check_many_registrations, check_a_cut_connection];
 
 /// As many ranges as a client may host.
-fn many(client: usize, first_class: u8) -> Vec<Range> {
+pub(super) fn many(client: usize, first_class: u8) -> Vec<Range> {
     let system = system_of(client);
     let name = |index: usize| Name::new(system, first_class + (index >> 8) as u8, index as u8, 0);
     (0..RANGES_MAX).map(|index| Range::module(name(index))).collect()
 }
 
-fn register(ground: &mut Ground, client: usize, number: u32, ranges: &[Range]) {
+pub(super) fn register(ground: &mut Ground, client: usize, number: u32, ranges: &[Range]) {
     let (mut laid_out, mut bytes) = (Vec::new(), Vec::new());
     Message::Register(Ranges::new(number, ranges, &mut laid_out)).write(&mut bytes);
     let place = ground.ends[client].1.unwrap();
@@ -61,10 +62,10 @@ fn clients_that_register_much_take_turns_and_each_has_its_own() {
     for client in 0..clients {
         let ranges: Vec<Range> = many(client, 0).into_iter().map(|range| own(client, range)).collect();
         for number in 0..3 {
-            register(&mut ground, client, number, &ranges[..1000]);
+            register(&mut ground, client, number, &ranges[..1090]);
         }
     }
-    let hosts = |ground: &Ground| ground.server.views().filter(|view| view.ranges == 1000).count();
+    let hosts = |ground: &Ground| ground.server.views().filter(|view| view.ranges == 1090).count();
     let at_once = hosts(&ground);
     assert!((1..clients).contains(&at_once), "{at_once} of {clients} had their turn at once");
     let mut looks = 0;
@@ -80,7 +81,8 @@ fn clients_that_register_much_take_turns_and_each_has_its_own() {
 fn send_behind_a_registration(from: Name, more: &[Range], may_host: Option<Vec<Range>>) -> Ground {
     let mut ground = Ground::clients(2);
     let place = ground.ends[0].1.unwrap();
-    ground.server.certify(place, system_of(0), "client 0", may_host.map(Into::into));
+    let rights = may_host.map_or_else(Rights::any, |ranges| Rights::only(ranges.into_iter().collect()));
+    ground.server.certify(place, system_of(0), "client 0", rights);
     // The first of these is looked at, so the second waits.
     register(&mut ground, 0, 7, &super::plan::ranges(0));
     let ranges: Vec<Range> = super::plan::ranges(0).into_iter().chain(more.iter().copied()).collect();
@@ -177,7 +179,7 @@ fn a_question_goes_behind_the_frame_that_has_begun_and_before_all_others() {
 }
 
 /// The same range among the names that only this client registers.
-fn own(client: usize, range: Range) -> Range {
+pub(super) fn own(client: usize, range: Range) -> Range {
     let turned = |name: Name| {
         let [system, class, instance, local] = name.raw().to_be_bytes();
         Name::new(system, (client / 3) as u8 * 8 + class + 1, instance, local)

@@ -1,11 +1,11 @@
 //! The monotonic clock, and the kernel's stamps by it.
 //!
-//! The kernel stamps frames by CLOCK_REALTIME. That is CLOCK_MONOTONIC and a difference, which changes only when somebody sets the
-//! clock: both are slewed alike. So the difference is bounded ever more narrowly by reading one clock between two readings of the other.
+//! The kernel stamps frames by CLOCK_REALTIME. That is the monotonic clock (CLOCK_BOOTTIME) and a difference, which changes only when somebody sets the
+//! clock: both are slewed alike, and both run on while the computer sleeps. So the difference is bounded ever more narrowly by reading one clock between two readings of the other.
 //! When a reading contradicts what was known, the clock was set, and stamps from before are not used.
 
-use crate::time::Stamp;
-use rohrpost_mailbox::{monotonic_ns, realtime_ns};
+use crate::time::{Looked, Stamp};
+use rohrpost_mailbox::{monotonic_ns, realtime_ns, slept_ns, unslewed_ns};
 
 /// The kernel computes both clocks from a counter, each rounded on its own.
 const ROUNDING_NS: i64 = 2;
@@ -44,7 +44,7 @@ impl Skew {
 #[derive(Debug)]
 pub(super) struct LocalClock {
     skew: Option<Skew>,
-    /// Between these lies CLOCK_REALTIME less CLOCK_MONOTONIC.
+    /// Between these lies CLOCK_REALTIME less the monotonic clock.
     low_ns: i64,
     high_ns: i64,
 }
@@ -57,6 +57,13 @@ impl LocalClock {
 
     pub(super) fn now_ns(&self) -> u64 {
         self.local_ns(monotonic_ns())
+    }
+
+    /// All clocks of this computer.
+    pub(super) fn looked(&self) -> Looked {
+        let looked = looked();
+        let [local_ns, unslewed_ns] = [looked.local_ns, looked.unslewed_ns].map(|ns| self.local_ns(ns));
+        Looked { local_ns, unslewed_ns, ..looked }
     }
 
     fn local_ns(&self, true_ns: u64) -> u64 {
@@ -83,6 +90,27 @@ impl LocalClock {
         let doubt_ns = (self.high_ns - middle_ns + ROUNDING_NS) as u32;
         (age_ns < RECENT_NS).then(|| Stamp { ns: self.local_ns(true_ns), doubt_ns, by_kernel: true })
     }
+}
+
+/// Two readings are compared if there was so little between them; if not, they are read again, so often.
+const NEAR_NS: u64 = 500;
+const READ_TRIES: usize = 3;
+
+/// The clocks of this computer, as near each other as they can be read.
+pub(crate) fn looked() -> Looked {
+    let read = || {
+        let before_ns = unslewed_ns();
+        let local_ns = monotonic_ns();
+        (unslewed_ns().saturating_sub(before_ns), before_ns, local_ns)
+    };
+    let mut best = read();
+    for _ in 1..READ_TRIES {
+        if best.0 > NEAR_NS {
+            best = best.min(read());
+        }
+    }
+    let (apart_ns, unslewed_ns, local_ns) = best;
+    Looked { local_ns, unslewed_ns, apart_ns, slept_ns: slept_ns() }
 }
 
 /// A stamp that is older was kept up somewhere, and with it the frame.

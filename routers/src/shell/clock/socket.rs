@@ -5,6 +5,7 @@
 
 use crate::frame::{FrameHead, NodeIndex};
 use crate::security::TAG_BYTES;
+use crate::shell::filter;
 use crate::time::{SentId, TIME_BYTES};
 use nix::errno::Errno;
 use nix::sys::socket::{
@@ -44,7 +45,7 @@ pub(super) struct Came {
 
 impl TimeSocket {
     /// Binds `own`; peers are reached at the port given with them.
-    pub(super) fn open(own: SocketAddr, peers: &[SocketAddr], kernel_stamps: bool) -> io::Result<Self> {
+    pub(super) fn open(own: SocketAddr, peers: &[SocketAddr], digest: u64, kernel_stamps: bool) -> io::Result<Self> {
         let socket = Socket::new(Domain::for_address(own), Type::DGRAM, Some(Protocol::UDP))?;
         if own.is_ipv6() {
             socket.set_only_v6(true)?;
@@ -60,6 +61,9 @@ impl TimeSocket {
             let _ = setsockopt(&socket, sockopt::Timestamping, &wanted);
         }
         socket.set_nonblocking(true)?;
+        let others: Vec<IpAddr> = peers.iter().filter(|peer| **peer != own).map(SocketAddr::ip).collect();
+        // Refused, all of it is read, and judged as before.
+        let _ = filter::take_time_only_from(&socket, &others, digest);
         socket.bind(&own.into())?;
         Ok(Self {
             socket: socket.into(),

@@ -15,8 +15,6 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
-/// So many datagrams are taken before what is due is sent.
-const BURST: usize = 64;
 /// A record that came too late is made anew, so often.
 const WRITE_TRIES: usize = 8;
 
@@ -43,6 +41,9 @@ pub(in crate::shell) struct Works {
     seals: Option<Seals>,
     state: Arc<ClockState>,
     snapshot: Snapshot,
+    system: u8,
+    /// Who says what time it is by another configuration, from an address that no node has.
+    refuse: Option<IpAddr>,
 }
 
 /// What seals and opens datagrams of time.
@@ -99,9 +100,10 @@ impl Works {
     /// Binds the socket. What an earlier life of this router wrote in the node's page goes on.
     pub(in crate::shell) fn new(parts: ClockParts) -> Result<Self, ClockError> {
         let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
-        let own = settings.own;
+        let (own, system) = (settings.own, settings.system);
         let at = nodes.get(usize::from(own)).copied().unwrap_or(SocketAddr::new(IpAddr::from([0; 16]), 0));
-        let socket = TimeSocket::open(at, &nodes, kernel_stamps).map_err(|error| ClockError::Socket(at, error))?;
+        let socket = TimeSocket::open(at, &nodes, settings.digest, kernel_stamps)
+            .map_err(|error| ClockError::Socket(at, error))?;
         let keeper = node.as_ref().map(TimeKeeper::resume).transpose()?;
         let page = keeper.as_ref().and_then(TimeKeeper::record);
         let local = LocalClock::new(skew);
@@ -118,6 +120,8 @@ impl Works {
             seals: None,
             state: Arc::new(ClockState::new(snapshot)),
             snapshot,
+            system,
+            refuse: None,
         })
     }
 
@@ -166,11 +170,23 @@ impl Works {
         seals.sealing.close(&mut sealed).is_ok() && self.socket.send(to, &sealed)
     }
 
-    /// Takes what came, without waiting: stamps of what `left`, then datagrams; when the impairment has more. When each left is known before an
+    /// Takes what came, `most` datagrams of it, without waiting: stamps of what `left`, then datagrams; when the impairment has more. When each left is known before an
     /// answer to it is read.
-    pub(in crate::shell) fn take(&mut self, left: impl FnMut(SentId, Stamp)) -> u64 {
+    pub(in crate::shell) fn take(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) -> u64 {
+        self.look_at_clocks();
         self.take_stamps(left);
-        self.take_datagrams()
+        self.take_datagrams(most)
+    }
+
+    /// Before anything is measured by it: whether the local clock is one to measure by.
+    fn look_at_clocks(&mut self) {
+        let looked = self.local.looked();
+        let was_steady = self.clock.unsteady(looked.local_ns).is_none();
+        if let Some(why) = self.clock.look_at_clocks(looked)
+            && was_steady
+        {
+            tracing::warn!("nothing is known of the time until it has been measured anew: {why}");
+        }
     }
 
     fn take_stamps(&mut self, mut left: impl FnMut(SentId, Stamp)) {
@@ -182,6 +198,11 @@ impl Works {
         }
     }
 
+    /// To whom it is to be said, where nothing is sealed, that there is another configuration.
+    pub(in crate::shell) fn refuses(&mut self) -> Option<IpAddr> {
+        self.refuse.take()
+    }
+
     /// Lets others see how it stands: writes the node's page, and shows it to tools.
     pub(in crate::shell) fn publish(&mut self) {
         self.write_page();
@@ -189,9 +210,9 @@ impl Works {
     }
 
     /// Takes what came; when the impairment has more.
-    fn take_datagrams(&mut self) -> u64 {
+    fn take_datagrams(&mut self, most: usize) -> u64 {
         let mut datagram = [0; SEALED_BYTES];
-        for _ in 0..BURST {
+        for _ in 0..most {
             let Some(Came { bytes, source, realtime_ns }) = self.socket.receive(&mut datagram) else { break };
             let now_ns = self.local.now_ns();
             let stamp = realtime_ns.and_then(|ns| self.local.stamp(ns)).unwrap_or(Stamp::by_us(now_ns));
@@ -228,6 +249,12 @@ impl Works {
             Some(seals) => seals.open(now_ns, source, self.socket.node_at(source), overhears, datagram),
         };
         let taken = match opened {
+            Some(Heard::Proven(head, rest)) if head.digest != self.clock.digest() => {
+                let node = self.socket.node_at(source);
+                // Whoever has an address that no node has here does not hear it from anybody else.
+                self.refuse = self.refuse.or((node.is_none() && head.system == self.system).then_some(source));
+                self.clock.handle_other(now_ns, stamp, node, &head, rest).is_ok()
+            }
             Some(Heard::Proven(head, rest)) if self.socket.is_from(head.from, source) => {
                 self.clock.handle(now_ns, stamp, &head, rest).is_ok()
             }

@@ -18,5 +18,5 @@ pub(super) fn be_punctual() {
 pub(super) fn sleep(for_ns: u64) {
     let until_ns = monotonic_ns().saturating_add(for_ns);
     let until = TimeSpec::new((until_ns / SECOND_NS).cast_signed(), (until_ns % SECOND_NS).cast_signed());
-    let _ = clock_nanosleep(ClockId::CLOCK_MONOTONIC, ClockNanosleepFlags::TIMER_ABSTIME, &until);
+    let _ = clock_nanosleep(ClockId::CLOCK_BOOTTIME, ClockNanosleepFlags::TIMER_ABSTIME, &until);
 }

@@ -55,7 +55,7 @@ mod tests {
             }
             let mut datagram = [0; 1472];
             let mut first = true;
-            while let Some((_, bytes)) = end.outbound.poll_slot(START, 1472, &mut datagram, &mut end.log) {
+            while let Some((_, bytes)) = end.outbound.poll_slot(START, (1472, &mut datagram), None, &mut end.log) {
                 let (frame, rest) = FrameHead::parse(&datagram[..bytes]).unwrap();
                 let says = frame.kind == Kind::Alive;
                 assert!(!says || rest.len() == ALIVE_BYTES && is_real_time(&datagram[..bytes], &network));

@@ -28,28 +28,35 @@ impl Intake {
 
     /// Before the call.
     pub(super) fn take_one(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
-        self.wants.take_one(&mut Hands { transit: &mut self.transit, outbound, report });
+        self.wants.take_one(&mut Hands { transit: &mut self.transit, outbound, report, busy_ns: || 0 });
     }
 
-    /// In the slot, before each datagram.
-    pub(super) fn take_on(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
-        self.wants.take_on(&mut Hands { transit: &mut self.transit, outbound, report });
+    /// In the slot, before each datagram. `busy_ns` says for how long the wire is still busy.
+    pub(super) fn take_on(&mut self, outbound: &mut Outbound, report: &mut impl Report, busy_ns: impl Fn() -> u64) {
+        self.wants.take_on(&mut Hands { transit: &mut self.transit, outbound, report, busy_ns });
+    }
+
+    /// How important the first is that was not taken.
+    pub(super) fn first(&mut self) -> Option<Priority> {
+        self.transit.waits().1
     }
 
     /// Between slots. `left_ns` says how long it may last.
     pub(super) fn relieve(&mut self, outbound: &mut Outbound, report: &mut impl Report, left_ns: impl FnMut() -> u64) {
-        self.wants.relieve(monotonic_ns(), &mut Hands { transit: &mut self.transit, outbound, report }, left_ns);
+        let mut hands = Hands { transit: &mut self.transit, outbound, report, busy_ns: || 0 };
+        self.wants.relieve(monotonic_ns(), &mut hands, left_ns);
     }
 }
 
 /// What a package goes through when it is taken.
-struct Hands<'a, R> {
+struct Hands<'a, R, B> {
     transit: &'a mut Receiver,
     outbound: &'a mut Outbound,
     report: &'a mut R,
+    busy_ns: B,
 }
 
-impl<R: Report> Transit for Hands<'_, R> {
+impl<R: Report, B: Fn() -> u64> Transit for Hands<'_, R, B> {
     fn waits(&mut self) -> (usize, Option<Priority>) {
         self.transit.waits()
     }
@@ -58,8 +65,16 @@ impl<R: Report> Transit for Hands<'_, R> {
         self.transit.shape().slots.into()
     }
 
-    fn has_queued(&self) -> bool {
-        self.outbound.waits()
+    fn queued(&self) -> Option<u8> {
+        self.outbound.first_level()
+    }
+
+    fn level(&self, priority: Priority) -> u8 {
+        self.outbound.level(priority)
+    }
+
+    fn busy_ns(&self) -> u64 {
+        (self.busy_ns)()
     }
 
     fn take(&mut self) -> Option<(Head, Accepted)> {
@@ -74,7 +89,7 @@ impl<R: Report> Transit for Hands<'_, R> {
 mod tests {
     use super::*;
     use crate::harness::{End, S, module};
-    use crate::intake::{FEW, LEFT_NS_MIN, UNTAKEN_NS_MAX};
+    use crate::intake::{FEW, LEFT_NS_MIN, MAKING_NS, TAKING_NS, UNTAKEN_NS_MAX};
     use crate::stats::Cause;
     use rohrpost_mailbox::{HEAD_BYTES, Label, Name, Node, Participant, Sender, Shape, Type};
 
@@ -126,8 +141,11 @@ mod tests {
             (0..looks).for_each(|_| self.intake.take_one(&mut self.end.outbound, &mut self.end.log));
         }
 
-        fn in_the_slot(&mut self) {
-            self.intake.take_on(&mut self.end.outbound, &mut self.end.log);
+        /// Before a datagram, while the wire is busy for long enough to take so many.
+        fn in_the_slot(&mut self, busy_for: u64) {
+            let left = std::cell::Cell::new(busy_for + 1);
+            let busy_ns = || left.replace(left.get().saturating_sub(1)).min(2) * (TAKING_NS + MAKING_NS);
+            self.intake.take_on(&mut self.end.outbound, &mut self.end.log, busy_ns);
         }
 
         fn between_slots(&mut self) {
@@ -149,19 +167,44 @@ mod tests {
         assert_eq!(ground.waiting(), (3, 2), "90 and 50 fill it");
         ground.data(&[50]);
         ground.before_the_call(10);
-        ground.in_the_slot();
+        ground.in_the_slot(9);
         assert_eq!(ground.waiting(), (4, 2), "as important as what was taken, it waits");
         ground.data(&[95, 51]);
         ground.before_the_call(10);
         assert_eq!(ground.waiting(), (4, 4));
         ground.data(&[95; FEW + 2]);
-        ground.in_the_slot();
-        assert_eq!(ground.waiting(), (6, 4 + FEW as u64), "a few between two datagrams");
+        ground.in_the_slot(0);
+        assert_eq!(ground.waiting(), (6, 8), "a few between two datagrams");
+        ground.in_the_slot(9);
+        assert_eq!(ground.waiting(), (4, 10));
         ground.intake.open(10_000);
-        ground.in_the_slot();
-        assert_eq!(ground.waiting(), (2, 8 + FEW as u64), "who woke up late takes in the slot what it has room for");
-        ground.in_the_slot();
-        assert_eq!(ground.waiting(), (0, 10 + FEW as u64), "a few before each datagram");
+        ground.in_the_slot(0);
+        assert_eq!(ground.waiting(), (4, 10), "what is less important takes no time from what is to leave");
+        ground.data(&[200]);
+        ground.in_the_slot(0);
+        assert_eq!(ground.waiting(), (4, 11), "this one leaves next");
+        ground.in_the_slot(9);
+        assert_eq!(ground.waiting(), (0, 15), "what there is room for");
+    }
+
+    #[test]
+    fn in_a_slot_what_is_less_important_is_taken_only_while_the_wire_is_busy() {
+        let mut ground = Ground::new(0);
+        ground.data(&[90; FEW + 2]);
+        ground.data(&[50, 50]);
+        ground.intake.open(10_000);
+        ground.in_the_slot(0);
+        assert_eq!(ground.waiting(), (4, FEW as u64));
+        ground.in_the_slot(0);
+        assert_eq!(ground.waiting(), (2, 6));
+        ground.in_the_slot(0);
+        assert_eq!(ground.waiting(), (2, 6), "all that is to leave next is there");
+        ground.in_the_slot(1);
+        assert_eq!(ground.waiting(), (1, 7));
+        // What hurries more than it may stands first in the mailbox, whatever waits in the queue.
+        ground.send(Type::command(16), &[255; FEW + 2]);
+        ground.in_the_slot(0);
+        assert_eq!(ground.waiting(), (3, 7 + FEW as u64));
     }
 
     #[test]
@@ -171,17 +214,17 @@ mod tests {
         ground.data(&[90; 1]);
         ground.before_the_call(1);
         ground.data(&[90; SLOTS as usize / 2]);
-        ground.in_the_slot();
+        ground.in_the_slot(9);
         assert_eq!(ground.waiting(), (8, 1), "no room, and no more important");
         ground.data(&[90; 2]);
-        ground.in_the_slot();
+        ground.in_the_slot(0);
         assert_eq!(ground.waiting(), (8, 3), "down to half of it");
 
         // Their peer is silent, so that taking them gives nothing to send.
         let mut ground = Ground::new(5 * S);
         ground.data(&[90; FEW + 2]);
         ground.intake.open(1000);
-        ground.in_the_slot();
+        ground.in_the_slot(0);
         assert_eq!(ground.waiting(), (0, 0));
         assert_eq!(ground.end.log.lost.len(), FEW + 2);
     }
@@ -236,7 +279,7 @@ mod tests {
         let mut ground = Ground::new(10 * S);
         ground.data(&[50; 5]);
         ground.intake.open(50);
-        ground.in_the_slot();
+        ground.in_the_slot(0);
         assert_eq!(ground.waiting(), (0, 0));
         assert_eq!(ground.end.log.causes(), [Cause::Silent; 5]);
     }

@@ -1,18 +1,25 @@
 //! What waits for a slot besides time and packages: refusals where nothing is sealed, else hellos.
 
 use super::super::socket::InSocket;
-use super::Answer;
-use crate::frame::NodeIndex;
+use super::{Answer, REFUSAL_BYTES, speech};
+use crate::frame::{NodeIndex, Reason};
+use crate::inbound::write_refusal;
 use crate::security::{HELLO_SLOT_BYTES, Waiting};
 use crate::settings::Settings;
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
+
+/// Whoever has no number here is refused so often at most.
+const REFUSE_EVERY_NS: u64 = 50_000_000;
 
 /// In the hands of the thread that sends.
 pub(in crate::shell) struct Line {
     answers: Receiver<Answer>,
     /// The refusal whose turn is next.
     refusal: Option<Answer>,
+    /// When somebody without a number was refused last, ns.
+    refused_ns: u64,
     /// Where all is sealed.
     hellos: Option<Waiting>,
     /// By which they leave.
@@ -27,7 +34,7 @@ impl Line {
         socket: Arc<InSocket>,
         settings: Arc<Settings>,
     ) -> Self {
-        Self { answers, refusal: None, hellos, socket, settings }
+        Self { answers, refusal: None, refused_ns: 0, hellos, socket, settings }
     }
 
     /// Of each peer the newest hellos wait; refusals wait where they are, one after the other.
@@ -40,6 +47,21 @@ impl Line {
                 (refusal, _) => self.refusal = Some(refusal),
             }
         }
+    }
+
+    /// Somebody without a number here says what time it is by another configuration. It is told once in a while; sealed, it could not believe it.
+    pub(super) fn refuse(&mut self, now_ns: u64, to: IpAddr) {
+        if self.refusal.is_none() && self.hellos.is_none() && self.refused_ns + REFUSE_EVERY_NS <= now_ns {
+            self.refused_ns = now_ns;
+            let mut datagram = [0; REFUSAL_BYTES];
+            let bytes = write_refusal(&self.settings, None, Reason::Digest, &mut datagram);
+            self.refusal = Some(Answer::Refusal { to, bytes, datagram });
+        }
+    }
+
+    /// Whose configuration this node goes by, and whose not, in words.
+    pub(super) fn parted_by(&self, others: impl Iterator<Item = (Option<NodeIndex>, u64)>) -> String {
+        speech::parted(&self.settings, others)
     }
 
     /// Sends the next that fits, a hello to this node before others; as how many bytes slots count it.

@@ -24,9 +24,12 @@ pub use state::{Snapshot, State, Used, WINDOWS};
 
 use super::answers::Answers;
 use super::clock::{ClockState, Works};
-use super::departures::{Departures, Wire};
+use super::departures::Departures;
+use super::sending::Sending;
 use super::threads::Shared;
+use super::wire::Wire;
 use crate::frame::{FrameHead, NodeIndex};
+use crate::intake::{MAKING_NS, QUIET_NS};
 use crate::outbound::Outbound;
 use crate::security::Said;
 use crate::stats::Stats;
@@ -35,8 +38,7 @@ use crate::time::{Allowed, SentId, Step, TIME_BYTES};
 use held::Held;
 use intake::Intake;
 pub(super) use line::Line;
-use rohrpost_config::Network;
-use rohrpost_config::wire::HAND_OVER;
+use rohrpost_config::{Network, TRANSIT_LOOK};
 use rohrpost_mailbox::{Name, monotonic_ns};
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -49,18 +51,19 @@ const SPIN_NS_MAX: u64 = 150_000;
 const SPIN_CYCLES: u64 = 20;
 /// Syncs that came since it woke up are looked for so long before the call: to read one takes some microseconds.
 const LAST_LOOK_NS: u64 = 50_000;
-/// In the last moments before the call nothing is begun that might last until then.
-const QUIET_NS: u64 = 20_000;
 /// Whether the mailbox is full is looked at this often: half of it has room for a burst of 32 packages.
 const NAP_NS: u64 = 1_000_000;
 /// With less than this until it has to wake up it sleeps on: each look at the mailbox keeps a processor from another thread, perhaps one that
 /// is about to send.
 const SLEEP_NS_MAX: u64 = NAP_NS + NAP_NS / 4;
+const _: () = assert!(
+    (SLEEP_NS_MAX + SPIN_NS_MAX) as u128 <= TRANSIT_LOOK.as_nanos(),
+    "who declares flows counts on it, that what waits does not overflow meanwhile"
+);
+/// So many datagrams of time, and one for each node, are read at a look: to read one takes some microseconds.
+const LOOK_BURST: usize = 16;
 /// To see to what waits takes less than this, unless much does.
 const TIDY_NS: u64 = 250_000;
-/// A datagram is made so long before it is handed over, at most, unless the thread stands still.
-const MAKING_NS: u64 = 10_000;
-const _: () = assert!(MAKING_NS < HAND_OVER.as_nanos() as u64, "bounds have room for it");
 /// Room for the longest refusal.
 pub(super) const REFUSAL_BYTES: usize = 128;
 /// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a second later.
@@ -83,6 +86,8 @@ pub(super) enum Answer {
 #[derive(Clone, Copy)]
 pub(super) struct Own {
     pub(super) router: Name,
+    /// Nodes of the network.
+    pub(super) nodes: usize,
     pub(super) network: Network,
 }
 
@@ -128,7 +133,8 @@ struct First {
 impl Slots {
     /// From what would send as packages come.
     pub(super) fn new(own: Own, departures: Departures, works: Works, discipline: Discipline, line: Line) -> Self {
-        let Departures { shared, transit, outbound, answers, wire, datagram, stats, .. } = departures;
+        let Departures { shared, transit, sending, .. } = departures;
+        let Sending { outbound, answers, wire, datagram, stats } = sending;
         let snapshot = Snapshot {
             counts: Counts::default(),
             silent: discipline.silent(),
@@ -223,8 +229,10 @@ impl Slots {
 
     /// Hands all datagrams of time and stamps that came to the clock, and shows how it stands.
     fn look(&mut self) {
-        let Self { stats, works, discipline, first, snapshot, looked_ns, state, .. } = self;
-        works.take(|id, stamp| {
+        let Self { stats, works, discipline, first, snapshot, looked_ns, state, line, own, .. } = self;
+        // What comes with a node's address, and is none of its, must not take the time before a slot.
+        let most = LOOK_BURST + own.nodes;
+        works.take(most, |id, stamp| {
             let Some(First { called_ns, begin_ns, .. }) = first.take_if(|first| first.id == id) else { return };
             discipline.left(called_ns, stamp);
             if let Some(Some(used)) = snapshot.windows.last_mut() {
@@ -234,13 +242,16 @@ impl Slots {
         });
         let now_ns = works.now_ns();
         works.clock.hears_by(stats, monotonic_ns(), now_ns);
+        if let Some(stranger) = works.refuses() {
+            line.refuse(monotonic_ns(), stranger);
+        }
         // Roles and bounds go on with time; there is nothing to be sent.
         let _ = works.clock.poll_in(now_ns, Allowed::Nothing, &mut [0; TIME_BYTES]);
         works.publish();
         *looked_ns = now_ns;
         let counts = discipline.counts(&works.clock);
         let (silent, lead_ns) = (discipline.silent(), discipline.lead_ns());
-        speech::tell_change(snapshot.silent, silent);
+        speech::tell_change(snapshot.silent, silent, || line.parted_by(works.clock.parted_by(now_ns)));
         *snapshot = Snapshot { counts, silent, lead_ns, ..*snapshot };
         state.show(snapshot);
     }
@@ -386,10 +397,13 @@ impl Slots {
         if let Some(held) = self.held.take() {
             return Some(held);
         }
-        self.intake.take_on(&mut self.outbound, &mut self.answers);
+        self.outbound.drop_first(monotonic_ns(), &mut self.answers);
+        let busy_ns = || permit.busy_ns(self.works.now_ns());
+        self.intake.take_on(&mut self.outbound, &mut self.answers, busy_ns);
         let room_bytes = permit.room_bytes(self.works.now_ns() + MAKING_NS)?;
-        let made_ns = monotonic_ns();
-        let made = self.outbound.poll_slot(made_ns, room_bytes, &mut self.datagram, &mut self.answers);
+        let (made_ns, behind) = (monotonic_ns(), self.intake.first());
+        let datagram = (room_bytes, &mut self.datagram[..]);
+        let made = self.outbound.poll_slot(made_ns, datagram, behind, &mut self.answers);
         made.map(|(to, bytes): (NodeIndex, usize)| Held { to, bytes, made_ns })
     }
 

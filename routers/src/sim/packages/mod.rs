@@ -7,7 +7,7 @@ mod settings;
 mod slotted;
 mod watch;
 
-pub(super) use settings::DIGEST;
+pub(super) use settings::{ROUTER_CLASS, digest};
 pub use settings::{address, settings};
 pub(super) use slotted::Hands;
 
@@ -16,8 +16,10 @@ use super::clock::Now;
 use super::host::{Parcel, TRANSIT_AGE_MAX_NS};
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
+use crate::broken::harmful;
 use crate::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound};
+use crate::intake::hurries;
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, TAG_BYTES};
 use crate::settings::Settings;
@@ -125,7 +127,8 @@ impl Packages {
             io.book.held(parcel.number);
         }
         let alone = io.host.transit.is_empty() && io.plan.slots.is_none();
-        let accepted = self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone);
+        let does_harm = io.book.packages[parcel.number as usize].role == Role::Intruder;
+        let accepted = harmful(does_harm, || self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone));
         io.book.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
         let head = parcel.head;
         self.in_hand = Some(parcel);
@@ -160,12 +163,16 @@ impl Packages {
         io.book.leaves(io.now, io.life, &bytes);
         if io.plan.slots.is_some() {
             let reaches = |to| self.seals.as_ref().is_none_or(|seals| seals.knows(to));
-            io.book.is_strict(io.now, io.life, &bytes, reaches);
+            // Of those that hurry more than they may, only a few are taken before a datagram.
+            let first = io.host.transit.first().filter(|first| !hurries(&first.head));
+            let first = first.filter(|first| self.settings.node_of(first.head.to).is_some_and(reaches));
+            let behind = first.map(|first| first.number);
+            io.book.is_strict(io.now, io.life, &bytes, behind, reaches);
         } else {
             io.book.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
         }
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
-        io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed });
+        io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed, handed: io.now });
     }
 
     /// Asks whoever is not known.
@@ -238,7 +245,8 @@ impl Packages {
                     let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
                     if let Some(to) = node {
                         io.book.saw("refused");
-                        self.refusals.push_back(Sent { port: PORT, to, bytes: Rc::from(&self.buffer[..bytes]) });
+                        let bytes = Rc::from(&self.buffer[..bytes]);
+                        self.refusals.push_back(Sent { port: PORT, to, bytes, handed: Now::default() });
                     }
                 }
                 inbound::Output::Wait { until_ns } => return until_ns.min(ask_ns),
@@ -278,7 +286,7 @@ impl Layer for Packages {
         }
         if taken > 0 {
             let first = self.seals.as_ref().map(|seals| seals.first(&clear));
-            io.book.took(io.now, io.life, (&clear, first), DIGEST);
+            io.book.took(io.now, io.life, (&clear, first), self.settings.digest);
             self.hears(io, source);
         } else if copies > 0 {
             io.book.saw("dropped as a copy");

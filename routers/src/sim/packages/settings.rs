@@ -1,14 +1,23 @@
 //! What routers of a simulated network are configured with.
 
-use crate::access::Access;
+use crate::admission::Admission;
 use crate::frame::NodeIndex;
 use crate::settings::{NodeSettings, Settings};
 use crate::sim::plan::{Plan, SYSTEM};
-use rohrpost_config::{Network, Route, Security};
+use rohrpost_config::{Network, Route, Security, Tunnel};
+use rohrpost_mailbox::{Class, Name};
 use std::net::{IpAddr, Ipv4Addr};
 
-/// Of the configuration.
-pub(in crate::sim) const DIGEST: u64 = 0x1234_5678;
+/// Of a configuration.
+pub(in crate::sim) fn digest(edition: usize) -> u64 {
+    const DIGEST: u64 = 0x1234_5678;
+    // In no order.
+    DIGEST.wrapping_mul(1 + edition as u64) & u64::MAX >> 1
+}
+
+/// Of routers; no module has it.
+pub(in crate::sim) const ROUTER_CLASS: Class = Class(250);
+const TUNNEL: Tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
 
 /// Address of a node.
 pub fn address(node: usize) -> IpAddr {
@@ -16,10 +25,13 @@ pub fn address(node: usize) -> IpAddr {
 }
 
 /// What one life of a router is configured with.
-pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
+pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> Settings {
     let others = plan.nodes.iter().enumerate().filter(|(other, _)| *other != node);
     let mut routes: Vec<Route> = others
-        .flat_map(|(index, other)| other.modules.iter().map(move |module| (index, *module)))
+        .flat_map(|(index, other)| {
+            let router = Name::new(SYSTEM, ROUTER_CLASS.0, index as u8, 0);
+            other.modules.iter().copied().chain([router]).map(move |module| (index, module))
+        })
         .map(|(index, module)| Route { first: module, last: module.with_local(u8::MAX), node: index as NodeIndex })
         .collect();
     routes.sort_unstable_by_key(|route| route.first);
@@ -28,7 +40,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
         system: SYSTEM,
         own: node as NodeIndex,
         nodes: nodes.collect(),
-        digest: DIGEST,
+        digest: digest(edition),
         incarnation,
         network: Network {
             security: if plan.sealed { Security::Keys } else { Security::None },
@@ -39,10 +51,16 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64) -> Settings {
             port: 21117,
             mtu: u16::MAX,
         },
-        tdma: plan.slots.as_ref().map(|slots| slots.table.clone()),
+        tdma: plan.slots_of(edition).map(|slots| slots.table.clone()),
         routes,
         senders: plan.nodes[node].modules.iter().map(|module| vec![*module]).collect(),
-        access: Access::default(),
+        hosts: Vec::new(),
+        admission: Admission {
+            router: Some(ROUTER_CLASS),
+            tunnel: Some((TUNNEL, node as NodeIndex)),
+            ..Admission::default()
+        },
         flows: Vec::new(),
+        real_time_from: 0,
     }
 }

@@ -5,9 +5,10 @@
 use super::watch::Watch;
 use super::{PORT, Packages};
 use crate::frame::NodeIndex;
-use crate::intake::{Intake, Transit};
+use crate::intake::{Intake, MAKING_NS, TAKING_NS, Transit};
 use crate::outbound::Accepted;
 use crate::security::{HELLO_SLOT_BYTES, Said};
+use crate::sim::clock::Now;
 use crate::sim::host::TRANSIT_SLOTS;
 use crate::sim::seals::PackageSeals;
 use crate::sim::station::{Io, Sent};
@@ -20,6 +21,8 @@ use std::rc::Rc;
 pub(in crate::sim) struct Hands<'a, 'b> {
     pub(in crate::sim) packages: &'a mut Packages,
     pub(in crate::sim) io: &'a mut Io<'b>,
+    /// The slot, where each package that is taken keeps the thread from sending.
+    pub(in crate::sim) permit: Option<&'a Permit>,
 }
 
 impl Transit for Hands<'_, '_> {
@@ -31,11 +34,20 @@ impl Transit for Hands<'_, '_> {
         TRANSIT_SLOTS
     }
 
-    fn has_queued(&self) -> bool {
-        self.packages.outbound.waits()
+    fn queued(&self) -> Option<u8> {
+        self.packages.outbound.first_level()
+    }
+
+    fn level(&self, priority: Priority) -> u8 {
+        self.packages.outbound.level(priority)
+    }
+
+    fn busy_ns(&self) -> u64 {
+        self.permit.map_or(0, |permit| permit.busy_ns(self.io.now.monotonic_ns))
     }
 
     fn take(&mut self) -> Option<(Head, Accepted)> {
+        self.io.works(if self.permit.is_some() { TAKING_NS } else { 0 });
         self.packages.take_one(self.io)
     }
 }
@@ -47,7 +59,7 @@ impl Packages {
         let fits = permit.carries_hello() && permit.fits(now_ns, HELLO_SLOT_BYTES);
         let Some((said, datagram)) = fits.then(|| seals.waiting.take(now_ns, first)).flatten() else { return false };
         permit.takes(now_ns, HELLO_SLOT_BYTES);
-        io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
+        io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram), handed: io.now });
         seals.waiting.left(said);
         true
     }
@@ -60,13 +72,16 @@ impl Packages {
             io.sent.push(refusal);
         }
         loop {
-            intake.take_on(&mut Hands { packages: self, io });
-            let Some(room_bytes) = permit.room_bytes(now_ns) else { break };
             let mut watch = Watch::out(io, &mut self.undelivered);
-            let Some((to, bytes)) = self.outbound.poll_slot(now_ns, room_bytes, &mut self.buffer, &mut watch) else {
-                break;
-            };
-            permit.takes(now_ns, bytes);
+            self.outbound.drop_first(watch.io.now.monotonic_ns, &mut watch);
+            intake.take_on(&mut Hands { packages: self, io, permit: Some(permit) });
+            let Some(room_bytes) = permit.room_bytes(io.now.monotonic_ns + MAKING_NS) else { break };
+            let (made_ns, mut watch) = (io.now.monotonic_ns, Watch::out(io, &mut self.undelivered));
+            let (_, behind) = watch.io.host.transit.waits();
+            let datagram = (room_bytes, &mut self.buffer[..]);
+            let Some((to, bytes)) = self.outbound.poll_slot(made_ns, datagram, behind, &mut watch) else { break };
+            io.works(MAKING_NS);
+            permit.takes(io.now.monotonic_ns, bytes);
             let bytes = Rc::from(&self.buffer[..bytes]);
             self.send(io, to, bytes);
         }
@@ -85,7 +100,8 @@ impl Packages {
 /// Says a hello, or has it wait for a slot.
 pub(super) fn say(io: &Io<'_>, seals: &mut PackageSeals, line: &mut VecDeque<Sent>, said: Said, datagram: &[u8]) {
     if io.plan.slots.is_none() {
-        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram) });
+        let bytes = Rc::from(datagram);
+        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes, handed: Now::default() });
     }
     let PackageSeals { gate, waiting, .. } = seals;
     gate.waits(said, || {

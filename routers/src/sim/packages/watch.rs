@@ -41,6 +41,9 @@ impl Report for Watch<'_, '_> {
         let io = &mut *self.io;
         io.book.saw(cause.word());
         io.line(|| format!("{}: from or to {peer:?}, {head:?}", cause.word()));
+        if cause == Cause::Late && io.plan.is_in_order() {
+            io.book.broken(io.now, Promise::Order, format!("late, and nothing was reordered: {head:?}"));
+        }
         let number = if self.is_out {
             io.book.lost_before(io.now, io.life, head, cause)
         } else {

@@ -41,6 +41,19 @@ impl Plan {
         }
     }
 
+    /// In every fourth network, beside all else.
+    pub(super) fn draw_intruders(&mut self) {
+        let mut chance = Chance::new(self.seed ^ 0x1d_e5);
+        if self.seed % 4 != 2 {
+            return;
+        }
+        for node in 0..self.nodes.len() {
+            let from_ns = chance.between(S, self.mended_ns - S / 2);
+            let fault = Fault::Intruder { node, count: chance.scale(4, 60) };
+            self.faults.push(Planned { from_ns, until_ns: from_ns, fault });
+        }
+    }
+
     pub(super) fn draw_calls(&mut self, chance: &mut Chance) {
         for _ in 0..1 + chance.below(self.nodes.len() as u64) {
             let (node, from, to) = self.pair(chance);

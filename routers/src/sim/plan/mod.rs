@@ -172,6 +172,27 @@ pub enum Fault {
         /// Which.
         module: Name,
     },
+    /// A computer sleeps.
+    Sleep {
+        /// Which.
+        node: usize,
+        /// By so much more than true it takes its sleep to be, ns.
+        wrong_ns: i64,
+    },
+    /// A time daemon slews a computer's clock.
+    Slew {
+        /// Where.
+        node: usize,
+        /// By how much, ns a second.
+        slewed_ppb: i64,
+    },
+    /// A node's router is started anew from a file that somebody has edited, and after that from the right one.
+    Edited {
+        /// Which.
+        node: usize,
+        /// Edition of the file.
+        edition: usize,
+    },
     /// Somebody repeats all that a node is told of the time, so much later.
     Echo {
         /// Who.
@@ -193,6 +214,22 @@ pub enum Fault {
     },
     /// Datagrams that no router of this installation sent.
     Foreign {
+        /// To whom.
+        to: usize,
+        /// How many.
+        count: u64,
+    },
+    /// A program of a node writes what it likes in its heads, and its router caps no priority.
+    Intruder {
+        /// Where.
+        node: usize,
+        /// How many packages.
+        count: u64,
+    },
+    /// Datagrams such as a router could have sent, of a life that never was or of a place far from its own.
+    Forged {
+        /// In whose name.
+        from: usize,
         /// To whom.
         to: usize,
         /// How many.
@@ -231,6 +268,8 @@ pub struct Plan {
     pub quality: Quality,
     /// Who may send when; none: everyone, as packages come.
     pub slots: Option<Slots>,
+    /// The same in files that somebody has edited; the first is edition 1.
+    pub edited: Vec<Slots>,
     /// Data.
     pub flows: Vec<Flow>,
     /// Commands.
@@ -245,6 +284,8 @@ pub struct Plan {
     pub sealed: bool,
     /// Whether damaged datagrams are dropped by the kernel, as UDP's checksum has it; else the routers get them.
     pub checksum: bool,
+    /// All steady flows publish at once, so often, ns; none: each as its period says.
+    pub moments_ns: Option<u64>,
     /// No data before this, ns.
     pub traffic_begin_ns: u64,
     /// No fault and no flood after this, ns.
@@ -283,6 +324,7 @@ impl Plan {
             calls: Vec::new(),
             faults: Vec::new(),
             checksum,
+            moments_ns: None,
             traffic_begin_ns: 0,
             mended_ns,
             traffic_end_ns: 0,
@@ -293,6 +335,7 @@ impl Plan {
             has_stamps: chance.percent(80),
             sealed: false,
             slots: None,
+            edited: Vec::new(),
             nodes,
         };
         plan.time();
@@ -300,7 +343,13 @@ impl Plan {
             plan.end_ns = plan.end_ns.max(plan.stepped_ns + S);
         }
         plan.draw_all(&mut chance);
+        plan.draw_intruders();
         plan
+    }
+
+    /// The slots of an edition of the configuration.
+    pub fn slots_of(&self, edition: usize) -> Option<&Slots> {
+        edition.checked_sub(1).map_or(self.slots.as_ref(), |edited| self.edited.get(edited))
     }
 
     /// Draws what happens in the network.
@@ -320,11 +369,59 @@ impl Plan {
         self.end_ns = (self.traffic_end_ns + DRAIN_NS).max(self.timed_ns + S);
     }
 
+    /// How often a flow publishes with all others at once, ns.
+    pub fn moment_of(&self, flow: &Flow) -> Option<u64> {
+        self.moments_ns.filter(|_| flow.burst == 1)
+    }
+
     /// The same network with datagrams that are sealed.
     #[must_use]
     pub fn sealed(self) -> Self {
         let mut plan = Self { sealed: true, ..self };
         plan.seal_slots();
+        plan
+    }
+
+    /// Whether each datagram comes behind all that its sender sent before it.
+    pub fn is_in_order(&self) -> bool {
+        self.quality.reorder_ppm == 0 && self.faults.iter().all(|its| matches!(its.fault, Fault::Forged { .. }))
+    }
+
+    /// A network in which nothing goes wrong but that somebody sends what a router could have sent.
+    pub fn forged(seed: u64) -> Self {
+        let mut plan = Self::calm(seed);
+        let mut chance = Chance::new(seed ^ 0xf0_9ed);
+        for _ in 0..chance.between(10, 100) {
+            let from = chance.below(plan.nodes.len() as u64) as usize;
+            let to = (from + 1 + chance.below(plan.nodes.len() as u64 - 1) as usize) % plan.nodes.len();
+            // When all have heard each other.
+            let (at_ns, count) = (chance.between(S, plan.traffic_end_ns), chance.scale(1, 20));
+            plan.faults.push(Planned { from_ns: at_ns, until_ns: at_ns, fault: Fault::Forged { from, to, count } });
+        }
+        plan
+    }
+
+    /// A network in which nothing goes wrong: from one node to another hundreds of flows pass a package in many parts, which is less urgent.
+    pub fn crowded(seed: u64) -> Self {
+        let mut plan = Self::calm(seed);
+        let mut chance = Chance::new(seed ^ 0xc_04d);
+        plan.nodes.truncate(2);
+        plan.masters = vec![0, 1];
+        plan.calls.clear();
+        plan.flows.clear();
+        (plan.shape.datagram_bytes_max, plan.shape.rate_bytes_s) = (1472, chance.between(1 << 20, 4 << 20));
+        let (all, small_bytes) = (plan.shape.rate_bytes_s, 60);
+        // Both small ones take half of the rate, the large ones a quarter.
+        let small = (small_bytes, 4 * (small_bytes + 100) * S / all, true);
+        let large_bytes = chance.between(20_000, 60_000);
+        let large = (large_bytes, 4 * large_bytes * S / all, false);
+        for (most, period_ns, is_mixed) in [small, small, large] {
+            let [from, to] = [0, 1].map(|node| chance.pick(&plan.nodes[node].modules));
+            let (to, bytes) = (to.with_local(rohrpost_mailbox::local::DATA), (most / 2, most));
+            plan.flows.push(Flow { node: 0, from, to, priority: 0, period_ns, bytes, is_mixed, burst: 1 });
+        }
+        plan.mended_ns = S;
+        plan.time();
         plan
     }
 

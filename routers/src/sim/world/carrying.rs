@@ -34,11 +34,11 @@ impl World<'_> {
 
     /// Puts on the wire what a router has sent.
     fn carry(&mut self, node: usize) {
-        for Sent { port, to, bytes } in std::mem::take(&mut self.sent) {
+        for Sent { port, to, bytes, handed } in std::mem::take(&mut self.sent) {
             let Some(router) = &mut self.stations[node].router else { return };
             let (life, index) = (router.life, router.sent[port]);
             router.sent[port] += 1;
-            let (left_ns, out_ns) = self.transmit(node, bytes.len());
+            let (left_ns, out_ns) = self.transmit(node, bytes.len(), handed.true_ns.max(self.now_ns));
             if port > 0 || self.plan.slots.is_some() {
                 self.at(left_ns, Event::Left { node, life, port, index });
             }
@@ -47,13 +47,13 @@ impl World<'_> {
     }
 
     /// It takes a while from the call to the wire: when a datagram leaves, and when all of it has.
-    fn transmit(&mut self, node: usize, bytes: usize) -> (u64, u64) {
-        let Some(slots) = &self.plan.slots else {
-            let left_ns = self.now_ns + self.chance.between(US, 30 * US);
+    fn transmit(&mut self, node: usize, bytes: usize, handed_ns: u64) -> (u64, u64) {
+        let Some(slots) = self.plan.slots_of(self.stations[node].edition) else {
+            let left_ns = handed_ns + self.chance.between(US, 30 * US);
             return (left_ns, left_ns);
         };
         let book = &mut self.book;
-        let at_ns = self.now_ns + self.chance.between(LEAD_NS.0, LEAD_NS.1);
+        let at_ns = handed_ns + self.chance.between(LEAD_NS.0, LEAD_NS.1);
         let sent = book.wire.transmit(node, at_ns, bytes, slots, &mut book.problems);
         let clock = &self.stations[node].clock;
         let local_ns = [self.now_ns, sent.begin_ns, sent.end_ns].map(|true_ns| clock.at(true_ns).monotonic_ns);
@@ -88,6 +88,9 @@ impl World<'_> {
     /// A datagram is in the kernel of its receiver.
     pub(in crate::sim) fn arrive(&mut self, to: usize, mut arrived: Arrived) {
         arrived.stamp = self.now(to);
+        if self.stations[to].sleeps > 0 {
+            return self.book.saw("came to a computer that sleeps");
+        }
         if !self.stations[to].runs() {
             let is_up = self.stations[to].router.is_some();
             if !is_up || !self.stations[to].keep(arrived) {

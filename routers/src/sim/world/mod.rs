@@ -28,8 +28,9 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
 
-/// Makes the layers of a router that begins to live: node, life, its clocks, what its page of system time says.
-pub type NewLayers<'a> = Box<dyn FnMut(usize, u32, Now, Option<TimeRecord>) -> Vec<Box<dyn Layer>> + 'a>;
+/// Makes the layers of a router that begins to live: node, which edition of the configuration it has, life, its clocks, what its page of system
+/// time says.
+pub type NewLayers<'a> = Box<dyn FnMut(usize, usize, u32, Now, Option<TimeRecord>) -> Vec<Box<dyn Layer>> + 'a>;
 
 /// One run.
 pub struct World<'a> {
@@ -84,6 +85,7 @@ impl<'a> World<'a> {
             stations.push(station);
         }
         let mut book = Book::new(plan.shape.bulk_below);
+        book.is_sealed = plan.sealed;
         book.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
         (book.wire, book.well_ns) = (Wire::new(count), plan.mended_ns + RECOVERY_NS);
         let mut world = Self {
@@ -119,7 +121,8 @@ impl<'a> World<'a> {
         }
         self.at(plan.mended_ns, Event::Mended);
         for (flow, its) in plan.flows.iter().enumerate() {
-            let at_ns = plan.traffic_begin_ns + self.chance.below(its.period_ns);
+            let later_ns = if plan.moment_of(its).is_some() { 0 } else { self.chance.below(its.period_ns) };
+            let at_ns = plan.traffic_begin_ns + later_ns;
             self.at(at_ns, Event::Flow { flow });
         }
         for (caller, its) in plan.calls.iter().enumerate() {
@@ -198,6 +201,10 @@ impl<'a> World<'a> {
         for node in 0..self.stations.len() {
             self.wander(node);
             let now = self.now(node);
+            // Nothing runs there.
+            if self.stations[node].sleeps > 0 {
+                continue;
+            }
             self.book.times.read(now, node, &mut self.book.problems);
             let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
             let well = self.now_ns >= self.book.well_ns;

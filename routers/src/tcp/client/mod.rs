@@ -14,15 +14,14 @@ use super::desk::Desk;
 use super::seal::ClientSeal;
 use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
-use crate::access::Access;
+use crate::admission::capped;
 use crate::impair;
-
 use crate::session::client::{Client, ClientSettings, Output, Package};
 use crate::session::frame::{BadFrame, Range};
 use crate::session::in_system;
 use crate::shell::Faults;
 use crate::shell::transit;
-use crate::shell::ways::{Reach, Ways};
+use crate::shell::ways::Ways;
 use rohrpost_mailbox::{
     ALL_SYSTEMS, CreateError, Head, Interest, Name, Node, NodeError, Participant, Receiver, Watch, Watches,
     monotonic_ns,
@@ -79,8 +78,6 @@ pub struct ClientParts<'a> {
     pub beyond: Vec<(Name, Name)>,
     /// How commands are answered that cannot be carried.
     pub faults: Arc<dyn Faults>,
-    /// Which commands of others the node's modules take.
-    pub access: Access,
     /// Its certificates; none: nothing is sealed.
     pub seal: Option<ClientSeal>,
     /// Whether the node's system time is what the server tells.
@@ -112,7 +109,7 @@ impl ClientShell {
     /// [`ClientError`]
     pub fn start(parts: ClientParts<'_>) -> Result<Self, ClientError> {
         let ClientParts { node, name, server, settings, hosts, others, .. } = parts;
-        let ClientParts { beyond, faults, access, seal, keeps_time, impair, .. } = parts;
+        let ClientParts { beyond, faults, seal, keeps_time, impair, .. } = parts;
         let participant = Participant::join(node, Name::NONE)?;
         let via = transit::name(name);
         let mailbox = participant.receiver(via, transit::shape())?;
@@ -125,16 +122,15 @@ impl ClientShell {
         let work = Work {
             shared: shared.clone(),
             server: bad_line.as_ref().map_or(server, BadLine::near),
-            client: Client::new(settings, hosts.into_iter().map(range).collect(), monotonic_ns()),
+            client: Client::new(settings, hosts.iter().copied().map(range).collect(), monotonic_ns()),
             voice: Voice::new(
                 server,
-                Ways::new(&participant, Reach::Here),
+                Ways::here(&participant, &hosts),
                 Desk::new(faults, format!("beyond the TCP router at {server}")),
-                access,
             ),
             system,
             others: others.into_iter().map(range).collect(),
-            ways_to_others: Ways::new(&participant, Reach::Everywhere),
+            ways_to_others: Ways::everywhere(&participant),
             seal,
             time,
             mailbox,
@@ -241,7 +237,7 @@ impl Work {
     fn take(&mut self) -> bool {
         for _ in 0..BURST {
             let Some(waiting) = self.mailbox.try_receive() else { return false };
-            let (head, published_ns, body) = (*waiting.head(), waiting.published_ns(), waiting.body());
+            let (head, published_ns, body) = (capped(waiting.head()), waiting.published_ns(), waiting.body());
             if head.to.system() == ALL_SYSTEMS {
                 // Its own system is one of them: there it goes as any package does, by the LAN, or if need be by the server. A node that only the
                 // server reaches knows of no others: the server brings it to them.
@@ -368,10 +364,13 @@ impl Work {
     }
 
     fn say(&mut self, now_ns: u64) {
-        let client = &self.client;
         if let Some(time) = &mut self.time {
-            time.told(now_ns, client.system_time(now_ns), client.answers());
+            if !time.is_steady() {
+                self.client.forget_time();
+            }
+            time.told(now_ns, self.client.system_time(now_ns), self.client.answers());
         }
+        let client = &self.client;
         let state = match (client.is_up(), client.is_connected()) {
             (true, _) => LinkState::Up,
             (false, true) => LinkState::Joining,

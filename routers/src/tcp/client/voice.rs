@@ -1,6 +1,5 @@
 //! What a client does for its session: it delivers, answers, and says what happens.
 
-use crate::access::Access;
 use crate::report::NotDelivered;
 use crate::session::client::{Event, Host};
 use crate::session::frame::Carried;
@@ -16,7 +15,6 @@ pub(super) struct Voice {
     server: SocketAddr,
     pub(super) ways: Ways,
     desk: Desk,
-    access: Access,
     /// Why it takes no part, as it was last told; empty if it does.
     pub(super) why: String,
     /// The server has said that, or what it said is why.
@@ -25,8 +23,8 @@ pub(super) struct Voice {
 }
 
 impl Voice {
-    pub(super) fn new(server: SocketAddr, ways: Ways, desk: Desk, access: Access) -> Self {
-        Self { server, ways, desk, access, why: String::new(), by_server: false, outage: Outage::default() }
+    pub(super) fn new(server: SocketAddr, ways: Ways, desk: Desk) -> Self {
+        Self { server, ways, desk, why: String::new(), by_server: false, outage: Outage::default() }
     }
 
     /// Says once why the server is not there. `was_made`: the connection was.
@@ -57,16 +55,16 @@ impl Answers for Voice {
 
 impl Host for Voice {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
-        if !self.access.allows(&carried.head) {
-            self.desk.rule = self.access.line(carried.head.to.class());
-            return Err(NotDelivered::NotAllowed);
-        }
         self.ways.send(&carried.head, carried.body).map_err(|error| {
             if let SendError::TooLarge { max, .. } = error {
                 self.desk.takes_bytes = Some(max);
             }
             error.into()
         })
+    }
+
+    fn not_allowed(&mut self, line: Option<usize>) {
+        self.desk.rule = line;
     }
 
     fn event(&mut self, event: Event<'_>) {

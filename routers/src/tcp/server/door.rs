@@ -79,9 +79,8 @@ impl Work {
     }
 
     fn take_in(&mut self, now_ns: u64, stream: Stream, peer: SocketAddr) {
-        let peer = peer.to_string();
         // Where there is no place, it is closed by being dropped.
-        let Some(client) = self.server.accept(now_ns, &peer, &mut self.host) else { return };
+        let Some(client) = self.server.accept(now_ns, peer, &mut self.host) else { return };
         let event = EpollEvent::new(EpollFlags::EPOLLIN, client.0.into());
         if self.epoll.add(&stream, event).is_err() {
             return self.server.closed(now_ns, client, &mut self.host);
@@ -90,6 +89,7 @@ impl Work {
         if self.connections.len() <= index {
             self.connections.resize_with(index + 1, || None);
         }
+        let peer = peer.to_string();
         self.connections[index] = Some(Connection { is_known: !stream.is_sealed(), stream, peer, awaits_room: false });
     }
 

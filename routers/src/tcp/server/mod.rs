@@ -9,9 +9,8 @@ use super::desk::Desk;
 use super::seal::{Holder, ServerSeal};
 use super::seen::{Class, HOSTS_MAX, MEMBERS_MAX, Member, Members, SAY_EVERY_NS, Seen};
 use super::stream::{Moved, Stream};
-use crate::session::ClientIndex;
-use crate::session::frame::Range;
-use crate::session::server::{Output, Server, ServerSettings, View};
+use crate::session::server::{Names, Output, Rights, Server, ServerSettings, View};
+use crate::session::{Cause, ClientIndex};
 use crate::shell::Faults;
 use door::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
@@ -67,7 +66,7 @@ pub struct ServerParts<'a> {
     /// Its certificates; none: nothing is sealed, and nobody shows who he is.
     pub seal: Option<ServerSeal>,
     /// What each node of its own system hosts, by its configuration: no certificate lets one register more. Of other systems it knows nothing.
-    pub names: BTreeMap<String, Arc<[Range]>>,
+    pub names: BTreeMap<String, Names>,
     /// The node whose system time it tells.
     pub node: &'a Arc<Node>,
 }
@@ -164,7 +163,7 @@ struct Work {
     host: Voice,
     seal: Option<ServerSeal>,
     own: Option<u8>,
-    names: BTreeMap<String, Arc<[Range]>>,
+    names: BTreeMap<String, Names>,
     /// Connections without a seal that holds, until the other end has read why, or this time has come, ns.
     parting: Vec<(u64, Stream)>,
     listener: TcpListener,
@@ -257,9 +256,9 @@ impl Work {
         let Some(connection) = connection(&mut self.connections, client) else { return false };
         if connection.stream.is_sealed() {
             let Some(Holder::Node { node, system }) = connection.stream.holder() else { return false };
-            let may_host = || self.names.get(&node).cloned().unwrap_or_default();
-            let may_host = (self.own == Some(system)).then(may_host);
-            self.server.certify(client, system, &format!("node {node} of system {system}"), may_host);
+            let given = || Rights::only(self.names.get(&node).cloned().unwrap_or_default());
+            let rights = if self.own == Some(system) { given() } else { Rights::any() };
+            self.server.certify(client, system, &format!("node {node} of system {system}"), rights);
         }
         connection.is_known = true;
         true
@@ -339,16 +338,29 @@ impl Work {
             hosts: hosts.get_mut(usize::from(client.index.0)).map(std::mem::take).unwrap_or_default(),
             age_ns: now_ns.saturating_sub(client.began_ns),
             heard_ns: now_ns.saturating_sub(client.heard_ns),
+            lost: client.lost,
             bytes: client.bytes as u64,
         };
         let classes = Class::all(self.server.counts());
         let Voice { left, refused, ref refusal, .. } = self.host;
         let (refusal, held) = (refusal.clone(), self.host.held());
-        let overtaken = self.server.overtaken();
+        let (crowded, overtaken) = (self.server.crowded(), self.server.overtaken());
+        let crowded_packages = self.server.counts().lost_for(Cause::Share);
         let mut views = self.server.views();
         let members = views.by_ref().take(MEMBERS_MAX).map(member).collect();
         let more = views.count() as u64;
-        self.shared.seen.say(Members { members, more, left, refused, refusal, overtaken, held, classes });
+        self.shared.seen.say(Members {
+            members,
+            more,
+            left,
+            refused,
+            refusal,
+            crowded,
+            crowded_packages,
+            overtaken,
+            held,
+            classes,
+        });
     }
 }
 

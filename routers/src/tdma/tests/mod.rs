@@ -4,12 +4,13 @@ mod arithmetic;
 mod overheard;
 mod scenes;
 mod single;
+mod tables;
 mod world;
 
 use crate::broken::{Broken, with};
 
 /// Checks that hold; with each mistake one of them fails.
-const CHECKS: [fn(); 14] = [
+const CHECKS: [fn(); 16] = [
     arithmetic::windows_end_where_their_guard_begins,
     single::what_is_late_is_not_sent,
     single::silence_begins_right_above_the_allowance,
@@ -24,6 +25,8 @@ const CHECKS: [fn(); 14] = [
     overheard::a_hello_leaves_in_one_of_four_cycles_and_nothing_else,
     overheard::whoever_hears_somebody_begins_no_time_for_a_while,
     overheard::who_has_begun_a_time_steps_back_until_it_is_impatient,
+    tables::whoever_starts_from_an_edited_file_beside_others_sends_nothing,
+    tables::of_two_tables_that_meet_one_goes_on,
 ];
 
 #[test]
@@ -34,7 +37,7 @@ fn all_checks_hold() {
 #[test]
 fn every_mistake_is_noticed() {
     let mut missed = Vec::new();
-    for broken in Broken::SLOTS.into_iter().chain(Broken::UNPROVEN) {
+    for broken in Broken::SLOTS.into_iter().chain(Broken::UNPROVEN).chain(Broken::TABLES) {
         let notices = |check: &fn()| with(broken, || std::panic::catch_unwind(check).is_err());
         if !CHECKS.iter().any(notices) {
             missed.push(broken);

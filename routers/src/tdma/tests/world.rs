@@ -63,7 +63,27 @@ pub(super) struct OnWire {
     pub(super) is_time: bool,
 }
 
+/// What a node is started from.
+#[derive(Clone, Debug)]
+pub(super) struct File {
+    pub(super) tdma: Tdma,
+    pub(super) masters: Vec<NodeIndex>,
+    pub(super) digest: u64,
+}
+
+impl File {
+    /// That of all.
+    pub(super) fn right() -> Self {
+        Self { tdma: tdma(), masters: MASTERS.to_vec(), digest: 7 }
+    }
+
+    fn table(&self, own: NodeIndex) -> Table {
+        Table::new(&self.tdma, &self.masters, own, 3, HEADS)
+    }
+}
+
 struct Letter {
+    from: NodeIndex,
     arrives: u64,
     bytes: [u8; TIME_BYTES],
 }
@@ -71,6 +91,7 @@ struct Letter {
 pub(super) struct One {
     pub(super) clock: Option<Clock>,
     pub(super) discipline: Discipline,
+    pub(super) file: File,
     offset_ns: u64,
     rate_ppb: i64,
     page: Option<TimeRecord>,
@@ -123,6 +144,7 @@ impl World {
         let nodes = (0..3).map(|own| One {
             clock: None,
             discipline: Discipline::new(table(own), 0),
+            file: File::right(),
             offset_ns: random.random_range(SECOND..100 * SECOND),
             rate_ppb: random.random_range(-80_000..=80_000),
             page: None,
@@ -140,18 +162,19 @@ impl World {
 
     pub(super) fn start(&mut self, node: NodeIndex) {
         let incarnation = self.random.random_range(1..u64::MAX);
+        let file = &self.nodes[usize::from(node)].file;
         let settings = TimeSettings {
             system: 1,
             own: node,
             nodes: 3,
-            masters: MASTERS.to_vec(),
-            interval: Duration::from_nanos(CYCLE),
-            digest: 7,
+            masters: file.masters.clone(),
+            interval: file.tdma.cycle,
+            digest: file.digest,
             incarnation,
         };
         let wall_ns = WALL_NS + self.random.random_range(0..SECOND) + self.now;
         let one = &mut self.nodes[usize::from(node)];
-        let table = table(node);
+        let table = one.file.table(node);
         let clock = Clock::new(settings, one.local_ns(self.now), wall_ns, one.page).in_slots(table.for_clock());
         one.clock = Some(clock);
         one.discipline = Discipline::new(table, 0);
@@ -199,6 +222,11 @@ impl World {
 
     pub(super) fn silent(&self, node: NodeIndex) -> Option<Silent> {
         self.nodes[usize::from(node)].discipline.silent()
+    }
+
+    /// How many frames of a node were on the wire.
+    pub(super) fn frames_of(&self, node: NodeIndex) -> usize {
+        self.wire.iter().filter(|frame| frame.from == node).count()
     }
 
     /// All that live send, and by one master.
@@ -282,9 +310,13 @@ impl World {
         while let Some(letter) = one.came.pop_front_if(|letter| letter.arrives <= now) {
             let came = Stamp { ns: one.local_ns(letter.arrives), doubt_ns: 100, by_kernel: true };
             let (head, rest) = FrameHead::parse(&letter.bytes).unwrap();
+            let is_other = head.digest != one.file.digest;
             let local_ns = one.local_ns(now);
             let Some(clock) = &mut one.clock else { continue };
-            let _ = clock.handle(local_ns, came, &head, rest);
+            let _ = match is_other {
+                true => clock.handle_other(local_ns, came, Some(letter.from), &head, rest),
+                false => clock.handle(local_ns, came, &head, rest),
+            };
         }
     }
 
@@ -309,7 +341,7 @@ impl World {
             one.discipline.left(local_ns, left);
             let arrives = frame.end + self.random.random_range(5 * US..25 * US);
             if !self.cut[usize::from(node)][usize::from(to)] {
-                self.nodes[usize::from(to)].came.push_back(Letter { arrives, bytes });
+                self.nodes[usize::from(to)].came.push_back(Letter { from: node, arrives, bytes });
             }
         }
         while permit.carries == Carries::All {
@@ -343,7 +375,7 @@ impl World {
     fn put(&mut self, from: NodeIndex, datagram_bytes: usize, free: &mut u64, is_time: bool) -> OnWire {
         let reaches = self.now + self.random.random_range(4 * US..20 * US);
         let begin = reaches.max(*free);
-        let end = begin + table(from).wire().ns(datagram_bytes);
+        let end = begin + self.nodes[usize::from(from)].file.table(from).wire().ns(datagram_bytes);
         *free = end;
         self.now += 2 * US;
         let frame = OnWire { from, begin, end, is_time };

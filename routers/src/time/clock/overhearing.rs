@@ -2,6 +2,7 @@
 //! ask, and not to begin a time of its own yet; nothing else.
 
 use super::Clock;
+use super::other_tables::claim;
 use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::time::election::State;
@@ -24,10 +25,18 @@ impl Clock {
         if broken!(TakesUnproven) {
             return self.handle(now_ns, received, head, rest);
         }
-        if !self.is_ours(head) {
+        let is_other = head.digest != self.settings.digest;
+        if !self.is_ours(&FrameHead { digest: self.settings.digest, ..*head }) {
             return Err(Ignored::Stranger);
         }
+        if self.is_unsteady(now_ns) {
+            return Err(Ignored::Unsteady);
+        }
+        if self.is_parted(now_ns) || (is_other && broken!(DeafToOtherTables)) {
+            return Err(Ignored::OtherTable);
+        }
         let message = Message::parse(head.kind, rest)?;
+        let theirs = claim(head, &message).filter(|_| is_other);
         let told = match &message {
             Message::Sync(sync) if sync.replacement => None,
             Message::Sync(sync) => Some(Told { epoch: sync.epoch, system_ns: sync.sent_ns, error_ns: 0 }),
@@ -44,18 +53,19 @@ impl Clock {
         }
         let is_patient = slots.overheard.is_patient(now_ns);
         self.election.overhears(&slots.overheard);
-        if let Message::Sync(sync) = message
-            && is_patient
-            && self.is_beginning()
-            && self.election.would_yield(head.from, &sync, self.is_followed(now_ns))
-        {
+        let yields = match (message, theirs) {
+            (_, Some(theirs)) => theirs > self.claim(now_ns),
+            (Message::Sync(sync), None) => self.election.would_yield(head.from, &sync, self.is_followed(now_ns)),
+            _ => false,
+        };
+        if is_patient && self.is_beginning() && yields {
             self.step_back(now_ns);
         }
         Ok(())
     }
 
     /// What this master began nobody goes by yet, and another's time may be older: it listens again.
-    fn step_back(&mut self, now_ns: u64) {
+    pub(super) fn step_back(&mut self, now_ns: u64) {
         self.election.steps_back(now_ns);
         self.line.stop_slew(now_ns);
         self.forget();

@@ -118,7 +118,7 @@ impl Clock {
         if master.epoch > epoch || self.is(Broken::Steps) {
             let error_ns = self.bound_ns(&estimate, estimate.offset_ns, &master);
             self.line.step(now_ns, master.epoch, target_ns, pace_ppb, error_ns, drift_ns_s);
-        } else if master.epoch < epoch || !self.line.is_synchronised() || by_ns.unsigned_abs() > STEP_MIN_NS {
+        } else if master.epoch < epoch || by_ns.unsigned_abs() > STEP_MIN_NS {
             self.far = true;
             self.slots.iter_mut().for_each(|slots| slots.unsure = true);
             return;

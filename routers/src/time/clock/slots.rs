@@ -21,6 +21,11 @@ const BEGINNING_CYCLES: u8 = JOINING_SYNCS;
 /// So many Syncs of a master in a row are missing when another takes its place.
 const MISSES: u64 = 3;
 
+/// So many cycles and slots of this node the time of another configuration may go on beside its own, if that has the greater claim: whoever
+/// hears it has yielded by then.
+const OTHERS_CYCLES: u64 = 2 * JOINING_SYNCS as u64;
+const OTHERS_SLOTS: u64 = 2;
+
 const MS: u64 = 1_000_000;
 
 /// What of time may leave now.
@@ -74,6 +79,12 @@ impl Slots {
         (self.unsure, self.master_error_ns) = (false, master_error_ns);
     }
 
+    /// What was heard of the time does not count any more.
+    pub(super) fn goes_by_nobody(&mut self) {
+        self.coarse.clear();
+        self.overheard.forget();
+    }
+
     /// This node reigns by such a time, which may be so far off that of an earlier term.
     pub(super) fn reigns(&mut self, error_ns: u64, origin: Origin) {
         self.goes_by(error_ns);
@@ -87,6 +98,8 @@ impl Clock {
     /// For a clock that is new: it listens first, whatever its page says.
     pub fn in_slots(mut self, settings: InSlots) -> Self {
         self.election.asks_after(JOINING_SYNCS.into(), settings.asks_every_ns);
+        let hears_ns = self.interval_ns.saturating_mul(OTHERS_CYCLES);
+        self.others.gives(hears_ns.saturating_add(settings.slot_every_ns.saturating_mul(OTHERS_SLOTS)));
         // Who hears nobody begins its terms anew, but not those of an earlier life, by which others may still go: a reign lasts longer than
         // a millisecond.
         if self.line.record().epoch > 0 {
@@ -285,6 +298,7 @@ impl Clock {
     /// The same of packages, as the one who takes them counts. `now_ns`: now by the monotonic clock, by which that is counted; `local_ns`: by
     /// that of time.
     pub fn hears_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
+        self.refused_by(packages, now_ns, local_ns);
         let State::Slave(Followed { node, .. }) = self.election.state() else { return };
         let link = &packages.peer(node).link;
         let since_ns = now_ns.saturating_sub(link.heard_ns.get());
@@ -356,7 +370,9 @@ impl Clock {
         if is_timed && epoch == heard.epoch() && off_ns <= slots.settings.allowance_ns {
             return;
         }
-        let epoch = if is_timed && epoch >= heard.epoch() { epoch + 1 } else { heard.epoch() };
+        // Also a node that knows nothing of its time any more must not go back in an epoch that it was in.
+        let is_back = epoch == heard.epoch() && system_ns < self.line.at(now_ns).ns;
+        let epoch = if (is_timed && epoch >= heard.epoch()) || is_back { epoch + 1 } else { heard.epoch() };
         self.line.step(now_ns, epoch, system_ns, EVEN_PPB, heard.bound_ns(now_ns), 0);
     }
 

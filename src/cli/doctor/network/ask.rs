@@ -24,9 +24,11 @@ const ATF_COM: u32 = 0x2;
 pub(in crate::cli::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> Option<Lan> {
     let (network, address) = (installation.network?, node.address?);
     let is_here = UdpSocket::bind((address, 0)).is_ok();
-    let ports = [network.port, network.time_port()];
+    let rest = installation.tdma.is_none().then(|| network.rest_port());
+    let ports = [Some(network.port), Some(network.time_port()), rest].into_iter().flatten();
     let ports = ports
-        .map(|number| Port { number, state: if is_here { try_port(address, number) } else { PortState::Unknown } });
+        .map(|number| Port { number, state: if is_here { try_port(address, number) } else { PortState::Unknown } })
+        .collect();
     let launched =
         Node::open(&node_directory(&installation.name, &node.name)).is_ok_and(|node| node.launcher().is_some());
     let others = installation.nodes.iter().filter(|other| other.name != node.name);

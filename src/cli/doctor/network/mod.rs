@@ -23,8 +23,8 @@ pub(super) struct Lan {
     pub(super) is_here: bool,
     /// The addresses that it has, and on which device.
     pub(super) addresses: Vec<(String, IpAddr)>,
-    /// That of packages, and that of time.
-    pub(super) ports: [Port; 2],
+    /// That of packages, that of time, and without time slots that of packages that are not real time.
+    pub(super) ports: Vec<Port>,
     /// A router of this node runs here.
     pub(super) runs: bool,
     pub(super) stamps: Stamps,
@@ -85,7 +85,7 @@ pub(super) enum Reach {
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     let Some(lan) = &machine.asked.lan else { return Vec::new() };
     let from = needs.from.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
-    let mut findings = vec![security(&from), address(lan, &from)];
+    let mut findings = vec![address(lan, &from)];
     findings.extend(lan.ports.iter().map(|port| self::port(lan, port, &from)));
     findings.extend(buffers(machine));
     findings.extend(stamps(lan));
@@ -94,16 +94,6 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
         findings.extend(mtu(peer, lan, &from));
     }
     findings
-}
-
-fn security(from: &str) -> Finding {
-    Finding::not(
-        State::Warn,
-        "network security",
-        format!("none, as {from} says"),
-        "packages between nodes are neither sealed nor signed: who reaches the network can read, change and send them",
-        "a network of the robot's own, without a way in from others",
-    )
 }
 
 fn address(lan: &Lan, from: &str) -> Finding {
@@ -129,7 +119,11 @@ fn address(lan: &Lan, from: &str) -> Finding {
 }
 
 fn port(lan: &Lan, port: &Port, from: &str) -> Finding {
-    let what = if port.number == lan.ports[0].number { "port of packages" } else { "port of time" };
+    let what = match lan.ports.iter().position(|known| known.number == port.number) {
+        Some(0) => "port of packages",
+        Some(1) => "port of time",
+        _ => "port of the rest",
+    };
     let why = "the node's router takes datagrams there; a firewall must let them in from all nodes";
     let number = port.number;
     match &port.state {
@@ -192,7 +186,6 @@ fn stamps(lan: &Lan) -> Option<Finding> {
 fn reach(peer: &Peer, lan: &Lan) -> Finding {
     let (what, why) = ("peer", "each node's router sends to each other one");
     let node = format!("{} at {}", peer.name, peer.address);
-    let port = lan.ports[0].number;
     match &peer.reach {
         Reach::NoRouter => Finding::ok(what, format!("{node}: is there; no router runs on it yet"), why),
         Reach::Neighbour => Finding::ok(what, format!("{node}: is there"), why),
@@ -202,9 +195,10 @@ fn reach(peer: &Peer, lan: &Lan) -> Finding {
             format!("{node}: does not answer"),
             why,
             format!(
-                "switch it on; look after cables and `ping {}`; a firewall must let UDP {port} and {} through (there: \
+                "switch it on; look after cables and `ping {}`; a firewall must let UDP {} through (there: \
                  `sudo nft list ruleset`)",
-                peer.address, lan.ports[1].number
+                peer.address,
+                lan.ports.iter().map(|port| port.number.to_string()).collect::<Vec<_>>().join(" and ")
             ),
         ),
         Reach::NoWay(error) => Finding::not(

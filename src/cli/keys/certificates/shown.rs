@@ -4,8 +4,8 @@ use super::{AUTHORITY, DAY, State, files, folder, holders, is_pair, state};
 use rcgen::date_time_ymd;
 use rohrpost::config::Installation;
 use rohrpost::mailbox::realtime_ns;
-use rohrpost_routers::tcp::{Authority, holds_until_s};
-use std::path::Path;
+use rohrpost_routers::tcp::{Authority, Holder, holds_until_s};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Whoever holds for less should be renewed.
@@ -31,17 +31,46 @@ pub(in crate::cli::keys) fn show(installation: &Installation) -> Vec<String> {
     });
     for holder in holders(installation) {
         let state = state(&folder, known.as_ref().ok(), &holder);
-        lines.extend(files(&folder, &holder.file_name()).map(|file| match state {
-            State::Holds => format!("{}: is there{}", file.display(), lasts(&file, "keys rotate")),
-            State::Missing if file.exists() => format!("{}: is there without the other file; {MAKES}", file.display()),
-            State::Missing => format!("{}: is missing; {MAKES}", file.display()),
-            State::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
-            State::Unsigned => {
-                format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
-            }
-        }));
+        lines.extend(files(&folder, &holder.file_name()).map(|file| line(&file, state)));
     }
     lines
+}
+
+/// What the programs of a node lack of what sessions with the TCP router take; empty if all of it is there and holds.
+pub(in crate::cli) fn lacking(installation: &Installation, node: &str) -> Vec<String> {
+    let Some(folder) = folder(installation) else { return Vec::new() };
+    let [certificate, _] = files(&folder, AUTHORITY);
+    let known = Authority::load(&certificate);
+    let mut lines: Vec<String> = known.as_ref().err().map(ToString::to_string).into_iter().collect();
+    let server = installation.tcp.as_ref().and_then(|tcp| tcp.server.as_deref());
+    let is_its = |holder: &Holder| match holder {
+        Holder::Node { node: name, .. } => name == node,
+        Holder::Router => server == Some(node),
+    };
+    for holder in holders(installation).filter(is_its) {
+        let state = state(&folder, known.as_ref().ok(), &holder);
+        // Without the authority nothing can be said of who has signed.
+        if state == State::Holds || (state == State::Unsigned && known.is_err()) {
+            continue;
+        }
+        let [certificate, secret] = files(&folder, &holder.file_name());
+        let is_at_fault = |file: &PathBuf| state != State::Missing || !file.exists();
+        lines.extend([certificate, secret].into_iter().filter(is_at_fault).take(1).map(|file| line(&file, state)));
+    }
+    lines
+}
+
+/// One of the two files of a holder.
+fn line(file: &Path, state: State) -> String {
+    match state {
+        State::Holds => format!("{}: is there{}", file.display(), lasts(file, "keys rotate")),
+        State::Missing if file.exists() => format!("{}: is there without the other file; {MAKES}", file.display()),
+        State::Missing => format!("{}: is missing; {MAKES}", file.display()),
+        State::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
+        State::Unsigned => {
+            format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
+        }
+    }
 }
 
 /// For how long a certificate holds that holds now, and what `renews` it; nothing of what is no certificate.

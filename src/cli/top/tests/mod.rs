@@ -64,7 +64,7 @@ fn json_says_what_the_screen_says() {
         (&json["installation"], &json["node"], &json["interval_s"]),
         (&"demo".into(), &"main".into(), &1.0.into())
     );
-    assert_eq!(json["states"], serde_json::json!({ "on": 2, "off": 1, "error": 1, "left out": 1 }));
+    assert_eq!(json["states"], serde_json::json!({ "on": 2, "off": 1, "error": 1, "stopped": 1 }));
     assert_eq!((&json["received_per_s"], &json["lost"], &json["lost_per_s"]), (&86.0.into(), &9.into(), &7.0.into()));
     let mapper = &json["modules"][2];
     assert_eq!(mapper["module"], "mapper.0");
@@ -87,7 +87,7 @@ fn json_says_what_the_screen_says() {
 #[test]
 fn the_first_look_has_no_rates() {
     let robot = Robot::new();
-    let model = super::Model::new(&robot.installation, "main", &["main"], &robot.earlier, None, &Default::default());
+    let model = super::Model::new(&robot.installation, "main", &["main"], &robot.earlier, None);
     assert_eq!((model.interval_s, model.received_per_s), (None, None));
     assert!(model.modules.iter().all(|row| row.sent_per_s.is_none() && row.cpu_percent.is_none()));
     assert!(model.modules.iter().all(|row| row.waited_p99_s.is_none() && row.lost_per_s.is_none()));

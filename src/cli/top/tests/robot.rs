@@ -5,7 +5,7 @@ use super::super::draw::{OutputText, View};
 use super::super::model::{Model, Sample, TimeNow};
 use super::super::palette::Palette;
 use super::super::{app::App, output};
-use crate::cli::summary::{Losses, ModuleLine};
+use crate::cli::summary::{ModuleLine, module_lines};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use rohrpost::Name;
@@ -13,12 +13,12 @@ use rohrpost::common::OutputLevel;
 use rohrpost::config::Installation;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::MotorInterface;
+use rohrpost::mailbox::sys::Scheduling;
 use rohrpost::mailbox::{
     Class, ClassTraffic, FlowInfo, Full, Latency, Loss, MailboxInfo, ModuleState, ParticipantInfo, Shape, Type, local,
 };
 use rohrpost::output::OutputLine;
 use rohrpost::survey::{ModuleSurvey, Survey, Usage, sum};
-use std::collections::HashMap;
 use std::path::Path;
 use std::time::Duration;
 
@@ -78,8 +78,7 @@ impl Robot {
                 counts("gui.0", None, [0; 4], 0),
             ],
         );
-        let errors = HashMap::from([(name(&installation, "mapper.0"), "no scan has come for 5 s".to_owned())]);
-        let model = Model::new(&installation, "main", &["main"], &now, Some(&earlier), &errors);
+        let model = Model::new(&installation, "main", &["main"], &now, Some(&earlier));
         Self { installation, earlier, now, model }
     }
 
@@ -157,13 +156,14 @@ fn sample(installation: &Installation, at_ns: u64, counts: &[Counts]) -> Sample 
         flow(module, if module.name == pilot { motor } else { pilot }, counts.sent)
     };
     let flows = flows.map(flow).collect();
-    let lines = counts.iter().zip(&modules).map(|(counts, module)| line(installation, counts, module)).collect();
+    let survey = Survey { node: "main".into(), at_ns, classes: sum(&mailboxes), modules, mailboxes, flows };
+    let lines = module_lines(installation, &survey, None);
     Sample {
-        lines,
+        lines: counts.iter().zip(lines).map(|(counts, seen)| line(counts, seen)).collect(),
         time: TimeNow { time_ns: 1_795_257_612_000_000_000, time_source: "simulation", time_pace: 2.0 },
         launched: true,
         silent: Vec::new(),
-        survey: Survey { node: "main".into(), at_ns, classes: sum(&mailboxes), modules, mailboxes, flows },
+        survey,
     }
 }
 
@@ -177,6 +177,7 @@ fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSur
         state: Some(state),
         restarts: u32::from(counts.module == "pilot.0"),
         joined_ns: 0,
+        in_hand: None,
     });
     // Each waited 25 to 33 µs, and one of fifteen some milliseconds.
     let mut waited = Latency { max: Duration::from_millis(6), ..Latency::default() };
@@ -193,7 +194,13 @@ fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSur
         node: "main".into(),
         at_ns: Some(at_ns),
         usage: process.is_some().then_some(usage),
-        scheduling: None,
+        scheduling: process.is_some().then_some(match counts.module {
+            "motor.0" => Scheduling::Fifo(34),
+            _ => Scheduling::Normal(0),
+        }),
+        working: None,
+        child: None,
+        error: (counts.state == Some(ModuleState::Error)).then(|| "no scan has come for 5 s".to_owned()),
         name,
         faces: configured.faces.clone(),
         process,
@@ -248,27 +255,7 @@ fn flow(module: &ModuleSurvey, to: Name, packages: u64) -> FlowInfo {
     }
 }
 
-fn line(installation: &Installation, counts: &Counts, module: &ModuleSurvey) -> ModuleLine {
-    let running = module.process.is_some();
-    ModuleLine {
-        module: counts.module.into(),
-        node: "main".into(),
-        faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
-        state: counts.state.map_or("left out", ModuleState::name).into(),
-        priority: module.name.class().0,
-        scheduling: if !running {
-            "-".into()
-        } else if counts.module == "motor.0" {
-            "fifo 34".into()
-        } else {
-            "nice 0".into()
-        },
-        pid: module.process.as_ref().map(|process| process.pid),
-        received: counts.received,
-        // As after a second in which the others counted this.
-        received_per_s: Some(counts.received as f64 / 10.0),
-        waiting: counts.waiting,
-        losses: Losses::new(&module.losses),
-        restarts: module.process.as_ref().map_or(0, |process| process.restarts),
-    }
+fn line(counts: &Counts, line: ModuleLine) -> ModuleLine {
+    // As after a second in which the others counted this.
+    ModuleLine { received_per_s: Some(counts.received as f64 / 10.0), ..line }
 }

@@ -4,10 +4,11 @@ mod faults;
 mod streams;
 
 use super::book::{Book, Known, Teller};
-use super::plan::{Clock, Plan, client_settings, module, ranges, server_settings, shared, system_of};
+use super::plan::{Clock, Plan, client_settings, loud, module, ranges, server_settings, shared, system_of};
+use crate::admission::capped;
+use crate::session::LOOK_EVERY_NS;
 use crate::session::client::{self, Client, Package};
 use crate::session::server::{self, Server};
-use crate::session::{LOOK_EVERY_NS, without_hurry};
 use crate::sim::chance::Chance;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Options, Priority, TimeRecord, TimeSource, Type};
 use streams::Connection;
@@ -64,7 +65,8 @@ impl World {
             up_ns: None,
             refusals: Vec::new(),
         };
-        let book = Book::new((0..plan.clients).map(known).collect());
+        let mut book = Book::new((0..plan.clients).map(known).collect());
+        book.flooder = plan.flooder;
         let (may_fail, server_life) = (!plan.calm, chance.bits() | 1);
         Self {
             now_ns: 0,
@@ -145,7 +147,18 @@ impl World {
         self.connections.iter().any(|connection| connection.client == client && is_whole(connection))
     }
 
+    /// As much as the flooder's own line takes, to all others.
+    fn flood(&mut self) {
+        let Some(flooder) = self.plan.flooder.filter(|_| self.may_post) else { return };
+        for to in (0..self.nodes.len()).filter(|to| *to != flooder) {
+            let len = self.posts.between(200, 2000) as u16;
+            let (from, kind, priority) = (loud(flooder), Type::data(2), Priority(250));
+            self.send(flooder, Head { to: module(to), from, len, kind, priority, ..Head::default() }, false);
+        }
+    }
+
     fn post(&mut self) {
+        self.flood();
         let share = (self.plan.per_s * 1000).min(1_000_000) as u32;
         let times = if self.posts.per_million(5000) { 40 } else { 1 };
         for _ in 0..times {
@@ -159,7 +172,7 @@ impl World {
         let posts = &mut self.posts;
         let senders = if self.plan.held_bytes.is_some() { 1 } else { self.nodes.len() };
         let from = posts.below(senders as u64) as usize;
-        let is_forged = posts.percent(2);
+        let is_forged = posts.percent(2) && self.plan.flooder.is_none();
         let sender = if is_forged { (from + 1) % self.nodes.len() } else { from };
         let other = posts.below(self.nodes.len() as u64) as usize;
         let to = match posts.below(100) {
@@ -170,9 +183,11 @@ impl World {
             90..95 => shared(system_of(other)),
             _ => Name::new(2, 250, 9, 0),
         };
-        let len = if posts.percent(95) { posts.between(8, 200) } else { posts.between(8, 65_000) } as u16;
+        let is_short = posts.percent(95) || self.plan.flooder.is_some();
+        let len = if is_short { posts.between(8, 200) } else { posts.between(8, 65_000) } as u16;
         let priority = Priority(posts.pick(&[10, 60, 60, 150, 250]));
-        let kind = if posts.percent(40) { Type::command(16) } else { Type::data(1) };
+        let is_command = posts.percent(40) || self.plan.flooder.is_some_and(|flooder| flooder != from);
+        let kind = if is_command { Type::command(16) } else { Type::data(1) };
         let is_newest = kind == Type::data(1) && posts.percent(60);
         let (id, options) = if is_newest { (posts.below(3) as u16, Options::NEWEST) } else { (0, Options::default()) };
         let head = Head { to, from: module(sender).with_local(1), len, kind, id, priority, options };
@@ -180,7 +195,7 @@ impl World {
     }
 
     pub(super) fn send(&mut self, from: usize, head: Head, is_forged: bool) -> usize {
-        let (number, body) = self.book.post(from, without_hurry(&head), is_forged);
+        let (number, body) = self.book.post(from, capped(&head), is_forged);
         self.book.saw("posted");
         let node = &mut self.nodes[from];
         let now_ns = node.clock.at(self.now_ns);

@@ -5,6 +5,7 @@ use super::World;
 use crate::session::ClientIndex;
 use crate::session::tests::book::Teller;
 use crate::session::tests::pipe::Pipe;
+use crate::session::tests::plan::address;
 
 /// A stream from a client to the server, as both see it.
 pub(super) struct Connection {
@@ -79,9 +80,9 @@ impl World {
         let now_ns = node.clock.at(self.now_ns);
         let is_there = self.now_ns >= self.server_down_until_ns;
         let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
-        let name = format!("address {index}");
+        let from = address(index, node.attempts);
         let place = self.server_clock.at(self.now_ns);
-        let Some(place) = is_there.then(|| self.server.accept(place, &name, &mut teller)).flatten() else {
+        let Some(place) = is_there.then(|| self.server.accept(place, from, &mut teller)).flatten() else {
             let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
             return node.client.closed(now_ns, &mut teller);
         };
@@ -90,6 +91,9 @@ impl World {
         let (mut up, mut down) = (Pipe::new(up, line, self.plan.calm), Pipe::new(down, line, self.plan.calm));
         if let Some(bytes) = self.plan.held_bytes.filter(|_| index == 0) {
             (up, down) = (up.holding(bytes), down.holding(bytes));
+        }
+        if self.plan.flooder.is_some_and(|flooder| flooder != index) {
+            down = down.holding(8 * 1024);
         }
         if self.plan.stalled == Some(index) && self.now_ns >= S {
             down.stalled_until_ns = u64::MAX;

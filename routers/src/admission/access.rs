@@ -1,7 +1,7 @@
 //! Which classes may command which: the receiving node sees to it.
 
 use rohrpost_config as config;
-use rohrpost_mailbox::{Class, Head, Kind};
+use rohrpost_mailbox::{Class, Head, Kind, local};
 
 /// Rules, one for each class that not all may command.
 #[derive(Clone, Debug, Default)]
@@ -28,11 +28,12 @@ impl Access {
         Self { rules: rules.iter().map(rule).collect() }
     }
 
-    /// Whether a package may go to its mailbox: all but commands may.
+    /// Whether a package may go to its mailbox: all may but commands, and what else takes up room in a mailbox for commands.
     pub fn allows(&self, head: &Head) -> bool {
+        let is_command = matches!(head.kind.kind(), Kind::Command(_)) || head.to.local() == local::COMMANDS;
         let Class(from) = head.from.class();
         let may = |rule: &Rule| rule.callers[usize::from(from / 64)] & 1 << (from % 64) != 0;
-        !matches!(head.kind.kind(), Kind::Command(_)) || self.rule(head.to.class()).is_none_or(may)
+        !is_command || self.rule(head.to.class()).is_none_or(may)
     }
 
     /// Line of the rule for a class, if there is one.
@@ -59,7 +60,9 @@ mod tests {
         for (to, from, may) in [(200, 64, true), (200, 255, true), (200, 63, false), (200, 200, false), (199, 63, true)]
         {
             assert_eq!(access.allows(&command(to, from)), may, "{from} commands {to}");
-            assert!(access.allows(&head(module(to, 0), module(from, 1), 0)), "data go to all");
+            let data = head(module(to, 0), module(from, 1), 0);
+            assert_eq!(access.allows(&data), may, "data of {from} in the mailbox for commands of {to}");
+            assert!(access.allows(&Head { to: data.to.with_local(local::DATA), ..data }), "else data go to all");
         }
         assert_eq!((access.line(Class(200)), access.line(Class(1))), (Some(7), None));
     }

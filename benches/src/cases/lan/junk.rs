@@ -1,0 +1,101 @@
+//! A package now and then from node to node, while somebody sends 500 000 datagrams a second to each port of the far one: how much later it comes than
+//! without them.
+//!
+//! ```text
+//!  processor 0                                processor 1
+//!  ping ─▶ router ═══════════════════════════▶ router ─▶ pong
+//!  junk ══════════════════════════════════════▶ both of its ports
+//! ```
+//! `junk`: from an address that no node has; `junk of a peer`: from that of the near node, as an attacker may write it on what it sends. The floor of each: a
+//! bare hop by UDP under the same junk, to ports that nobody reads. It tells what the junk costs the computer that carries it, whoever is its target.
+
+use super::{Ground, hop::ETHERNET};
+use crate::cases::Case;
+use crate::harness::{Cell, End, Failure, time_two_processes};
+use crate::lan::Wire;
+use crate::lan::ends::Module;
+use crate::lan::junk::Junk;
+use crate::lan::nodes::{Network, UNPACED};
+use crate::lan::udp::Datagrams;
+use crate::lan::wire::address;
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::Summary;
+use std::cell::RefCell;
+use std::time::Duration;
+
+const BYTES: usize = 64;
+const MESSAGES: usize = 2_000;
+const PACE: Duration = Duration::from_micros(500);
+/// Of packages and of time, as configurations have them that say nothing; and two that nobody reads.
+const PORTS: [u16; 2] = [21_117, 21_118];
+const UNREAD: [u16; 2] = [21_217, 21_218];
+
+/// Whose address stands on it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum From {
+    /// That of a third computer, which is no node.
+    Stranger,
+    /// That of the near end: a node that the far one takes datagrams of.
+    Peer,
+}
+
+/// All of them.
+pub(super) fn cases() -> Vec<Box<dyn Case>> {
+    let case = |name, from| Box::new(Junked { name, from }) as Box<dyn Case>;
+    vec![case("junk", From::Stranger), case("junk of a peer", From::Peer)]
+}
+
+struct Junked {
+    name: &'static str,
+    from: From,
+}
+
+impl Case for Junked {
+    fn name(&self) -> String {
+        self.name.into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
+        let ground = Ground::on(settings, &network, Wire::with_stranger(network.mtu));
+        let cell = Cell { pace: Some(PACE), ..Cell::hop(BYTES, settings.count(MESSAGES)) };
+        let rates = RefCell::new(Vec::new());
+        let under_junk = |ports, timed: &dyn Fn() -> Result<Vec<f64>, Failure>| {
+            let wire = ground.wire()?;
+            let go = || match self.from {
+                From::Stranger => wire.enter_stranger(),
+                From::Peer => wire.enter(End::Ping),
+            };
+            let junk = Junk::start(go, address(End::Pong), ports)?;
+            let samples = timed();
+            rates.borrow_mut().push(junk.end()?);
+            samples
+        };
+        let ours = || {
+            let (nodes, turn) = ground.turn()?;
+            time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, BYTES, meetings))
+        };
+        let udp = || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end));
+        let contenders = [
+            Contender::sampled("rohrpost", || under_junk(&PORTS, &ours)),
+            Contender::sampled("no junk", ours),
+            Contender::sampled("udp, junk on unread ports", || under_junk(&UNREAD, &udp)),
+            Contender::sampled("udp", udp),
+        ];
+        let judged = (self.from == From::Stranger).then_some(Target::AtMost(1.2));
+        let versus = [
+            Versus { name: "no junk", p50: None, p99: judged },
+            Versus { name: "udp, junk on unread ports", p50: None, p99: None },
+            Versus { name: "udp", p50: None, p99: None },
+        ];
+        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
+        let mut rows = compare(settings, &subject, &contenders, &versus);
+        let median = crate::statistics::median(rates.borrow().iter().copied());
+        rows.extend(median.map(|median| {
+            let subject = Subject { case: self.name(), bytes: None, unit: "datagrams/s" };
+            Row::alone(subject, "junk to each port", Ok(Summary::single(median)))
+        }));
+        Ok(rows)
+    }
+}

@@ -1,0 +1,94 @@
+//! Somebody who sends what nobody wants to know, as fast as a processor can.
+
+use crate::harness::{Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle};
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// As long as a datagram of time, so that nobody can tell it by its length.
+const BYTES: usize = 108;
+/// To each port so many a second, if the processor can.
+const WANTED_S: u64 = 500_000;
+/// Sent without a look at the clock.
+const BURST: u64 = 64;
+const ENDS_WITHIN: Duration = Duration::from_secs(5);
+
+#[repr(C)]
+struct Counts {
+    begun: Gate,
+    over: AtomicU64,
+    sent: AtomicU64,
+}
+
+// SAFETY: atomics only.
+unsafe impl Zeroable for Counts {}
+
+/// Junk on its way to a node, until it is ended or dropped.
+///
+/// Who makes it has the near processor with what else runs there: with two processors there is no third for it. What a datagram costs until it is dropped
+/// or in a socket is spent on that processor too, since the network of namespaces carries each datagram in the thread that sends it.
+pub struct Junk {
+    counts: Shared<Counts>,
+    child: Child,
+    began: Instant,
+    ports: u64,
+}
+
+impl Junk {
+    /// Starts it, to these ports of a node. `go`: to where it comes from.
+    ///
+    /// # Errors
+    /// When there can be no further process, or no socket.
+    pub fn start(go: impl FnOnce() -> Result<(), Failure>, to: IpAddr, ports: &[u16]) -> Result<Self, Failure> {
+        let counts = Shared::<Counts>::new()?;
+        let child = Child::start(|| {
+            go()?;
+            let sockets: Result<Vec<_>, Failure> = ports.iter().map(|port| open((to, *port).into())).collect();
+            settle(End::Ping, Placement::TwoCores, Scheduling::Normal)?;
+            counts.begun.meet(2)?;
+            send(&sockets?, &counts)
+        })?;
+        counts.begun.meet(2)?;
+        Ok(Self { counts, child, began: Instant::now(), ports: ports.len() as u64 })
+    }
+
+    /// Ends it, and tells how many a second went to each port.
+    ///
+    /// # Errors
+    /// What it failed with.
+    pub fn end(self) -> Result<f64, Failure> {
+        let seconds = self.began.elapsed().as_secs_f64();
+        let sent = self.counts.sent.load(Ordering::Acquire);
+        self.counts.over.store(1, Ordering::Release);
+        self.child.finish(Instant::now() + ENDS_WITHIN)?;
+        Ok(sent as f64 / seconds / self.ports as f64)
+    }
+}
+
+fn open(to: SocketAddr) -> Result<UdpSocket, Failure> {
+    let opened = || {
+        let socket = UdpSocket::bind("0.0.0.0:0")?;
+        socket.connect(to)?;
+        Ok(socket)
+    };
+    opened().map_err(|error: std::io::Error| Failure::of("udp socket", error))
+}
+
+/// Each port in turn, until it is over.
+fn send(sockets: &[UdpSocket], counts: &Counts) -> Result<(), Failure> {
+    let (began, message) = (Instant::now(), [0x5a; BYTES]);
+    let wanted_s = WANTED_S * sockets.len() as u64;
+    while counts.over.load(Ordering::Acquire) == 0 {
+        let sent = counts.sent.load(Ordering::Acquire);
+        if sent > began.elapsed().as_nanos() as u64 * (wanted_s / 1_000) / 1_000_000 {
+            std::hint::spin_loop();
+            continue;
+        }
+        for socket in sockets.iter().cycle().take(BURST as usize) {
+            // Nobody may listen there, or the queue is full: it has cost what it costs.
+            let _ = socket.send(&message);
+        }
+        counts.sent.store(sent + BURST, Ordering::Release);
+    }
+    Ok(())
+}

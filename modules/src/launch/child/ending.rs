@@ -1,0 +1,133 @@
+//! A process on its way to its end, because somebody wants it so.
+
+use super::{Child, Phase};
+use crate::launch::leftovers::KILL_TIME;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use rohrpost_mailbox::Node;
+use std::time::{Duration, Instant};
+
+/// What becomes of a module that is told to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::launch) enum Then {
+    /// It stays ended until somebody starts it.
+    Stay,
+    /// It is started again.
+    Start,
+    /// It is launch that ends.
+    End,
+}
+
+/// A process on its way to its end.
+pub(super) struct Ending {
+    then: Then,
+    /// When it was told.
+    since: Instant,
+    /// When it was killed, since it did not obey.
+    killed: Option<Instant>,
+    /// Not even that helped.
+    left_behind: bool,
+}
+
+impl Ending {
+    /// When there is something to do about it, if it has not ended by then.
+    pub(super) fn press_at(&self, stop_within: Duration) -> Option<Instant> {
+        match self.killed {
+            _ if self.left_behind => None,
+            Some(at) => Some(at + KILL_TIME),
+            None => Some(self.since + stop_within),
+        }
+    }
+}
+
+impl Child {
+    pub(super) fn ended_as_told(&mut self, ending: &Ending, how: &str, now: Instant) -> Option<String> {
+        let obeyed = if ending.killed.is_some() { "since it did not stop when told to" } else { "when told to" };
+        self.last_end = format!("{how} {obeyed}");
+        match ending.then {
+            Then::End => {
+                self.rest(Phase::Ended);
+                None
+            }
+            Then::Stay => {
+                self.rest(Phase::Stopped);
+                Some(format!("{} is stopped, as asked", self.text))
+            }
+            Then::Start => {
+                self.phase = Phase::Waiting;
+                self.since = now;
+                Some(format!("{} is started again, as asked", self.text))
+            }
+        }
+    }
+
+    /// Tells its process to end; `step` sees to it that it does. A later wish replaces an earlier one.
+    pub(in crate::launch) fn tell_to_end(&mut self, then: Then, node: &Node, now: Instant) {
+        self.last_life |= then == Then::End;
+        if then == Then::Start {
+            self.policy.begin_anew();
+        }
+        if let Some(ending) = &mut self.ending {
+            ending.then = then;
+            return;
+        }
+        self.note_switch(node);
+        if self.phase.is_over() {
+            self.turn_on = self.configured_on;
+        }
+        if self.process.is_some() || self.over.is_some() {
+            self.kill(Signal::SIGTERM);
+            self.phase = Phase::Stopping;
+            self.ending = Some(Ending { then, since: now, killed: None, left_behind: false });
+        } else if then == Then::Start {
+            (self.phase, self.since) = (Phase::Waiting, now);
+        } else if !self.phase.is_over() {
+            self.rest(if then == Then::Stay { Phase::Stopped } else { Phase::Ended });
+        }
+    }
+
+    /// Sees to it that a process that was told to end does.
+    pub(super) fn press(&mut self, now: Instant) -> Option<String> {
+        let (within, pid) = (self.stop_within, self.process.as_ref()?.id());
+        let ending = self.ending.as_mut()?;
+        match ending.killed {
+            None if now >= ending.press_at(within)? => {
+                self.force(now);
+                Some(format!("{} did not stop within {within:?}; killed", self.text))
+            }
+            Some(_) if now >= ending.press_at(within)? => {
+                // It waits for broken hardware, say. The others still have to be looked after.
+                ending.left_behind = true;
+                Some(format!("{} (process {pid}) cannot even be killed; left behind", self.text))
+            }
+            _ => None,
+        }
+    }
+
+    /// Kills a process that was told to end; false when there is none, or it was killed before.
+    pub(in crate::launch) fn force(&mut self, now: Instant) -> bool {
+        let Some(ending) = self.ending.as_mut().filter(|ending| ending.killed.is_none()) else { return false };
+        ending.killed = Some(now);
+        // A stopped process obeys this one too.
+        self.kill(Signal::SIGKILL);
+        true
+    }
+
+    /// Whether it was told to end and did not within its time.
+    pub(in crate::launch) fn overran(&self) -> bool {
+        self.ending.as_ref().is_some_and(|ending| ending.killed.is_some())
+    }
+
+    /// Whether there is nothing more to wait for.
+    pub(in crate::launch) fn is_gone(&self) -> bool {
+        let left_behind = self.ending.as_ref().is_some_and(|ending| ending.left_behind);
+        left_behind || self.process.is_none() && self.over.is_none()
+    }
+
+    pub(super) fn kill(&self, signal: Signal) {
+        if let Some(process) = &self.process {
+            // Not reaped yet, so the number still is this child's.
+            let _ = kill(Pid::from_raw(process.id() as i32), signal);
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What launch sees of a module that runs: the part of its code that does not come back, and why it is in error. Knows no process and
+//! asks nobody; what there is to know comes as an argument.
+
+use crate::survey::Working;
+use rohrpost_mailbox::{InHand, Name, Node, monotonic_ns};
+use std::time::{Duration, Instant};
+
+/// It is looked no more often than this whether a part of a module's code has come back.
+const LOOK_MIN: Duration = Duration::from_millis(50);
+
+/// How a module does, while it runs.
+pub(super) struct Health {
+    busy_after: Duration,
+    look_at: Instant,
+    /// What has not come back since then was told, ns of the monotonic clock.
+    told_ns: Option<u64>,
+    /// The last that went wrong.
+    error: String,
+    /// That is why it is in error now.
+    is_present: bool,
+}
+
+/// A part of a module's code that has not come back for long.
+pub(super) struct Stuck {
+    in_hand: InHand,
+    lasts: Duration,
+}
+
+impl Stuck {
+    /// In words; the name of a function is in what the module noted of itself under one of these names.
+    pub(super) fn told(&self, node: &Node, names: &[Name]) -> String {
+        Working::new(self.in_hand.work, self.lasts, node, names.iter().copied()).to_string()
+    }
+}
+
+impl Health {
+    pub(super) fn new(busy_after: Duration, now: Instant) -> Self {
+        Self { busy_after, look_at: now, told_ns: None, error: String::new(), is_present: false }
+    }
+
+    /// When to look again. A part that begins after a look is not long before `busy_after` is over once more.
+    pub(super) fn look_at(&self) -> Instant {
+        self.look_at
+    }
+
+    /// Takes what the module has in hand; what is to be told of it, once.
+    pub(super) fn look(&mut self, in_hand: Option<InHand>, now: Instant) -> Option<Stuck> {
+        let lasts = in_hand.map_or(Duration::ZERO, |in_hand| in_hand.lasts(monotonic_ns()));
+        let left = self.busy_after.checked_sub(lasts).filter(|left| !left.is_zero());
+        self.look_at = now + left.unwrap_or(self.busy_after).max(LOOK_MIN);
+        let in_hand = in_hand.filter(|_| left.is_none())?;
+        let is_new = self.told_ns.replace(in_hand.since_ns) != Some(in_hand.since_ns);
+        is_new.then_some(Stuck { in_hand, lasts })
+    }
+
+    /// Whether the module says that it is in error and why is not known yet.
+    pub(super) fn asks_why(&mut self, in_error: bool) -> bool {
+        self.is_present &= in_error;
+        in_error && !self.is_present
+    }
+
+    /// Why it is in error.
+    pub(super) fn is_in_error(&mut self, why: String) {
+        (self.error, self.is_present) = (why, true);
+    }
+
+    /// Its process has ended; if it failed, so.
+    pub(super) fn ended(&mut self, failure: Option<&String>) {
+        self.is_present = false;
+        if let Some(failure) = failure {
+            self.error.clone_from(failure);
+        }
+    }
+
+    /// The last that went wrong; empty if nothing did.
+    pub(super) fn error(&self) -> &str {
+        &self.error
+    }
+
+    /// Why it is in error now, if it is.
+    pub(super) fn present_error(&self) -> Option<&str> {
+        self.is_present.then_some(&self.error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rohrpost_mailbox::Work;
+
+    #[test]
+    fn what_does_not_come_back_is_told_once_and_looked_for_in_time() {
+        let (second, start) = (Duration::from_secs(1), Instant::now());
+        let mut health = Health::new(second, start);
+        let since = |ago: Duration| monotonic_ns().saturating_sub(ago.as_nanos() as u64);
+        let in_hand = |since_ns| Some(InHand { work: Work::Tick, since_ns });
+        assert!(health.look(None, start).is_none());
+        assert_eq!(health.look_at(), start + second, "what begins now is long in a second");
+        let began_ns = since(second * 3 / 4);
+        assert!(health.look(in_hand(began_ns), start).is_none(), "not long yet");
+        let (look_at, quarter) = (health.look_at(), second / 4);
+        assert!(look_at > start && look_at <= start + quarter, "when it is long");
+        let began_ns = since(second * 2);
+        assert!(health.look(in_hand(began_ns), start).is_some());
+        assert!(health.look(in_hand(began_ns), start + second).is_none(), "told once");
+        assert!(health.look_at() > start + second, "launch sleeps");
+        assert!(health.look(in_hand(began_ns + 5), start + second).is_some(), "the next is another one");
+    }
+
+    #[test]
+    fn an_error_is_asked_for_once_and_stays_the_last_when_it_is_over() {
+        let mut health = Health::new(Duration::from_secs(1), Instant::now());
+        assert!(!health.asks_why(false) && health.asks_why(true) && health.asks_why(true));
+        health.is_in_error("no port".into());
+        assert!(!health.asks_why(true));
+        assert_eq!(health.present_error(), Some("no port"));
+        assert!(!health.asks_why(false));
+        assert_eq!((health.present_error(), health.error()), (None, "no port"));
+        assert!(health.asks_why(true), "it may be another one");
+        health.ended(Some(&"ended with 1".into()));
+        assert_eq!((health.present_error(), health.error()), (None, "ended with 1"));
+    }
+}

@@ -1,0 +1,208 @@
+//! The start of a launch: modules one after the other, then switched on; and what is asked of a module later on: to switch itself on,
+//! and why it is in error. Nothing here waits for a module that may be done without.
+
+use super::child::Child;
+use super::control::Phase;
+use super::{Launch, LaunchError};
+use crate::call::{CallError, Fault};
+use crate::common::{self, Status};
+use crate::output::plain;
+use rohrpost_config::{Module, Scheduling as Wanted};
+use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+/// A router that was started again so often, and is not ready, is not going to be.
+const ROUTER_RESTARTS_MAX: u32 = 8;
+
+/// Calls of launch to a module that are under way.
+#[derive(Clone, Default)]
+pub(super) struct UnderWay {
+    /// Switches it on.
+    pub(super) switch: Option<u32>,
+    /// Asks it why it is in error.
+    why: Option<u32>,
+}
+
+impl Launch {
+    pub(super) fn start_all(&mut self) -> Result<(), LaunchError> {
+        for index in 0..self.children.len() {
+            // Unless somebody wants it stopped already.
+            if self.children[index].phase() == Phase::Waiting {
+                let note = self.children[index].spawn(Instant::now());
+                self.note(note);
+            }
+            self.await_ready(index)?;
+            // At once: switched off, the collector would drop what the others say while they start.
+            if self.is_collector(&self.children[index]) {
+                self.switch_on(index);
+            }
+        }
+        self.await_any()?;
+        // One after the other, so that each finds those on that it needs.
+        for index in 0..self.children.len() {
+            self.switch_on(index);
+            while self.calls[index].switch.is_some() {
+                let turned = self.turn(0..self.children.len(), Duration::MAX, index);
+                self.switch_on(index);
+                // Who is told to stop when the last answer has come has started, and stops as such.
+                if self.calls[index].switch.is_some() {
+                    turned?;
+                }
+            }
+        }
+        let note = self.without_real_time();
+        self.note(note);
+        Ok(())
+    }
+
+    /// Until this module is ready, or the others begin without it.
+    fn await_ready(&mut self, index: usize) -> Result<(), LaunchError> {
+        // Looked at before each sleep: nothing may be left that would end it.
+        loop {
+            let child = &self.children[index];
+            match child.phase() {
+                Phase::Ready | Phase::Running | Phase::Stopped | Phase::Ended => return Ok(()),
+                Phase::Failed if child.is_required() => return Err(not_ready(child, child.last_end())),
+                Phase::Failed => {
+                    let note = format!("{} does not start; the others go on without it", child.text());
+                    self.note(Some(note));
+                    return Ok(());
+                }
+                _ if self.never_ready(child) => return Err(not_ready(child, child.last_end())),
+                _ if !child.is_required() && child.restarts() > 0 => {
+                    let note = format!(
+                        "{} does not start yet; the others go on without it, and it is tried again",
+                        child.text()
+                    );
+                    self.note(Some(note));
+                    return Ok(());
+                }
+                Phase::Starting | Phase::Waiting | Phase::Stopping => {}
+            }
+            self.turn(0..index + 1, Duration::MAX, index)?;
+        }
+    }
+
+    /// A node of whose modules none starts has not started.
+    fn await_any(&mut self) -> Result<(), LaunchError> {
+        let is_in_file = |child: &Child| self.installation.module(child.name()).is_some_and(Module::is_in_file);
+        let own: Vec<usize> = (0..self.children.len()).filter(|index| is_in_file(&self.children[*index])).collect();
+        let work: Vec<usize> = own.iter().copied().filter(|index| !self.is_collector(&self.children[*index])).collect();
+        let work = if work.is_empty() { own } else { work };
+        let Some(first) = work.first().copied() else { return Ok(()) };
+        loop {
+            let phase = |index: &usize| self.children[*index].phase();
+            if work.iter().any(|index| !matches!(phase(index), Phase::Failed | Phase::Waiting | Phase::Starting)) {
+                return Ok(());
+            }
+            if work.iter().all(|index| phase(index) == Phase::Failed) {
+                return Err(not_ready(&self.children[first], self.children[first].last_end()));
+            }
+            self.turn(0..self.children.len(), Duration::MAX, first)?;
+        }
+    }
+
+    fn is_collector(&self, child: &Child) -> bool {
+        Some(child.name().class()) == self.installation.classes.id(crate::output::CLASS)
+    }
+
+    /// A router is never given up, but a node on which it never was ready has not started: perhaps another one has its port.
+    fn never_ready(&self, child: &Child) -> bool {
+        let is_router = self.installation.module(child.name()).is_some_and(|module| !module.is_in_file());
+        is_router && child.is_required() && child.restarts() > ROUTER_RESTARTS_MAX
+    }
+
+    /// What to say of modules that are meant to be real time and are not: where nobody reads the log, nobody would know.
+    fn without_real_time(&self) -> Option<String> {
+        let is_ordinary = |child: &&Child| {
+            let wanted = self.installation.scheduling(child.name().class());
+            let real = child.pid().and_then(|pid| scheduling_of(pid).ok());
+            matches!((wanted, real), (Wanted::Fifo { .. }, Some(Scheduling::Normal(_))))
+        };
+        let ordinary: Vec<&str> = self.children.iter().filter(is_ordinary).map(Child::text).collect();
+        (!ordinary.is_empty()).then(|| {
+            format!(
+                "no real time: {} run{} like ordinary programs, and late when the computer is busy; allow it with a limit \
+                 `rtprio` for this user (limits.conf) or CAP_SYS_NICE (`rohrpost doctor` says what is missing)",
+                ordinary.join(", "),
+                if ordinary.len() == 1 { "s" } else { "" }
+            )
+        })
+    }
+
+    /// Sleeps until something happens, then looks after those children that were started, and answers tools.
+    fn turn(&mut self, started: Range<usize>, period: Duration, index: usize) -> Result<(), LaunchError> {
+        self.sleep(started.clone(), period);
+        if self.bell.words() > 0 {
+            return Err(not_ready(&self.children[index], "told to stop"));
+        }
+        // Those that were started before may end meanwhile.
+        started.for_each(|index| self.step(index));
+        self.serve(false);
+        Ok(())
+    }
+
+    /// Switches a module on that is ready, or looks how far that is. Never waits: one that hangs must not keep the others
+    /// from being watched.
+    pub(super) fn switch_on(&mut self, index: usize) {
+        let child = &mut self.children[index];
+        let call = self.calls[index].switch.take();
+        if child.phase() != Phase::Ready {
+            // It ended meanwhile.
+            call.into_iter().for_each(|call| self.tool.link.forget(call));
+            return;
+        }
+        let answer = match call {
+            None if !child.wants_on() => Some(Ok(())),
+            None => match self.tool.begin_switch(child.name(), true) {
+                Ok(call) => return self.calls[index].switch = Some(call),
+                Err(error) => Some(Err(error)),
+            },
+            Some(call) => {
+                self.tool.link.collect();
+                let answer = self.tool.link.poll(call);
+                self.calls[index].switch = answer.is_none().then_some(call);
+                answer
+            }
+        };
+        let Some(answer) = answer else { return };
+        child.runs(answer.is_ok());
+        if let Err(CallError::Fault(_, Fault::ModuleError(why))) = &answer {
+            child.health().is_in_error(why.clone());
+        }
+        // The lower layers know numbers only.
+        let told = |error: CallError| error.to_string().replace(&child.name().to_string(), child.text());
+        let note = answer.err().map(|error| format!("{} could not be switched on: {}", child.text(), told(error)));
+        self.note(note);
+    }
+
+    /// Asks a module that says it is in error why, or looks whether it has answered. Never waits.
+    pub(super) fn ask_why(&mut self, index: usize) {
+        let child = &mut self.children[index];
+        let call = self.calls[index].why.take();
+        if !child.asks_why(&self.node) {
+            call.into_iter().for_each(|call| self.tool.link.forget(call));
+            return;
+        }
+        let Some(call) = call else {
+            // One that cannot be asked now is asked at the next look.
+            self.calls[index].why = self.tool.begin(child.name(), common::STATUS, common::HASH, |_| Ok(())).ok();
+            return;
+        };
+        self.tool.link.collect();
+        match self.tool.link.poll_for(call, |bytes| postcard::from_bytes::<Status>(bytes)) {
+            None => self.calls[index].why = Some(call),
+            Some(Ok(status)) if !status.error.is_empty() => {
+                let note = format!("{} is in error: {}", child.text(), plain::line(&status.error));
+                child.health().is_in_error(status.error);
+                self.note(Some(note));
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+fn not_ready(child: &Child, why: &str) -> LaunchError {
+    LaunchError::NotReady { module: child.text().into(), why: why.into(), notes: Vec::new() }
+}

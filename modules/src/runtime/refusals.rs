@@ -1,0 +1,110 @@
+//! Packages that a module or launch does not take: counted by cause, and told seldom, so that nobody fills the log with them.
+
+use crate::common::Refused;
+use rohrpost_mailbox::Name;
+use std::time::{Duration, Instant};
+
+/// They are told at most so often.
+const TELL: Duration = Duration::from_secs(10);
+
+/// Why a package is not taken.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Cause {
+    /// `[access]` does not let the sender's class command this one.
+    NotAllowed,
+    /// The sender holds its share of places, or all are taken.
+    NoPlace,
+    /// It is no command, or no data.
+    Malformed,
+    /// There is no such subscription.
+    Unasked,
+    /// The subscription follows another module.
+    OtherPublisher,
+    /// The subscription is to data of another number.
+    OtherNumber,
+    /// An earlier life of the module asked for it.
+    EarlierLife,
+}
+
+impl Cause {
+    /// What is told of it. Nothing where it happens to all: after a restart, what the life before asked for still comes for a while.
+    fn words(self) -> Option<&'static str> {
+        match self {
+            Self::NotAllowed => Some("[access] does not let that class command this one"),
+            Self::NoPlace => Some("there is no place for more callers or subscriptions of it"),
+            Self::Malformed => Some("it is not what that mailbox takes"),
+            Self::Unasked => Some("nobody subscribed to it"),
+            Self::OtherPublisher => Some("the subscription follows another module"),
+            Self::OtherNumber => Some("the subscription is to other data of that module"),
+            Self::EarlierLife => None,
+        }
+    }
+}
+
+/// All refusals of one life.
+#[derive(Default)]
+pub(crate) struct Refusals {
+    pub(crate) counts: Refused,
+    /// Worth telling, and not told yet.
+    untold: u64,
+    told: Option<Instant>,
+}
+
+impl Refusals {
+    /// Counts one.
+    pub(crate) fn note(&mut self, cause: Cause, from: Name) {
+        let counts = &mut self.counts;
+        *match cause {
+            Cause::NotAllowed => &mut counts.not_allowed,
+            Cause::NoPlace => &mut counts.no_place,
+            Cause::Malformed => &mut counts.malformed,
+            Cause::Unasked => &mut counts.unasked,
+            Cause::OtherPublisher => &mut counts.other_publisher,
+            Cause::OtherNumber => &mut counts.other_number,
+            Cause::EarlierLife => &mut counts.earlier_life,
+        } += 1;
+        let Some(words) = cause.words() else { return };
+        self.untold += 1;
+        let now = Instant::now();
+        if self.told.is_none_or(|told| now >= told + TELL) {
+            let packages = std::mem::take(&mut self.untold);
+            self.told = Some(now);
+            tracing::warn!(
+                "took nothing of {packages} packages, the last of them from {from}: {words} (`rohrpost status --json` \
+                 counts them by cause)"
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_cause_has_a_count_of_its_own() {
+        let causes = [
+            Cause::NotAllowed,
+            Cause::NoPlace,
+            Cause::Malformed,
+            Cause::Unasked,
+            Cause::OtherPublisher,
+            Cause::OtherNumber,
+            Cause::EarlierLife,
+        ];
+        let mut refusals = Refusals::default();
+        for (times, cause) in (1..).zip(causes) {
+            (0..times).for_each(|_| refusals.note(cause, Name::new(1, 9, 0, 0)));
+        }
+        let expected = Refused {
+            not_allowed: 1,
+            no_place: 2,
+            malformed: 3,
+            unasked: 4,
+            other_publisher: 5,
+            other_number: 6,
+            earlier_life: 7,
+        };
+        assert_eq!(refusals.counts, expected);
+    }
+}

@@ -1,0 +1,203 @@
+//! The one point of admission: what comes from another node, from another system, or by the TCP router is judged here before it reaches a mailbox.
+//!
+//! ```text
+//!  LAN ─▶ Inbound ──────────┐                                    ┌─▶ the mailbox, with the priority that it may have
+//!                           ├─▶ way · sender · receiver · kind ──┤
+//!  TCP router ─▶ Client ────┘             · priority · body      └─▶ refused: counted by cause, a command is answered
+//! ```
+//!
+//! A function of what configuration says and of the package alone: no socket, no clock, no memory of what came before. What a receiver has asked
+//! for only the receiver knows: that data are of its subscription is looked at there.
+
+mod access;
+mod packet;
+
+pub use access::Access;
+pub use packet::Addresses;
+#[cfg(test)]
+pub(crate) use packet::tests::v4;
+
+use crate::broken::broken;
+use crate::frame::NodeIndex;
+use crate::{session, stats};
+use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER, Tunnel};
+use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
+
+/// Of a router of the LAN: takes IP packets from the same mailbox of other nodes.
+pub(crate) const TUNNEL: u8 = 4;
+/// Type of an IP packet.
+pub(crate) const PACKET: Type = Type::data(1);
+/// An IP packet goes behind all packages of modules.
+pub(crate) const PACKET_PRIORITY: Priority = Priority(0);
+
+/// What of configuration the judgement needs. The default refuses nothing but what is wrong in itself.
+#[derive(Clone, Debug, Default)]
+pub struct Admission {
+    /// Which classes may command which.
+    pub access: Access,
+    /// Class of the routers of the LAN.
+    pub router: Option<Class>,
+    /// Class of the TCP router and its clients.
+    pub tcp: Option<Class>,
+    /// The tunnel for ordinary traffic, and which of its addresses is ours.
+    pub tunnel: Option<(Tunnel, NodeIndex)>,
+}
+
+/// The way by which a package came.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Way {
+    /// From a node of the LAN. `is_its_name`: the sender is one of that node, or nobody vouches for who sent it anyway.
+    Lan {
+        /// Which node.
+        node: NodeIndex,
+        /// See above.
+        is_its_name: bool,
+    },
+    /// By the TCP router, which vouches for the sender. `is_our_name`: it is one that this node hosts itself.
+    Beyond {
+        /// See above.
+        is_our_name: bool,
+    },
+}
+
+/// Why a package is not admitted.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Refused {
+    /// Its sender is not hosted where it came from.
+    ForeignName,
+    /// It is from or for a router's own mailbox, or for a router of another system.
+    RoutersOwn,
+    /// It is no IP packet from the tunnel's address of the node that it came from to ours.
+    BadPacket,
+    /// A command of a class that may not command this one.
+    NotAllowed,
+}
+
+impl From<Refused> for stats::Cause {
+    fn from(why: Refused) -> Self {
+        match why {
+            Refused::ForeignName => Self::ForeignName,
+            Refused::RoutersOwn => Self::RoutersOwn,
+            Refused::BadPacket => Self::BadPacket,
+            Refused::NotAllowed => Self::NotAllowed,
+        }
+    }
+}
+
+impl From<Refused> for session::Cause {
+    fn from(why: Refused) -> Self {
+        match why {
+            Refused::ForeignName => Self::Foreign,
+            Refused::RoutersOwn | Refused::BadPacket => Self::RoutersOwn,
+            Refused::NotAllowed => Self::NotAllowed,
+        }
+    }
+}
+
+impl Admission {
+    /// As configuration has it for a node.
+    pub fn new(installation: &Installation, node: &str) -> Self {
+        let tunnel = installation.tdma.as_ref().and_then(|tdma| tdma.tunnel);
+        Self {
+            access: Access::new(&installation.access),
+            router: installation.classes.id(ROUTER),
+            tcp: installation.classes.id(TCP),
+            tunnel: tunnel.zip(installation.lan_index(node)),
+        }
+    }
+
+    /// Whether a package that came may go to its mailbox. Its head is one that [`capped`] has been applied to.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn judge(&self, way: Way, head: &Head, body: &[u8]) -> Result<(), Refused> {
+        let is_reply = matches!(head.kind.kind(), Kind::Reply(_));
+        match way {
+            Way::Lan { is_its_name: false, .. } if !broken!(AdmitsForeignNames) => return Err(Refused::ForeignName),
+            // In our own names the server itself speaks: it says that a module of ours is not there.
+            Way::Beyond { is_our_name }
+                if (is_our_name && !is_reply || !head.from.is_mailbox()) && !broken!(AdmitsForeignNames) =>
+            {
+                return Err(Refused::ForeignName);
+            }
+            Way::Lan { .. } | Way::Beyond { .. } => {}
+        }
+        // A reply in the name of such a mailbox says that it takes nothing.
+        if self.is_routers_own(head.to) || self.is_routers_own(head.from) && !is_reply {
+            self.judge_routers_own(way, head, body)?;
+        }
+        if self.is_across_systems(way, head) && !broken!(AdmitsRoutersOwn) {
+            return Err(Refused::RoutersOwn);
+        }
+        if self.access.allows(head) { Ok(()) } else { Err(Refused::NotAllowed) }
+    }
+
+    /// Whether a body is an IP packet from the tunnel's address of a node to ours.
+    pub(crate) fn is_packet_of(&self, node: NodeIndex, body: &[u8]) -> bool {
+        let Some((tunnel, own)) = &self.tunnel else { return false };
+        let expected = Addresses { source: tunnel.address(node).into(), destination: tunnel.address(*own).into() };
+        Addresses::of(body) == Some(expected)
+    }
+
+    /// The node whose mailbox for IP packets this is.
+    pub(crate) fn tunnel_end(&self, name: Name) -> Option<NodeIndex> {
+        (Some(name.class()) == self.router && name.local() == TUNNEL).then_some(name.instance())
+    }
+
+    /// Whether a mailbox is one by which routers carry packages. Commands, replies and data of their modules have the same mailboxes as those of
+    /// any module.
+    fn is_routers_own(&self, name: Name) -> bool {
+        let class = Some(name.class());
+        name.local() >= local::TRANSIT && (class == self.router || class == self.tcp)
+    }
+
+    /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own address.
+    fn judge_routers_own(&self, way: Way, head: &Head, body: &[u8]) -> Result<(), Refused> {
+        let node = match way {
+            Way::Lan { node, .. } => Some(node),
+            Way::Beyond { .. } => None,
+        };
+        let is_tunnel = node.is_some()
+            && self.tunnel.is_some()
+            && self.tunnel_end(head.from) == node
+            && self.tunnel_end(head.to).is_some()
+            && head.kind == PACKET;
+        match node.filter(|_| is_tunnel) {
+            None if !broken!(AdmitsRoutersOwn) => Err(Refused::RoutersOwn),
+            Some(node) if !self.is_packet_of(node, body) && !broken!(AdmitsPackets) => Err(Refused::BadPacket),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a package of another system is for a router. The TCP router alone is for all: they ask it what it hosts.
+    fn is_across_systems(&self, way: Way, head: &Head) -> bool {
+        let Head { to, from, .. } = *head;
+        let class = Some(to.class());
+        let is_for_all = class == self.tcp && to.module() == Name::new(to.system(), to.class().0, TCP_SERVER, 0);
+        let is_router = class == self.router || class == self.tcp;
+        matches!(way, Way::Beyond { .. }) && from.system() != to.system() && is_router && !is_for_all
+    }
+}
+
+/// A package's head with the priority that it may have beyond its own node.
+///
+/// Nobody makes others hurry more than it may hurry itself: a command has at most the class of its sender. A reply has the priority of the
+/// command that asked, so at most the class of its receiver, which is who asked. Data are either asked for, like a reply, or sent unasked, like a
+/// command: they have at most the greater of both classes. More cannot be said without knowing who asked for what; and who pretends to have been
+/// asked is no more urgent to its receiver than that has made itself. Into a mailbox for commands nobody has anything sent: what is more urgent than
+/// its sender would push commands out of it.
+#[must_use]
+pub fn capped(head: &Head) -> Head {
+    let (sender, receiver) = (head.from.class().priority(), head.to.class().priority());
+    let limit = match head.kind.kind() {
+        Kind::Command(_) | Kind::None => sender,
+        Kind::Reply(_) | Kind::Data(_) if head.to.local() == local::COMMANDS => sender,
+        Kind::Reply(_) => receiver,
+        Kind::Data(_) if sender.outranks(receiver) => sender,
+        Kind::Data(_) => receiver,
+    };
+    Head { priority: head.priority.at_most(limit), ..*head }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,159 @@
+use super::*;
+use rohrpost_config as config;
+use std::net::Ipv4Addr;
+
+const ROUTER: Class = Class(250);
+const TCP: Class = Class(64);
+const TUNNEL_NET: Tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
+
+/// Of node 0, with a tunnel, where only class 100 may command class 200.
+fn admission() -> Admission {
+    let rule = config::Access { class: Class(200), callers: vec![Class(100)], line: 7 };
+    Admission { access: Access::new(&[rule]), router: Some(ROUTER), tcp: Some(TCP), tunnel: Some((TUNNEL_NET, 0)) }
+}
+
+fn name(system: u8, class: u8, instance: u8, local: u8) -> Name {
+    Name::new(system, class, instance, local)
+}
+
+fn lan(node: NodeIndex) -> Way {
+    Way::Lan { node, is_its_name: true }
+}
+
+const BEYOND: Way = Way::Beyond { is_our_name: false };
+
+fn judged(way: Way, kind: Type, from: Name, to: Name) -> Result<(), Refused> {
+    admission().judge(way, &Head { to, from, kind, ..Head::default() }, &[])
+}
+
+#[test]
+fn who_has_not_the_name_that_it_sends_under_is_refused() {
+    let (mine, yours) = (name(1, 60, 1, 1), name(1, 90, 0, 2));
+    for (way, from, is_admitted, why) in [
+        (lan(1), mine, true, "a node speaks for its own names"),
+        (Way::Lan { node: 1, is_its_name: false }, mine, false, "and for no others"),
+        (BEYOND, name(2, 60, 1, 1), true, "the TCP router vouches"),
+        (Way::Beyond { is_our_name: true }, mine, false, "nobody beyond hosts our names"),
+        (BEYOND, Name::NONE, false, "none"),
+        (BEYOND, name(0, 60, 1, 1), false, "no system"),
+        (BEYOND, name(255, 60, 1, 1), false, "all systems"),
+        (BEYOND, name(2, 0, 1, 1), false, "no class"),
+    ] {
+        let expected = if is_admitted { Ok(()) } else { Err(Refused::ForeignName) };
+        assert_eq!(judged(way, Type::data(1), from, yours), expected, "{why}");
+    }
+}
+
+#[test]
+fn the_mailboxes_of_routers_take_nothing_and_their_modules_are_as_any() {
+    let tool = name(1, 32, 40, 1);
+    for class in [ROUTER.0, TCP.0] {
+        for local in 0..=u8::MAX {
+            let expected = if local < local::TRANSIT { Ok(()) } else { Err(Refused::RoutersOwn) };
+            for way in [lan(1), BEYOND] {
+                let (to, kinds) = (name(1, class, 0, local), [Type::command(16), Type::reply(16), Type::data(1)]);
+                for kind in kinds {
+                    assert_eq!(judged(way, kind, tool, to), expected, "{way:?} to {to}");
+                    let expected = if kind == Type::reply(16) { Ok(()) } else { expected };
+                    assert_eq!(judged(way, kind, name(1, class, 1, local), tool), expected, "{way:?} from {to}");
+                }
+            }
+        }
+    }
+    let module = name(1, 90, 0, local::TRANSIT);
+    assert_eq!(judged(lan(1), Type::data(1), tool, module), Ok(()), "the same local id of a module is its own");
+}
+
+#[test]
+fn of_another_systems_routers_the_tcp_router_alone_is_for_all() {
+    for (from, to, is_admitted, why) in [
+        (2, name(1, TCP.0, TCP_SERVER, 0), true, "who asks what is hosted"),
+        (2, name(1, TCP.0, 0, 0), false, "the client of a node"),
+        (2, name(1, ROUTER.0, 0, 0), false, "the router of a node"),
+        (1, name(1, TCP.0, 0, 0), true, "a tool of the same system, beyond the LAN"),
+        (1, name(1, ROUTER.0, 0, 0), true, "the same of the LAN's router"),
+        (2, name(1, 90, 0, 0), true, "a module"),
+    ] {
+        let expected = if is_admitted { Ok(()) } else { Err(Refused::RoutersOwn) };
+        assert_eq!(judged(BEYOND, Type::command(4), name(from, 32, 40, 1), to), expected, "{why}");
+    }
+    let answer = judged(BEYOND, Type::reply(4), name(2, TCP.0, TCP_SERVER, 0), name(1, 32, 40, 1));
+    assert_eq!(answer, Ok(()), "and what it answers");
+}
+
+#[test]
+fn only_classes_that_are_listed_may_command_by_whichever_way() {
+    for (kind, from, local, is_admitted) in [
+        (Type::command(16), 100, 0, true),
+        (Type::command(16), 90, 0, false),
+        (Type::command(16), 90, 3, false),
+        (Type::data(1), 90, 0, false),
+        (Type::reply(16), 90, 0, false),
+        (Type::data(1), 90, 2, true),
+        (Type::reply(16), 90, 1, true),
+    ] {
+        let (expected, to) = (if is_admitted { Ok(()) } else { Err(Refused::NotAllowed) }, name(1, 200, 0, local));
+        assert_eq!(judged(lan(1), kind, name(1, from, 1, 1), to), expected, "{kind:?} to {to}, by the LAN");
+        assert_eq!(judged(BEYOND, kind, name(2, from, 1, 1), to), expected, "{kind:?} to {to}, by the TCP router");
+    }
+}
+
+#[test]
+fn packets_of_the_tunnel_come_from_the_node_whose_address_they_have() {
+    let (ours, theirs) = (TUNNEL_NET.address(0), TUNNEL_NET.address(1));
+    let end = |node| name(1, ROUTER.0, node, TUNNEL);
+    let packet = v4(theirs, ours, b"payload");
+    let head = Head { to: end(0), from: end(1), kind: PACKET, ..Head::default() };
+    let (own, bad) = (Err(Refused::RoutersOwn), Err(Refused::BadPacket));
+    for (way, head, body, expected, why) in [
+        (lan(1), head, packet.clone(), Ok(()), "as it should be"),
+        (lan(1), head, v4(TUNNEL_NET.address(2), ours, b""), bad, "the address of a third node"),
+        (lan(1), head, v4(Ipv4Addr::new(192, 168, 0, 9), ours, b""), bad, "an address outside"),
+        (lan(1), head, v4(theirs, TUNNEL_NET.address(2), b""), bad, "for a third node"),
+        (lan(1), head, v4(theirs, Ipv4Addr::BROADCAST, b""), bad, "for all"),
+        (lan(1), head, packet[..24].to_vec(), bad, "cut short"),
+        (lan(1), head, b"no packet at all".to_vec(), bad, "something else"),
+        (lan(2), head, packet.clone(), own, "of another node than it says"),
+        (lan(1), Head { from: name(1, 60, 1, TUNNEL), ..head }, packet.clone(), own, "of a module"),
+        (lan(1), Head { from: end(1).with_local(3), ..head }, packet.clone(), own, "of another mailbox of that router"),
+        (lan(1), Head { to: end(0).with_local(3), ..head }, packet.clone(), own, "for the transit mailbox"),
+        (lan(1), Head { to: name(1, TCP.0, 0, 3), ..head }, packet.clone(), own, "for that of the TCP router's client"),
+        (lan(1), Head { kind: Type::command(1), ..head }, packet.clone(), own, "a command"),
+        (BEYOND, head, packet.clone(), own, "by the TCP router"),
+    ] {
+        assert_eq!(admission().judge(way, &head, &body), expected, "{why}");
+    }
+    let without = Admission { tunnel: None, ..admission() };
+    assert_eq!(without.judge(lan(1), &head, &packet), own, "without a tunnel there is nobody to take it");
+}
+
+#[test]
+fn nobody_hurries_more_than_it_may_or_than_who_asked_for_it() {
+    for (kind, from, to, limit, why) in [
+        (Type::command(16), 60, 200, 60, "a command, as its sender"),
+        (Type::command(16), 200, 60, 200, "a command, as its sender"),
+        (Type::reply(16), 200, 60, 60, "a reply, as who asked"),
+        (Type::reply(16), 60, 200, 200, "a reply, as who asked"),
+        (Type::data(1), 60, 200, 200, "data that were asked for"),
+        (Type::data(1), 200, 60, 200, "data that were not"),
+        (Type(0), 60, 200, 60, "nothing that there is"),
+    ] {
+        let head = |priority| Head {
+            to: name(1, to, 0, 2),
+            from: name(1, from, 1, 0),
+            kind,
+            priority: Priority(priority),
+            ..Head::default()
+        };
+        for priority in 0..=u8::MAX {
+            assert_eq!(capped(&head(priority)), head(priority.min(limit)), "{why}");
+        }
+    }
+    for kind in [Type::command(16), Type::reply(16), Type::data(1)] {
+        let to = name(1, 200, 0, local::COMMANDS);
+        let head = Head { to, from: name(1, 60, 1, 0), kind, priority: Priority(255), ..Head::default() };
+        assert_eq!(capped(&head).priority, Priority(60), "among commands all go as their sender");
+    }
+    let unasked = Head { to: name(1, 60, 0, 0), kind: Type::command(1), priority: Priority(1), ..Head::default() };
+    assert_eq!(capped(&unasked).priority, Priority(0), "who says no name has no importance");
+}

@@ -1,0 +1,172 @@
+//! Shares of one memory and one line, for senders that do not trust each other: each has an equal part of what others
+//! want too.
+//!
+//! ```text
+//!  memory   of too much, the least important and newest of the sender that has most gives way; nobody loses anything
+//!           to others as long as it has no more than they have
+//!  line     the most important goes first, of those parties that are not a window ahead of the one that had least of
+//!           the line; senders that trust each other are one party, and among them nothing counts but importance
+//! ```
+
+use super::{Place, Queue, Sender, Waiting};
+use crate::broken::broken;
+
+/// What a package takes of the line besides its body, about.
+const HEADS_BYTES: u64 = 32;
+
+/// As whom a package is counted.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct Share {
+    /// In memory: whose it is.
+    pub sender: u32,
+    /// On the line: the party of that sender.
+    pub party: u32,
+}
+
+/// Whose the places of senders are, and what each party had of the line.
+#[derive(Debug, Default)]
+pub(super) struct Shares {
+    /// By the sender's place: who that is, and the place of its party.
+    senders: Vec<(u32, usize)>,
+    parties: Vec<Party>,
+}
+
+#[derive(Debug)]
+struct Party {
+    number: u32,
+    /// Bytes of the line; it began with as much as the party had that had least.
+    served: u64,
+    /// Senders of which something waits.
+    waiting: u32,
+}
+
+impl Shares {
+    /// What the party had of the line that had least of those of which something waits.
+    fn least_served(&self) -> Option<u64> {
+        self.parties.iter().filter(|party| party.waiting > 0).map(|party| party.served).min()
+    }
+
+    /// The place of a party; a new one, or one that nobody needs, if it has none.
+    fn party(&mut self, number: u32) -> usize {
+        if let Some(at) = self.parties.iter().position(|party| party.number == number) {
+            return at;
+        }
+        // Who had more of the line than others is remembered until they have caught up.
+        let least = self.least_served().unwrap_or(u64::MAX);
+        let fresh = Party { number, served: 0, waiting: 0 };
+        match self.parties.iter().position(|party| party.waiting == 0 && party.served <= least) {
+            Some(at) => {
+                self.parties[at] = fresh;
+                at
+            }
+            None => {
+                self.parties.push(fresh);
+                self.parties.len() - 1
+            }
+        }
+    }
+
+    /// Something of a sender waits from now on, which had nothing waiting. Nobody saves up by that.
+    pub(super) fn begins(&mut self, sender: u16) {
+        let least = self.least_served();
+        if least.is_none() {
+            // Who is alone waits for nobody.
+            self.parties.iter_mut().for_each(|party| party.served = 0);
+        }
+        let party = &mut self.parties[self.senders[usize::from(sender)].1];
+        party.served = party.served.max(least.unwrap_or(0));
+        party.waiting += 1;
+    }
+
+    /// Nothing of a sender waits any more.
+    pub(super) fn ends(&mut self, sender: u16) {
+        self.parties[self.senders[usize::from(sender)].1].waiting -= 1;
+    }
+}
+
+impl Queue {
+    /// The place of a sender; that of one of which nothing waits, or a new one, if it has none. So there are no more
+    /// than packages wait, and one.
+    pub fn sender_of(&mut self, share: Share) -> u16 {
+        let number = if broken!(SharesQueue) { 0 } else { share.sender };
+        let Some(shares) = &mut self.shares else { return 0 };
+        let is_known = |(_, (known, _)): &(&Sender, &(u32, usize))| *known == number;
+        let known = self.senders.iter().zip(&shares.senders).position(|both| is_known(&both));
+        let idle = || self.senders.iter().position(|sender| sender.used == 0);
+        let at = known.or_else(idle).unwrap_or_else(|| {
+            self.senders.push(Sender::default());
+            shares.senders.push((number, 0));
+            self.senders.len() - 1
+        });
+        if self.senders[at].used == 0 {
+            shares.senders[at] = (number, shares.party(share.party));
+        }
+        at as u16
+    }
+
+    /// Whether something of others than this sender waits.
+    pub fn others_wait(&self, sender: u16) -> bool {
+        self.used_blocks > self.senders.get(usize::from(sender)).map_or(0, |sender| sender.used)
+    }
+
+    /// The package that goes next: the most important of those parties that had at most so many bytes of the line more
+    /// than the one that had least.
+    pub fn first_shared(&self, window_bytes: u64) -> Option<Place> {
+        let shares = self.shares.as_ref().filter(|_| !broken!(IgnoresShares));
+        let Some((shares, least)) = shares.and_then(|shares| Some((shares, shares.least_served()?))) else {
+            return self.first();
+        };
+        let is_in_turn = |at: usize| shares.parties[shares.senders[at].1].served - least <= window_bytes;
+        let waiting = self.senders.iter().enumerate().filter(|(at, sender)| sender.waiting != 0 && is_in_turn(*at));
+        let firsts = waiting.filter_map(|(_, sender)| {
+            let level = sender.waiting.trailing_zeros() as usize;
+            sender.levels[level].first().map(|place| (level, self.entries[place as usize].ticket, place))
+        });
+        firsts.min().map(|(_, _, place)| Place(place))
+    }
+
+    /// Takes a package out that leaves.
+    pub fn serve(&mut self, place: Place) -> (Waiting, &[u8]) {
+        let Waiting { sender, head, .. } = self.entries[place.0 as usize].waiting;
+        if let Some(shares) = &mut self.shares {
+            let party = shares.senders[usize::from(sender)].1;
+            shares.parties[party].served += u64::from(head.len) + HEADS_BYTES;
+        }
+        self.remove(place)
+    }
+
+    /// Makes room where all use one memory: of whoever has more than the sender would, and then of the sender itself.
+    pub(super) fn make_shared_room(
+        &mut self,
+        sender: usize,
+        level: u8,
+        needed: u32,
+        gone: &mut impl FnMut(&Waiting, &[u8]),
+    ) -> bool {
+        let (quota, lower) = (self.quota_blocks, usize::from(level) + 1);
+        let own = self.senders[sender].used + needed;
+        let short = (self.used_blocks + needed).saturating_sub(quota);
+        if short == 0 {
+            return true;
+        }
+        let others = self.senders.iter().enumerate().filter(|(at, _)| *at != sender);
+        let beyond: u32 = others.map(|(_, other)| other.used.saturating_sub(own)).sum();
+        let yielding: u32 = self.senders[sender].blocks[lower..].iter().sum();
+        if short > beyond + yielding {
+            return false;
+        }
+        while self.used_blocks + needed > quota {
+            let others = self.senders.iter().enumerate().filter(|(at, other)| *at != sender && other.used > own);
+            let largest = others.max_by_key(|(_, other)| other.used).map(|(at, _)| at);
+            let is_made = match largest {
+                Some(largest) => self.displace(largest, 0, gone),
+                None => self.displace(sender, lower, gone),
+            };
+            // Something could give way: it was counted.
+            if !is_made {
+                return false;
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,171 @@
+//! Who is there: places for connections, shared out by principal, and what must be found quickly of those that have
+//! one.
+//!
+//! ```text
+//!  accept ─▶ greeting: of too many the oldest of the address that has most gives way
+//!  hello  ─▶ member:   of too many the newest of the principal that has most, if the new one's has fewer by two
+//! ```
+
+use super::crowd::Crowd;
+use super::member::{Member, State};
+use super::principal::{Principal, Principals};
+use super::registering::WORK_SHARE;
+use super::{Host, Server};
+use crate::broken::broken;
+use crate::session::ClientIndex;
+use crate::session::frame::{Hello, Reason};
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::SocketAddr;
+
+/// Numbers of parties that are no system.
+const STRANGERS: u32 = 256;
+
+/// How often somebody had more of something than its share.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct Crowded {
+    /// Connections before their hello that gave way, since their address had most.
+    pub greetings: u64,
+    /// Clients that gave way to others who had fewer, or were not let in while they had most.
+    pub clients: u64,
+    /// Registrations with more ranges than a principal may have.
+    pub ranges: u64,
+}
+
+/// All that is to be found of connections without going through them.
+#[derive(Debug, Default)]
+pub(super) struct Places {
+    /// Places that were left.
+    free: BTreeSet<u16>,
+    /// Who has not said hello, by address.
+    greetings: Crowd<Principal>,
+    /// Who takes part.
+    pub(super) principals: Principals,
+    /// Who takes part, by its life.
+    lives: BTreeMap<u64, ClientIndex>,
+    /// Who takes part, by its system.
+    systems: BTreeSet<(u8, ClientIndex)>,
+    pub(super) crowded: Crowded,
+}
+
+impl Places {
+    /// One of a system that takes part.
+    pub(super) fn of_system(&self, system: u8) -> Option<ClientIndex> {
+        let least = (system, ClientIndex(0));
+        self.systems.range(least..).next().filter(|(of, _)| *of == system).map(|(_, client)| *client)
+    }
+
+    /// Who takes part in this life.
+    pub(super) fn of_life(&self, life: u64) -> Option<ClientIndex> {
+        self.lives.get(&life).copied()
+    }
+
+    /// It does not take part any more.
+    pub(super) fn leaves(&mut self, now_ns: u64, client: ClientIndex, member: &Member) {
+        self.principals.leaves(now_ns, member.principal_id, member.began_ns, client);
+        self.systems.remove(&(member.system, client));
+        if self.lives.get(&member.life) == Some(&client) {
+            self.lives.remove(&member.life);
+        }
+    }
+
+    /// It does not stand before its hello any more.
+    pub(super) fn greets_no_more(&mut self, client: ClientIndex, member: &Member) {
+        self.greetings.remove(&member.address, member.began_ns, client);
+    }
+}
+
+impl Server {
+    /// A connection was made, from this address. None: so many are there that it must be closed.
+    pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl Host) -> Option<ClientIndex> {
+        let address = Principal::of(from.ip());
+        if self.places.greetings.len() >= self.settings.greetings_max.into() {
+            let oldest = self.oldest_greeting(&address)?;
+            self.places.crowded.greetings += 1;
+            self.refuse(now_ns, oldest, Reason::Silent, (0, 0), "others wait to be let in", host);
+        }
+        let index = match self.places.free.pop_first() {
+            Some(free) => free,
+            None if self.members.len() < self.places_max() => {
+                self.members.push(None);
+                self.members.len() as u16 - 1
+            }
+            None => return None,
+        };
+        let client = ClientIndex(index);
+        self.places.greetings.add(&address, now_ns, client);
+        let member = Member::new(now_ns, from.to_string(), address, self.settings.quota_bytes);
+        self.members[usize::from(index)] = Some(Box::new(member));
+        Some(client)
+    }
+
+    /// Of the connections before their hello, one that gives way to a new one from this address.
+    fn oldest_greeting(&self, address: &Principal) -> Option<ClientIndex> {
+        let greetings = &self.places.greetings;
+        let (largest, most) = greetings.largest()?;
+        if broken!(CrowdsOut) {
+            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == State::Greeting;
+            return self.present().filter(greeting).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
+        }
+        let whose = if greetings.count_of(address) == most { address } else { largest };
+        greetings.ends_of(whose).map(|(oldest, _)| oldest)
+    }
+
+    /// A client said hello, and nothing speaks against it: whether there is a place for it.
+    pub(super) fn take_in(
+        &mut self,
+        now_ns: u64,
+        client: ClientIndex,
+        hello: &Hello<'_>,
+        host: &mut impl Host,
+    ) -> bool {
+        let Some(whose) = self.member(client).map(|member| member.principal.clone()) else { return false };
+        if self.places.principals.members.len() >= self.settings.clients_max.into() {
+            let Some(newest) = self.gives_way_to(&whose) else { return false };
+            self.places.crowded.clients += 1;
+            let text = "who has most connections gives way to who has fewer";
+            self.refuse(now_ns, newest, Reason::Full, (0, 0), text, host);
+        }
+        let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return false };
+        self.places.greets_no_more(client, member);
+        member.principal_id = self.places.principals.joins(&whose, member.began_ns, client, WORK_SHARE);
+        member.joins(now_ns, hello);
+        let is_own = self.settings.system.is_some_and(|(system, _)| system == hello.system);
+        if member.certified.is_none() && is_own {
+            member.rights = self.settings.own_nodes.rights_of(hello.name);
+            member.is_at_home = self.settings.own_nodes.is_at_home(hello.name, &member.address);
+        }
+        let is_node = member.certified.is_some() || is_own && self.settings.own_nodes.has(hello.name);
+        member.party = if is_node { hello.system.into() } else { STRANGERS + member.principal_id };
+        self.places.lives.insert(member.life, client);
+        self.places.systems.insert((member.system, client));
+        true
+    }
+
+    /// The newest client of the principal that has most, if a further one of another's still leaves that with fewer.
+    fn gives_way_to(&mut self, whose: &Principal) -> Option<ClientIndex> {
+        let members = &self.places.principals.members;
+        let own = self.places.principals.id_of(whose).map_or(0, |id| members.count_of(&id));
+        let (largest, most) = members.largest()?;
+        let newest = members.ends_of(largest).map(|(_, newest)| newest);
+        if own > 1 && own == most {
+            self.places.crowded.clients += 1;
+        }
+        newest.filter(|_| most >= own + 2 && !broken!(CrowdsOut))
+    }
+
+    /// The place is free; whoever comes into it is another.
+    pub(super) fn free(&mut self, client: ClientIndex) {
+        let Some(member) = self.members.get_mut(usize::from(client.0)).and_then(Option::take) else { return };
+        if member.state == State::Greeting {
+            self.places.greets_no_more(client, &member);
+        }
+        if member.is_due {
+            self.due.retain(|due| *due != client);
+        }
+        self.places.free.insert(client.0);
+    }
+
+    fn places_max(&self) -> usize {
+        usize::from(self.settings.clients_max) + usize::from(self.settings.greetings_max)
+    }
+}

@@ -1,0 +1,102 @@
+//! What the server brings is judged where it arrives, by the same rules as on the LAN.
+
+use super::ground::Ground;
+use super::plan::{client_settings, module, ranges};
+use crate::admission::{Access, Admission, PACKET, TUNNEL};
+use crate::session::Cause;
+use crate::session::client::ClientSettings;
+use crate::session::frame::{Carried, Message};
+use rohrpost_config as config;
+use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
+
+const ROUTER: Class = Class(103);
+const BARRED: Class = Class(60);
+
+pub(super) const CHECKS: &[fn()] = &[check_admission, check_leaving];
+
+/// A client of system 2, whose modules of class 60 only class 40 may command, joined to its server.
+fn guarded() -> Ground {
+    let rule = config::Access { class: BARRED, callers: vec![Class(40)], line: 12 };
+    let admission = Admission { access: Access::new(&[rule]), router: Some(ROUTER), ..Admission::default() };
+    Ground::new([(ClientSettings { admission, ..client_settings(1, 9) }, ranges(1))])
+}
+
+/// What becomes of a package that the server brings: with which priority it is delivered, or why it is lost.
+fn brought(ground: &mut Ground, head: Head) -> Result<u8, Cause> {
+    let mut bytes = Vec::new();
+    Message::Package(Carried { hops: 1, published_ns: ground.now_ns, head, body: &[] }).write(&mut bytes);
+    let (client, _, notes) = &mut ground.ends[0];
+    let before = notes.delivered.len();
+    client.received(ground.now_ns, &bytes, notes);
+    if let Some((delivered, _)) = notes.delivered.get(before) {
+        return Ok(delivered.priority.0);
+    }
+    let lost = |cause: &Cause| client.inn().lost_for(*cause) > 0;
+    let causes: Vec<Cause> = Cause::ALL.into_iter().filter(lost).collect();
+    assert_eq!(causes.len(), 1, "{causes:?}");
+    Err(causes[0])
+}
+
+fn check_admission() {
+    let ours = module(1);
+    let (router, tool) = (Name::new(2, ROUTER.0, 0, 0), Name::new(3, 32, 40, local::REPLIES));
+    let (command, reply, data) = (Type::command(16), Type::reply(16), Type::data(1));
+    let allowed = Name::new(3, 40, 0, local::REPLIES);
+    for (to, from, kind, expected, why) in [
+        (ours, allowed, command, Ok(40), "a command, as its sender"),
+        (ours.with_local(1), Name::new(3, 200, 0, 0), reply, Ok(60), "a reply, as who asked"),
+        (ours.with_local(2), allowed, data, Ok(60), "data that were asked for"),
+        (ours.with_local(2), Name::new(3, 200, 0, 0), data, Ok(200), "data that were not"),
+        (ours, tool, command, Err(Cause::NotAllowed), "a class that may not"),
+        (ours.with_local(2), ours.with_local(0), data, Err(Cause::Foreign), "in our own name"),
+        (ours.with_local(1), ours, reply, Ok(60), "but what the server says in the name of who is not there"),
+        (ours.with_local(2), Name::NONE, data, Err(Cause::Foreign), "in no name"),
+        (router.with_local(local::TRANSIT), tool, data, Err(Cause::RoutersOwn), "for a transit mailbox"),
+        (router.with_local(TUNNEL), router.with_local(TUNNEL), PACKET, Err(Cause::RoutersOwn), "an IP packet"),
+        (router, tool, command, Err(Cause::RoutersOwn), "for a router of another system"),
+        (router, Name::new(2, 32, 40, 1), command, Ok(32), "for one of the same"),
+    ] {
+        let head = Head { to, from, kind, priority: Priority(255), ..Head::default() };
+        assert_eq!(brought(&mut guarded(), head), expected, "{why}");
+    }
+}
+
+#[test]
+fn what_the_server_brings_is_admitted_as_on_the_lan() {
+    check_admission();
+}
+
+#[test]
+fn who_may_not_command_is_told_by_which_rule() {
+    let mut ground = guarded();
+    let head = Head { to: module(1), from: Name::new(3, 32, 40, 1), kind: Type::command(16), ..Head::default() };
+    assert_eq!(brought(&mut ground, head), Err(Cause::NotAllowed));
+    let notes = &ground.ends[0].2;
+    assert_eq!((&notes.lost[..], &notes.rules[..]), (&[Cause::NotAllowed][..], &[Some(12)][..]));
+}
+
+/// A client sends a package of the greatest priority; with which its receiver gets it.
+fn crossed(kind: Type, to: Name, from: Name) -> u8 {
+    let mut ground = Ground::clients(2);
+    let head = Head { to, from, kind, priority: Priority(255), ..Head::default() };
+    let package = crate::session::client::Package { head, body: &[], published_ns: ground.now_ns, hops: 0 };
+    let (client, _, notes) = &mut ground.ends[0];
+    client.send(ground.now_ns, &package, notes);
+    assert_eq!(client.out().class(Priority(255)).packages.get(), 0, "it is counted as what it is");
+    ground.settle();
+    assert_eq!(ground.server.counts().class(Priority(255)).packages.get(), 0, "at the server too");
+    ground.ends[1].2.delivered[0].0.priority.0
+}
+
+fn check_leaving() {
+    let low = Name::new(1, 100, 9, 0);
+    assert_eq!(crossed(Type::command(16), module(1), low), 100);
+    assert_eq!(crossed(Type::reply(16), module(1).with_local(1), low), 60);
+    assert_eq!(crossed(Type::data(1), module(1).with_local(2), low), 100);
+    assert_eq!(crossed(Type::data(1), module(1).with_local(2), module(0)), 60);
+}
+
+#[test]
+fn a_program_that_says_the_greatest_priority_sends_with_its_own() {
+    check_leaving();
+}

@@ -1,0 +1,131 @@
+//! The thread that sends what is not real time: scheduled as the modules are whose packages it carries, below all that is real time.
+//!
+//! It has a queue, sockets and a port of its own, and shares the wire's rate with what is real time, which goes first. Beside it stands one that
+//! receives at that port: so the kernel parts both kinds before any thread runs, and no flood of the one takes room or time from the other.
+
+use super::answers::{Answers, Faults};
+use super::arrivals::{Arrivals, Desk};
+use super::handover::{Giver, Taker, Waited, handover};
+use super::sending::Sending;
+use super::socket::{InSocket, REST_BYTES};
+use super::threads::{Shared, schedule_below};
+use super::ways::Ways;
+use super::wire::Wire;
+use super::{Shell, ShellError, transit};
+use crate::impair;
+use crate::inbound::Inbound;
+use crate::outbound::{Outbound, Package};
+use crate::security::{Gate, Port, Sealing};
+use crate::stats::Stats;
+use rohrpost_mailbox::{Name, Node, Participant, monotonic_ns};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Packages taken before the wire has its turn.
+const BURST: usize = 64;
+/// The router's end is looked for so often.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// What the thread has.
+pub(super) struct Rest {
+    pub(super) shared: Arc<Shared>,
+    pub(super) taker: Taker,
+    pub(super) sending: Sending,
+}
+
+impl Rest {
+    /// Until the router ends.
+    pub(super) fn run(mut self) {
+        while !self.shared.ends() {
+            self.take();
+            let now_ns = monotonic_ns();
+            let Some(until_ns) = self.sending.step(now_ns) else { continue };
+            let until_ns = until_ns.min(self.sending.wire.deliver(now_ns));
+            let time = Duration::from_nanos(until_ns.saturating_sub(now_ns)).min(LOOK);
+            if self.sending.outbound.has_plenty() {
+                // The pace holds the wire, and what more there is waits where it gives way to what is more important.
+                std::thread::sleep(time);
+            } else if self.taker.wait(time) == Waited::Ended {
+                return;
+            }
+        }
+    }
+
+    /// Takes what was handed over, as long as there is use for it.
+    fn take(&mut self) {
+        for _ in 0..BURST {
+            if self.sending.outbound.has_plenty() {
+                return;
+            }
+            let Some((head, published_ns, body, alone)) = self.taker.next() else { return };
+            self.sending.accept(&Package { head, published_ns, body }, alone);
+        }
+    }
+}
+
+impl Shell {
+    /// Where what is not real time goes its own way: opens its port and starts its two threads. The way there for the thread that reads the
+    /// mailbox.
+    pub(super) fn begin_rest(
+        &mut self,
+        (node, name): (&Arc<Node>, Name),
+        faults: &Arc<dyn Faults>,
+        impair: Option<impair::Settings>,
+    ) -> Result<Option<Giver>, ShellError> {
+        let (settings, shared) = (self.settings.clone(), self.shared.clone());
+        if !settings.parts_rest() {
+            return Ok(None);
+        }
+        let port = settings.network.rest_port();
+        let own = (settings.nodes[usize::from(settings.own)].address, port).into();
+        let socket = Arc::new(InSocket::open(own, &settings.peer_addresses(), REST_BYTES)?);
+        let stats = Stats::of_rest(&settings, &self.stats);
+        let all = self.acquaintances.as_ref();
+        let mut outbound = Outbound::new(&settings, stats.clone()).behind(&self.stats);
+        if let Some(all) = all {
+            outbound = outbound.sealed(all.clone());
+        }
+        let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
+        // Whether a peer is there is known by what is real time.
+        let via = transit::name(name);
+        let answers = |participant| Answers::new(&settings, &self.stats, faults, participant, via);
+        let (giver, taker) = handover(&shared);
+        let sealing = all.map(|all| Sealing::new(all, Port::Rest));
+        let sending = Sending {
+            outbound,
+            stats: stats.clone(),
+            answers: answers(&sender),
+            wire: Wire::new(&settings, port, sealing, impair, &self.failures),
+            datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
+        };
+        let arrivals = Arrivals {
+            shared: shared.clone(),
+            socket: socket.clone(),
+            inbound: Inbound::new(&settings, stats.clone()),
+            desk: Desk {
+                ways: Ways::here(&receiver, &settings.hosts),
+                answers: answers(&receiver),
+                news: None,
+                ages: self.ages.clone(),
+                takes_bytes: None,
+            },
+            settings: settings.clone(),
+            stats: stats.clone(),
+            guard: all.map(Gate::of_rest),
+            answers: None,
+            is_rest: true,
+        };
+        self.sockets.push(socket);
+        self.rest_stats = Some(stats);
+        let departures = Rest { shared, taker, sending };
+        self.begin("rest-out", move || {
+            schedule_below();
+            departures.run();
+        })?;
+        self.begin("rest-in", move || {
+            schedule_below();
+            arrivals.run();
+        })?;
+        Ok(Some(giver))
+    }
+}

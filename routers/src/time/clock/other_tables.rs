@@ -1,0 +1,117 @@
+//! A clock in time slots beside nodes that go by another configuration: who of them says what time it is, and who says nothing.
+
+use super::Clock;
+use crate::broken::broken;
+use crate::frame::{FrameHead, NodeIndex};
+use crate::stats::Stats;
+use crate::time::election::State;
+use crate::time::message::Message;
+use crate::time::others::Claim;
+use crate::time::{Ignored, Stamp};
+
+impl Clock {
+    /// Takes a datagram of time whose digest is another than this node's. `node`: whose address it comes from; none if no node has it. What it
+    /// says is no time for this node; that it is said is a reason not to speak.
+    ///
+    /// # Errors
+    /// [`Ignored`]: it changed nothing.
+    pub fn handle_other(
+        &mut self,
+        now_ns: u64,
+        received: Stamp,
+        node: Option<NodeIndex>,
+        head: &FrameHead,
+        rest: &[u8],
+    ) -> Result<(), Ignored> {
+        if head.system != self.settings.system || head.digest == self.settings.digest {
+            return Err(Ignored::Stranger);
+        }
+        let theirs = claim(head, &Message::parse(head.kind, rest)?).ok_or(Ignored::OtherTable)?;
+        // Where there are no slots, two times are in nobody's way.
+        if self.slots.is_none() || broken!(DeafToOtherTables) {
+            return Err(Ignored::OtherTable);
+        }
+        let own = self.claim(now_ns);
+        self.others.hears(node, received.ns, theirs, own);
+        self.part(now_ns);
+        Ok(())
+    }
+
+    /// What the one who takes packages knows of those who refuse this node for its configuration. `now_ns`: by the clock by which that is
+    /// counted; `local_ns`: by that of time. Whoever is followed lets them; who has a greater claim says what time it is.
+    pub(super) fn refused_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
+        if self.slots.is_none() || broken!(DeafToOtherTables) {
+            return;
+        }
+        let own = self.claim(local_ns);
+        let local_ns_of = |then_ns: u64| local_ns.saturating_sub(now_ns.saturating_sub(then_ns));
+        for node in (0..self.settings.nodes).filter(|node| *node != self.settings.own) {
+            let link = &packages.peer(node).link;
+            let (refused_ns, told_ns) = (link.refuses_us_ns.get(), link.tells_other_ns.get());
+            if self.others.is_news(refused_ns) && !own.0 {
+                self.others.refuses(node, local_ns_of(refused_ns), link.refuses_us_digest.get());
+            }
+            // One datagram that was forged, or went astray, must not silence it for long.
+            self.others.is_heard(node, local_ns_of(link.heard_ns.get()));
+            if self.others.is_news(told_ns) {
+                // Whether it is followed it does not say.
+                self.others.hears(Some(node), local_ns_of(told_ns), (true, link.tells_other_digest.get()), own);
+            }
+        }
+        self.others.knows_refusals(now_ns);
+        self.part(local_ns);
+    }
+
+    /// Because of which nodes this one neither begins a time nor goes on with one, and their digests; a node is none if its address is that of
+    /// no node. Empty unless that is so.
+    pub fn parted_by(&self, now_ns: u64) -> impl Iterator<Item = (Option<NodeIndex>, u64)> {
+        self.others.because_of(now_ns)
+    }
+
+    /// Digest of this node's configuration.
+    pub fn digest(&self) -> u64 {
+        self.settings.digest
+    }
+
+    pub(super) fn is_parted(&self, now_ns: u64) -> bool {
+        self.parted_until_ns(now_ns).is_some()
+    }
+
+    pub(super) fn parted_until_ns(&self, now_ns: u64) -> Option<u64> {
+        self.others.silent_until_ns(now_ns)
+    }
+
+    /// It follows nobody and reigns no more, as long as it must not: then it listens anew.
+    fn part(&mut self, now_ns: u64) {
+        let Some(until_ns) = self.parted_until_ns(now_ns) else { return };
+        self.step_back(now_ns);
+        self.election.steps_back(until_ns);
+        if let Some(slots) = &mut self.slots {
+            slots.goes_by_nobody();
+            self.election.overhears(&slots.overheard);
+        }
+    }
+
+    /// Who hears no time of its own configuration, or whom nobody follows, has the lesser claim.
+    pub(super) fn claim(&self, now_ns: u64) -> Claim {
+        let is_followed = match self.election.state() {
+            State::Listening => false,
+            State::Slave(_) => true,
+            State::Master(_) => self.is_followed(now_ns),
+        };
+        // Of two that have no time neither may begin one.
+        let digest = if self.election.state() == State::Listening { 0 } else { self.settings.digest };
+        (is_followed, digest)
+    }
+}
+
+/// What a datagram of another configuration says of the time there; none if it says that there is none.
+pub(super) fn claim(head: &FrameHead, message: &Message) -> Option<Claim> {
+    let is_followed = match message {
+        Message::Sync(sync) => sync.followed || sync.replacement,
+        Message::Request(hello) if hello.id == 0 && !hello.timed => return None,
+        // They go between a master and who follows it; or it says that it has time.
+        Message::WarmUp | Message::Request(_) | Message::Reply(_) => true,
+    };
+    Some((is_followed, head.digest))
+}
