@@ -10,6 +10,8 @@ use crate::settings::Settings;
 use crate::stats::Cause;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 
+/// Where nothing is sealed, the first datagram to a peer is doubted: if nothing else goes to it within this time, it is told once more.
+const SAY_AGAIN_NS: u64 = 10_000_000;
 /// Where a part begins in its datagram.
 pub(super) const PART_START: usize = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
 
@@ -134,7 +136,8 @@ impl Outbound {
         sent.datagrams.add(1);
         sent.bytes.add((bytes + self.settings.network.security.tag_bytes()) as u64);
         self.stats.on_wire_bytes.add((bytes + self.pace.overhead_bytes) as u64);
-        self.peers[usize::from(to)].quiet_until_ns = now_ns + ALIVE_EVERY_NS;
+        let is_doubted = self.acquaintances.is_none() && !self.in_slots && sent.datagrams.get() == 1;
+        self.peers[usize::from(to)].quiet_until_ns = now_ns + if is_doubted { SAY_AGAIN_NS } else { ALIVE_EVERY_NS };
         self.pace.left(now_ns, bytes, level);
     }
 

@@ -103,6 +103,8 @@ pub struct Outbound {
     reached: u64,
     /// Those whose way has no room just now, one bit each: they are passed over.
     full: u64,
+    /// Those that hear this life of ours, as far as that has to be waited for, one bit each.
+    awaited: u64,
     /// What is real time, if this is not: all that leaves leaves at one rate. And how much of it was counted, bytes.
     shares_with: Option<(Arc<Stats>, u64)>,
     /// It sends in time slots only.
@@ -139,6 +141,7 @@ impl Outbound {
             acquaintances: None,
             reached: u64::MAX,
             full: 0,
+            awaited: u64::MAX,
             shares_with: None,
             in_slots: settings.tdma.is_some(),
             alive_ns: 0,
@@ -154,10 +157,11 @@ impl Outbound {
         Self { reached: 0, acquaintances: Some(acquaintances), ..self }
     }
 
-    /// From now on it sends what is not real time: at the rate that is left by what is, which counts here.
+    /// From now on it sends what is not real time: at the rate that is left by what is, which counts here, and to those peers that have said
+    /// to it that they hear this life. Others take nothing of this life at the port of what is not real time.
     #[must_use]
     pub fn behind(self, real_time: &Arc<Stats>) -> Self {
-        Self { shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
+        Self { awaited: 0, shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
     }
 
     /// The ways to these peers, one bit each, have no room just now: what is for them waits, and keeps nobody else waiting.
@@ -246,7 +250,7 @@ impl Outbound {
         let datagram = &mut datagram[..self.datagram_bytes];
         self.aboard.clear();
         self.look_who_is_known();
-        self.look_what_else_left(now_ns);
+        self.look_at_what_is_real_time(now_ns);
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
         }
@@ -337,20 +341,28 @@ impl Outbound {
 
     fn reaches(&self, peer: NodeIndex) -> bool {
         let is_known = self.acquaintances.as_ref().is_none_or(|all| all.reached() & 1 << peer != 0);
-        is_known && self.full & 1 << peer == 0
+        is_known && self.full & 1 << peer == 0 && self.awaited & 1 << peer != 0
     }
 
     /// Those to whom something may leave now.
     fn open(&self) -> u64 {
-        if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full }
+        if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full & self.awaited }
     }
 
-    /// What is real time has left besides, at the same rate.
-    fn look_what_else_left(&mut self, now_ns: u64) {
+    /// What is real time has left besides, at the same rate, and has heard of who hears us.
+    fn look_at_what_is_real_time(&mut self, now_ns: u64) {
         let Some((real_time, counted)) = &mut self.shares_with else { return };
         let bytes = real_time.on_wire_bytes.get();
         self.pace.takes(now_ns, bytes.wrapping_sub(*counted) as usize);
         *counted = bytes;
+        let all = self.settings.peers().fold(0, |all, peer| all | 1 << peer);
+        if self.awaited != all {
+            let hears = |peer: &NodeIndex| real_time.peer(*peer).link.hears_us_ns.get() > 0;
+            let awaited = self.settings.peers().filter(hears).fold(0, |all, peer| all | 1 << peer);
+            if awaited != self.awaited {
+                (self.awaited, self.alive_ns) = (awaited, 0);
+            }
+        }
     }
 
     /// Whoever is known since just now is told at once that we are there.

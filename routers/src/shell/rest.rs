@@ -25,6 +25,8 @@ use std::time::Duration;
 const BURST: usize = 64;
 /// The router's end is looked for so often.
 const LOOK: Duration = Duration::from_millis(100);
+/// What waits while its peer does not hear this life yet is looked at so often.
+const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
 /// What the thread has.
 pub(super) struct Rest {
@@ -41,7 +43,8 @@ impl Rest {
             let now_ns = monotonic_ns();
             let Some(until_ns) = self.sending.step(now_ns) else { continue };
             let until_ns = until_ns.min(self.sending.wire.deliver(now_ns));
-            let time = Duration::from_nanos(until_ns.saturating_sub(now_ns)).min(LOOK);
+            let look = if self.sending.outbound.waits() { LOOK_AGAIN } else { LOOK };
+            let time = Duration::from_nanos(until_ns.saturating_sub(now_ns)).min(look);
             if self.sending.outbound.has_plenty() {
                 // The pace holds the wire, and what more there is waits where it gives way to what is more important.
                 std::thread::sleep(time);

@@ -107,11 +107,13 @@ fn what_is_lost_is_counted_with_its_cause_and_not_measured() {
 #[test]
 fn a_bound_says_nothing_of_what_was_published_before_a_slot_was_left_out() {
     let mut end = End::new(0, declare);
-    for (published_ms, left_ms, kept) in [(0, 4, (4, 0)), (10, 18, (4, 0)), (16, 22, (6, 1)), (30, 33, (6, 1))] {
+    // Peers are told once more that we are there.
+    end.leave(START + 10 * MS);
+    for (published_ms, left_ms, kept) in [(10, 14, (4, 0)), (20, 28, (4, 0)), (26, 32, (6, 1)), (40, 43, (6, 1))] {
         end.queue(START + published_ms * MS, to(1, 90), b"one");
         end.poll(START + left_ms * MS).unwrap();
-        if published_ms == 10 {
-            end.outbound.slot_left_out(START + 16 * MS);
+        if published_ms == 20 {
+            end.outbound.slot_left_out(START + 26 * MS);
         }
         end.outbound.sent(START + left_ms * MS);
         let found = (counts(&end).kept_worst().as_millis(), counts(&end).kept_over_bound.get());

@@ -261,13 +261,14 @@ fn the_rate_is_kept() {
 fn check_advance() {
     let mut end = End::new(0, |settings| settings.network.rate_bytes_s = 1_000_000);
     end.hears(1, START);
+    end.leave(START + 10 * MS);
     let flood = |end: &mut End, now_ns| {
         while end.stats.waiting_in_all() < 20 {
             end.queue(now_ns, to(1, 90), &[0; 1000]);
         }
     };
-    flood(&mut end, START);
-    let mut now_ns = START + 10 * MS;
+    flood(&mut end, START + 10 * MS);
+    let mut now_ns = START + 20 * MS;
     for _ in 0..20 {
         flood(&mut end, now_ns);
         let through_ns = loop {
@@ -332,7 +333,11 @@ fn an_idle_peer_hears_every_200_ms_and_a_busy_one_every_500_ms_what_we_heard() {
         now_ns += 10 * MS;
     }
     let of = |node, begin, end| told.iter().filter(|(to, at)| *to == node && (begin..end).contains(at)).count();
-    assert_eq!((of(1, 0, 2 * S), of(2, 0, 2 * S), of(2, 2 * S, 4 * S)), (9, 9, 10));
+    assert_eq!(
+        (of(1, 0, 2 * S), of(2, 0, 2 * S), of(2, 2 * S, 4 * S)),
+        (10, 10, 10),
+        "and once more 10 ms after the first"
+    );
     assert_eq!(of(1, 2 * S, 4 * S), 4, "a busy one");
     assert_eq!((ALIVE_EVERY_NS, TELL_EVERY_NS), (200 * MS, S / 2));
 }
@@ -431,6 +436,8 @@ fn what_is_not_real_time_leaves_at_the_rate_that_is_left() {
     let slow = |settings: &mut Settings| settings.network.rate_bytes_s = 1_000_000;
     let (mut first, mut rest) = (End::new(0, slow), End::new(0, slow));
     rest.outbound = Outbound::new(&rest.settings, rest.stats.clone()).behind(&first.stats);
+    assert_eq!(rest.send(START, to(1, 90), b"", true), None, "it has not said that it hears this life");
+    assert!(rest.poll(START).is_err(), "so nothing leaves");
     for end in [&mut first, &mut rest] {
         end.hears(1, START);
     }
