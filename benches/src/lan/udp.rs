@@ -25,8 +25,11 @@ impl Datagrams {
         Self::between(wire, end, [PORT, PORT])
     }
 
-    /// With these ports, the near one first.
-    pub(super) fn between(wire: &Wire, end: End, ports: [u16; 2]) -> Result<Self, Failure> {
+    /// The same with these ports, the near one first.
+    ///
+    /// # Errors
+    /// When that is refused.
+    pub fn between(wire: &Wire, end: End, ports: [u16; 2]) -> Result<Self, Failure> {
         wire.enter(end)?;
         let (own, other) = if end == End::Ping { (0, 1) } else { (1, 0) };
         let other_end = if end == End::Ping { End::Pong } else { End::Ping };

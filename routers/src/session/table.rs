@@ -177,7 +177,10 @@ fn outermost(mut ranges: Vec<Range>) -> Result<Vec<Range>, Range> {
 
 /// What another hosts is never given away.
 fn is_given_away(held: &Range, wanted: &Range) -> bool {
-    broken!(TakesTwice) || broken!(TakesInside) && held != wanted && held.holds(wanted)
+    if broken!(TakesInside) && held != wanted && held.holds(wanted) {
+        return true;
+    }
+    broken!(TakesTwice)
 }
 
 #[cfg(test)]

@@ -13,15 +13,19 @@
 //! its quota of the queue; what is too much is refused, or lost there. Of the urgent ones none may be. Flooder and swamp have
 //! FIFO 10, before other programs and after all that is timed, and each is where the router of its node is not. The flooder pauses
 //! for 2 ms in 20, so that the kernel's fair server stays out; what waits in the queue lasts longer.
+//!
+//! The floor, `udp`: sockets in the modules themselves, the flood from one of its own to one of its own, as fast as the routers may send.
 
 use super::Ground;
 use crate::cases::Case;
 use crate::harness::{
     Cell, Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
 };
+use crate::lan::Wire;
 use crate::lan::ends::{Module, Sink, Source};
-use crate::lan::flow::Outlet;
+use crate::lan::flow::{Inlet, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
+use crate::lan::udp::Datagrams;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -46,16 +50,24 @@ const ENDS_WITHIN: Duration = Duration::from_secs(5);
 const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB", sealed: false };
 /// As a user gets it who says nothing.
 const USUAL: Network = Network { rate: "100 MiB", ..CARRIED };
+/// Of the bare flood.
+const FLOOD_PORT: u16 = 20_217;
+/// The bare swamp looks so often whether it is over.
+const LOOK: Duration = Duration::from_millis(100);
+/// Heads of a datagram on an Ethernet, with its gap.
+const WIRE_BYTES: u64 = 66;
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let urgent = |name, network| Box::new(Urgent { name, network }) as Box<dyn Case>;
-    vec![urgent("urgent", CARRIED), urgent("urgent-saturated", USUAL)]
+    let urgent = |name, network, mib_s: u64| Box::new(Urgent { name, network, bytes_s: mib_s << 20 }) as Box<dyn Case>;
+    vec![urgent("urgent", CARRIED, 10), urgent("urgent-saturated", USUAL, 100)]
 }
 
 struct Urgent {
     name: &'static str,
     network: Network,
+    /// The network's rate.
+    bytes_s: u64,
 }
 
 impl Case for Urgent {
@@ -75,26 +87,35 @@ impl Case for Urgent {
             pace: Some(PACE),
             cap: CAP,
         };
-        let floods = RefCell::new(Vec::new());
+        let floods = [RefCell::new(Vec::new()), RefCell::new(Vec::new())];
+        let beside = |flood: Flood, floods: &RefCell<Vec<_>>, samples: Result<Vec<f64>, Failure>| {
+            let flooded = flood.end();
+            let samples = samples?;
+            floods.borrow_mut().push(flooded?);
+            Ok(samples)
+        };
+        let udp = || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end));
         let contenders = [
             Contender::sampled("rohrpost", || {
                 let (nodes, turn) = ground.turn()?;
-                let flood = Flood::start(nodes, turn)?;
-                let samples = urgent(nodes, turn, &cell);
-                let flooded = flood.end();
-                let samples = samples?;
-                floods.borrow_mut().push(flooded?);
-                Ok(samples)
+                let flood = Flood::over(nodes, turn)?;
+                beside(flood, &floods[0], urgent(nodes, turn, &cell))
             }),
             Contender::sampled("no flood", || {
                 let (nodes, turn) = ground.turn()?;
                 urgent(nodes, turn, &cell)
             }),
+            Contender::sampled("udp", || beside(Flood::bare(ground.wire()?, self.bytes_s)?, &floods[1], udp())),
+            Contender::sampled("udp, no flood", udp),
         ];
-        let versus = [Versus { name: "no flood", p50: Some(Target::AtMost(1.5)), p99: Some(Target::AtMost(3.0)) }];
+        let versus = [
+            Versus { name: "no flood", p50: Some(Target::AtMost(1.5)), p99: Some(Target::AtMost(3.0)) },
+            Versus { name: "udp", p50: None, p99: None },
+        ];
         let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
         let mut rows = compare(settings, &subject, &contenders, &versus);
-        rows.extend(flood_rows(&self.name(), &floods.borrow()));
+        rows.extend(flood_rows(&self.name(), ["flood, taken", "flood, arrived"], &floods[0].borrow()));
+        rows.extend(flood_rows(&self.name(), ["flood by udp, sent", "flood by udp, arrived"], &floods[1].borrow()));
         Ok(rows)
     }
 }
@@ -137,11 +158,46 @@ struct Flood {
 }
 
 impl Flood {
-    fn start(nodes: &Nodes, turn: u8) -> Result<Self, Failure> {
-        let counts = Shared::<Counts>::new()?;
+    /// From a module of the near node to one of the far one.
+    fn over(nodes: &Nodes, turn: u8) -> Result<Self, Failure> {
         let [from, to] = [End::Ping, End::Pong].map(|end| nodes::flood(end, turn));
+        let sink = || Sink::open(&nodes.directory(End::Pong), to, FLOOD_BYTES);
+        let source = || {
+            let mut source = Source::open(&nodes.directory(End::Ping), from, to)?;
+            Ok(move |message: &[u8]| source.offer(message))
+        };
+        Self::start(sink, source)
+    }
+
+    /// From socket to socket, no faster than this.
+    fn bare(wire: &Wire, bytes_s: u64) -> Result<Self, Failure> {
+        let open = |end| Datagrams::between(wire, end, [FLOOD_PORT; 2]);
+        let source = || {
+            let mut socket = open(End::Ping)?;
+            let (began, mut sent_bytes) = (Instant::now(), 0);
+            Ok(move |message: &[u8]| {
+                let may_bytes = (began.elapsed().as_secs_f64() * bytes_s as f64) as u64;
+                // What it could not send before is not made up for at once, as a router does not.
+                sent_bytes = may_bytes.saturating_sub(bytes_s / 1_000).max(sent_bytes);
+                let may = sent_bytes <= may_bytes;
+                if may {
+                    Inlet::send(&mut socket, message)?;
+                    sent_bytes += FLOOD_BYTES as u64 + WIRE_BYTES;
+                }
+                Ok(may)
+            })
+        };
+        Self::start(|| open(End::Pong)?.with_patience(LOOK), source)
+    }
+
+    /// `sink`: opens where it goes. `source`: opens what it comes from, and says of each whether it was taken.
+    fn start<O: Outlet, S: FnMut(&[u8]) -> Result<bool, Failure>>(
+        sink: impl FnOnce() -> Result<O, Failure>,
+        source: impl FnOnce() -> Result<S, Failure>,
+    ) -> Result<Self, Failure> {
+        let counts = Shared::<Counts>::new()?;
         let swamp = Child::start(|| {
-            let mut sink = Sink::open(&nodes.directory(End::Pong), to, FLOOD_BYTES)?;
+            let mut sink = sink()?;
             settle_low(End::Ping)?;
             counts.swamp.meet(2)?;
             let mut message = vec![0; FLOOD_BYTES];
@@ -154,7 +210,7 @@ impl Flood {
         })?;
         let flooder = Child::start(|| {
             counts.swamp.meet(2)?;
-            let mut source = Source::open(&nodes.directory(End::Ping), from, to)?;
+            let mut offer = source()?;
             settle_low(End::Pong)?;
             counts.flooding.meet(2)?;
             let message = vec![7; FLOOD_BYTES];
@@ -162,7 +218,7 @@ impl Flood {
             while !is_over() {
                 let ends = Instant::now() + FLOOD;
                 while Instant::now() < ends && !is_over() {
-                    if source.offer(&message)? {
+                    if offer(&message)? {
                         counts.sent.fetch_add(1, Ordering::AcqRel);
                     }
                 }
@@ -197,15 +253,12 @@ fn settle_low(end: End) -> Result<(), Failure> {
     Ok(())
 }
 
-fn flood_rows(case: &str, floods: &[Flooded]) -> Vec<Row> {
+fn flood_rows(case: &str, [sent, arrived]: [&'static str; 2], floods: &[Flooded]) -> Vec<Row> {
     // What the router's mailbox took, and what arrived.
     let row = |who, rate: fn(&Flooded) -> f64| {
         let median = crate::statistics::median(floods.iter().map(rate))?;
         let subject = Subject { case: case.into(), bytes: Some(FLOOD_BYTES), unit: "packages/s" };
         Some(Row::alone(subject, who, Ok(Summary::single(median))))
     };
-    [row("flood, taken", |flood| flood.sent), row("flood, arrived", |flood| flood.received)]
-        .into_iter()
-        .flatten()
-        .collect()
+    [row(sent, |flood| flood.sent), row(arrived, |flood| flood.received)].into_iter().flatten().collect()
 }
