@@ -1,12 +1,15 @@
 //! What the kernel is asked for a process: its scheduling, its memory, a device for IP packets. A refusal is told, not fatal.
 
+use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use nix::sys::statvfs::statvfs;
 use std::fs::File;
 use std::io;
-use std::os::fd::{AsRawFd, OwnedFd};
+use std::os::fd::{AsRawFd, BorrowedFd, FromRawFd, OwnedFd, RawFd};
+use std::os::unix::process::CommandExt;
 use std::path::Path;
+use std::process::Command;
 
 /// How a process is scheduled.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -199,6 +202,43 @@ fn check(result: i32) -> io::Result<()> {
     if result < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
 }
 
+/// Has a process keep these descriptors under their numbers, which it has to be told: see [`adopt`]. They are open in it although each is marked to be
+/// closed there, so no other process that is started meanwhile has them. They have to stay open until it is started.
+pub fn hand_on(command: &mut Command, descriptors: &[OwnedFd]) {
+    let numbers: Vec<RawFd> = descriptors.iter().map(AsRawFd::as_raw_fd).collect();
+    let keep = move || {
+        for number in &numbers {
+            // SAFETY: `fcntl` looks up the number and nothing else; one that is not open is an error.
+            let descriptor = unsafe { BorrowedFd::borrow_raw(*number) };
+            fcntl(descriptor, FcntlArg::F_SETFD(FdFlag::empty()))?;
+        }
+        Ok(())
+    };
+    // SAFETY: between fork and exec the closure makes system calls that are safe there (signal-safety(7)), takes no lock and no memory: the numbers were
+    // collected before.
+    unsafe { command.pre_exec(keep) };
+}
+
+/// Takes over a descriptor that whoever started this process has [handed on](hand_on), under this number. Only once: from then on it is closed in processes
+/// that this one starts, as all that this one has opened itself.
+///
+/// # Errors
+/// When nothing was handed on under this number.
+pub fn adopt(number: RawFd) -> io::Result<OwnedFd> {
+    if number < 0 {
+        return Err(io::ErrorKind::InvalidInput.into());
+    }
+    // SAFETY: the descriptor is only looked at by `fcntl`; one that is not open is an error.
+    let descriptor = unsafe { BorrowedFd::borrow_raw(number) };
+    let flags = FdFlag::from_bits_retain(fcntl(descriptor, FcntlArg::F_GETFD)?);
+    if flags.contains(FdFlag::FD_CLOEXEC) || number <= 2 {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("descriptor {number} was not handed on")));
+    }
+    fcntl(descriptor, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC))?;
+    // SAFETY: it is open, and nobody in this process has it: Rust marks all that it opens to be closed in further processes, and this one was not.
+    Ok(unsafe { OwnedFd::from_raw_fd(number) })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -236,6 +276,34 @@ mod tests {
         // More than there is, and nothing: whoever asks, it is refused.
         let error = reserved(2 * MS, MS).unwrap_err();
         assert!(matches!(error, ReservationError::NotTaken(..) | ReservationError::NotAllowed), "{error}");
+    }
+
+    #[test]
+    fn what_is_handed_on_is_open_in_that_process_alone_and_taken_over_once() {
+        let (reader, mut writer) = std::io::pipe().unwrap();
+        std::io::Write::write_all(&mut writer, b"handed on").unwrap();
+        drop(writer);
+        let kept = [OwnedFd::from(reader)];
+        let number = kept[0].as_raw_fd();
+        let cat = || {
+            let mut command = Command::new("cat");
+            command.arg(format!("/proc/self/fd/{number}")).stderr(std::process::Stdio::null());
+            command
+        };
+        assert!(!cat().status().unwrap().success(), "it is not open in others");
+        assert!(adopt(number).is_err(), "it is of this process, which has opened it");
+        let mut command = cat();
+        hand_on(&mut command, &kept);
+        assert_eq!(command.output().unwrap().stdout, b"handed on");
+
+        // As in a process that it was handed on to.
+        fcntl(&kept[0], FcntlArg::F_SETFD(FdFlag::empty())).unwrap();
+        let [first] = kept;
+        let number = std::os::fd::IntoRawFd::into_raw_fd(first);
+        let taken = adopt(number).unwrap();
+        assert!(adopt(number).is_err(), "it has an owner");
+        drop(taken);
+        assert!([number, 0, -1].into_iter().all(|number| adopt(number).is_err()));
     }
 
     #[test]

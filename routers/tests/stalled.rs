@@ -87,7 +87,8 @@ fn a_way_that_stands_still_keeps_nobody_else_waiting() {
             let _inside = lab.enter(NODES[own]).unwrap();
             let (settings, faults) = (settings(own as u8, real_time_from), Arc::new(Words));
             let (name, node) = (router(own as u8), &nodes[own]);
-            Shell::start(Parts { node, name, settings, faults, socket: None, impair: None, clock: None }).unwrap()
+            Shell::start(Parts { node, name, settings, faults, sockets: Vec::new(), impair: None, clock: None })
+                .unwrap()
         };
         let shells = [0, 1, 2].map(start);
         let join = |node: usize| rohrpost_mailbox::Participant::join(&nodes[node], Name::NONE).unwrap();

@@ -119,7 +119,7 @@ impl Member {
         let clock = clock.map(|parts| ClockParts { skew: Some(skew), node: None, ..parts });
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);
         let faults = Arc::new(Silence);
-        let parts = Parts { node: &node, name, settings, faults, socket: None, impair: None, clock };
+        let parts = Parts { node: &node, name, settings, faults, sockets: Vec::new(), impair: None, clock };
         let shell = Shell::start(parts).map_err(|error| Failure::of("router", error))?;
         Ok(Self { skew, shell: Some(shell) })
     }

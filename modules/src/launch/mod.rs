@@ -124,11 +124,11 @@ impl Launch {
         executable: PathBuf,
         events: Receiver<Event>,
     ) -> Result<Self, LaunchError> {
-        Self::begin_keeping(installation, node_name, executable, events, |_| None)
+        Self::begin_keeping(installation, node_name, executable, events, |_| Vec::new())
     }
 
-    /// The same, and it keeps what `keep` gives for a module: a socket, say. Each process of that module has it as its standard input
-    /// ([`kept`](crate::runtime::kept)), so what waits in it outlives them.
+    /// The same, and it keeps what `keep` gives for a module: sockets, say. Each process of that module has them
+    /// ([`kept`](crate::runtime::kept)), so what waits in them outlives it.
     ///
     /// # Errors
     /// As for [`Launch::begin`].
@@ -137,7 +137,7 @@ impl Launch {
         node_name: &str,
         executable: PathBuf,
         events: Receiver<Event>,
-        keep: impl Fn(&Module) -> Option<OwnedFd>,
+        keep: impl Fn(&Module) -> Vec<OwnedFd>,
     ) -> Result<Self, LaunchError> {
         let usual_nice = program::hurry();
         let beside = executable.parent().map(PathBuf::from).unwrap_or_default();

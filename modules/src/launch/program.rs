@@ -4,7 +4,7 @@ use crate::runtime::environment;
 use rohrpost_config::{Installation, Module, Program as Configured, Scheduling, find_program};
 use rohrpost_mailbox::sys;
 use std::io::{self, PipeWriter};
-use std::os::fd::OwnedFd;
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -29,8 +29,8 @@ pub(super) struct Program {
     config: PathBuf,
     /// The module's name.
     module: String,
-    /// The standard input of all its processes, one after the other; none: there is nothing to read.
-    kept: Option<OwnedFd>,
+    /// What all its processes have, one after the other.
+    kept: Vec<OwnedFd>,
     /// What it begins with, if launch goes before ordinary programs and it is not real time.
     nice: Option<i8>,
 }
@@ -42,7 +42,7 @@ impl Program {
         module: &Module,
         installation: &Installation,
         executable: &Path,
-        kept: Option<OwnedFd>,
+        kept: Vec<OwnedFd>,
         usual_nice: Option<i8>,
     ) -> Self {
         let beside = executable.parent().unwrap_or(Path::new("."));
@@ -71,16 +71,18 @@ impl Program {
         if !on {
             command.env(environment::OFF, "1");
         }
-        match &self.kept {
-            Some(kept) => command.env(environment::KEPT, "1").stdin(kept.try_clone()?),
-            None => command.env_remove(environment::KEPT).stdin(Stdio::null()),
-        };
+        command.env_remove(environment::KEPT);
+        if !self.kept.is_empty() {
+            let numbers: Vec<String> = self.kept.iter().map(|kept| kept.as_raw_fd().to_string()).collect();
+            sys::hand_on(command.env(environment::KEPT, numbers.join(",")), &self.kept);
+        }
         // Launch alone speaks to the service manager.
         for variable in ["NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "JOURNAL_STREAM"] {
             command.env_remove(variable);
         }
         command
             .args(&self.arguments)
+            .stdin(Stdio::null())
             .env(environment::CONFIG, &self.config)
             .env(environment::MODULE, &self.module)
             .env(environment::LAUNCHER, std::process::id().to_string())

@@ -15,7 +15,7 @@ use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, Work, base_directory, local,
     node_directory, sys,
 };
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,15 +32,15 @@ pub(crate) mod environment {
     pub(crate) const RESTARTS: &str = "ROHRPOST_RESTARTS";
     /// Set: it begins switched off, and launch switches it on when it is time.
     pub(crate) const OFF: &str = "ROHRPOST_OFF";
-    /// Set: the standard input is what launch keeps for all processes of this module.
+    /// Numbers of the descriptors that launch keeps for all processes of this module, with commas.
     pub(crate) const KEPT: &str = "ROHRPOST_KEPT";
 }
 
-/// What launch keeps for all processes of this module, one after the other: each has it as its standard input. None of a module for which it
-/// keeps nothing, and of one that was started by hand.
-pub fn kept() -> Option<OwnedFd> {
-    std::env::var_os(environment::KEPT)?;
-    std::io::stdin().as_fd().try_clone_to_owned().ok()
+/// What launch keeps for all processes of this module, one after the other, in its order. To be asked for once. Nothing of a module for which it keeps
+/// nothing, and of one that was started by hand.
+pub fn kept() -> Vec<OwnedFd> {
+    let numbers = std::env::var(environment::KEPT).unwrap_or_default();
+    numbers.split(',').filter_map(|number| sys::adopt(number.parse().ok()?).ok()).collect()
 }
 
 /// Why a module did not start.

@@ -109,8 +109,8 @@ pub struct Parts<'a> {
     pub settings: Settings,
     /// How commands are answered that cannot be delivered.
     pub faults: Arc<dyn Faults>,
-    /// Its socket, if that is kept for it ([`listen`]); else it makes its own.
-    pub socket: Option<OwnedFd>,
+    /// Its sockets, if they are kept for it ([`listen`]), in that order; it makes those that are missing.
+    pub sockets: Vec<OwnedFd>,
     /// A bad network between it and its sockets.
     pub impair: Option<impair::Settings>,
     /// Its clock; none unless time comes from a master.
@@ -166,7 +166,8 @@ impl Shell {
             return Err(ShellError::Keys);
         }
         let seed = keys.as_ref().map(|_| security::random()).transpose()?;
-        let Parts { node, name, mut settings, faults, socket, impair, clock } = parts;
+        let Parts { node, name, mut settings, faults, sockets, impair, clock } = parts;
+        let mut sockets = sockets.into_iter();
         let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
         if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
             // What comes through the tunnel comes from the router, and is not to share the quota of those whom nobody knows.
@@ -174,11 +175,7 @@ impl Shell {
         }
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
         let peers = settings.peer_addresses();
-        let socket = match socket {
-            Some(kept) => InSocket::kept(kept, own, &peers),
-            None => InSocket::open(own, &peers, InSocket::WANTED_BYTES),
-        };
-        let socket = Arc::new(socket?);
+        let socket = Arc::new(InSocket::kept(sockets.next(), own, &peers, InSocket::WANTED_BYTES)?);
         if socket.receive_bytes < InSocket::WANTED_BYTES {
             tracing::debug!(
                 "{} bytes may wait in the socket; raise net.core.rmem_max to {} for bursts (`sysctl`)",
@@ -251,7 +248,7 @@ impl Shell {
             let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.acquaintances.as_ref()));
             shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
-            departures.rest = shell.begin_rest((node, name), &faults, impair)?;
+            departures.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
             shell.begin("departures", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                     tracing::warn!(

@@ -18,6 +18,7 @@ use crate::outbound::{Outbound, Package};
 use crate::security::{Gate, Port, Sealing};
 use crate::stats::Stats;
 use rohrpost_mailbox::{Name, Node, Participant, monotonic_ns};
+use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -73,7 +74,7 @@ impl Shell {
         &mut self,
         (node, name): (&Arc<Node>, Name),
         faults: &Arc<dyn Faults>,
-        impair: Option<impair::Settings>,
+        (socket, impair): (Option<OwnedFd>, Option<impair::Settings>),
     ) -> Result<Option<Giver>, ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
         if !settings.parts_rest() {
@@ -81,7 +82,7 @@ impl Shell {
         }
         let port = settings.network.rest_port();
         let own = (settings.nodes[usize::from(settings.own)].address, port).into();
-        let socket = Arc::new(InSocket::open(own, &settings.peer_addresses(), REST_BYTES)?);
+        let socket = Arc::new(InSocket::kept(socket, own, &settings.peer_addresses(), REST_BYTES)?);
         let stats = Stats::of_rest(&settings, &self.stats);
         let all = self.acquaintances.as_ref();
         let mut outbound = Outbound::new(&settings, stats.clone()).behind(&self.stats);

@@ -77,13 +77,15 @@ pub(super) enum Received {
     Closed,
 }
 
-/// The socket of a node's router, for who keeps it while routers come and go ([`Parts::socket`](super::Parts)). What peers send meanwhile waits in
-/// the kernel, with the time at which it came; what has waited for too long is not delivered.
+/// The sockets of a node's router, for who keeps them while routers come and go ([`Parts::sockets`](super::Parts)): of this port, and of that of what is not
+/// real time. What peers send meanwhile waits in the kernel, with the time at which it came; what has waited for too long is not delivered.
 ///
 /// # Errors
 /// [`SocketError`]
-pub fn listen(own: SocketAddr, peers: &[IpAddr]) -> Result<OwnedFd, SocketError> {
-    InSocket::open(own, peers, RECEIVE_BYTES).map(|inside| inside.socket.into())
+pub fn listen(own: IpAddr, (port, rest): (u16, Option<u16>), peers: &[IpAddr]) -> Result<Vec<OwnedFd>, SocketError> {
+    let ports = std::iter::once((port, RECEIVE_BYTES)).chain(rest.map(|port| (port, REST_BYTES)));
+    let open = |(port, bytes)| InSocket::open((own, port).into(), peers, bytes).map(|inside| inside.socket.into());
+    ports.map(open).collect()
 }
 
 /// Takes datagrams from all peers.
@@ -109,13 +111,18 @@ impl InSocket {
         Self::of(socket, own, (peers, bytes), false)
     }
 
-    /// A socket that is kept for all routers of this node, one after the other: see [`listen`].
-    pub(super) fn kept(socket: OwnedFd, own: SocketAddr, peers: &[IpAddr]) -> Result<Self, SocketError> {
-        let socket = Socket::from(socket);
+    /// A socket that is kept for all routers of this node, one after the other: see [`listen`]. Without one opens it.
+    pub(super) fn kept(
+        socket: Option<OwnedFd>,
+        own: SocketAddr,
+        peers: &[IpAddr],
+        bytes: usize,
+    ) -> Result<Self, SocketError> {
+        let Some(socket) = socket.map(Socket::from) else { return Self::open(own, peers, bytes) };
         let bound =
             socket.local_addr().map_err(|error| SocketError::Io(own, "looking at the socket that is kept", error))?;
         match bound.as_socket() {
-            Some(bound) if bound == own => Self::of(socket, own, (peers, RECEIVE_BYTES), true),
+            Some(bound) if bound == own => Self::of(socket, own, (peers, bytes), true),
             bound => Err(SocketError::Strange(own, bound.map_or("nothing".into(), |bound| bound.to_string()))),
         }
     }
@@ -340,13 +347,15 @@ mod tests {
     #[test]
     fn what_comes_while_nobody_reads_a_kept_socket_waits_for_the_next_one() {
         let at = SocketAddr::new(ONE, free_port(ONE));
-        let keeper = listen(at, &[OTHER]).unwrap();
+        let mut keepers = listen(at.ip(), (at.port(), Some(free_port(ONE))), &[OTHER]).unwrap();
+        let (rest, keeper) = (keepers.pop().unwrap(), keepers.pop().unwrap());
+        assert_ne!(UdpSocket::from(rest).local_addr().unwrap(), at, "the other one has the other port");
         let mut sender = OutSocket::new(OTHER, at, 0);
         let mut datagram = [0; 10];
         for life in 0..3_u8 {
             sender.send(&[IoSlice::new(&[life])]).unwrap();
             std::thread::sleep(Duration::from_millis(2));
-            let inside = InSocket::kept(keeper.try_clone().unwrap(), at, &[OTHER]).unwrap();
+            let inside = InSocket::kept(keeper.try_clone().ok(), at, &[OTHER], RECEIVE_BYTES).unwrap();
             let Received::Datagram { bytes: 1, waited_ns, .. } = inside.receive(&mut datagram) else { panic!() };
             assert_eq!(datagram[0], life);
             assert!(waited_ns >= 2_000_000, "the kernel says how long: {waited_ns}");
@@ -354,7 +363,7 @@ mod tests {
             assert_eq!(inside.receive(&mut datagram), Received::Closed);
         }
         let elsewhere = SocketAddr::new(ONE, free_port(ONE));
-        let error = InSocket::kept(keeper, elsewhere, &[]).err().unwrap();
+        let error = InSocket::kept(Some(keeper), elsewhere, &[], RECEIVE_BYTES).err().unwrap();
         assert!(
             matches!(error, SocketError::Strange(..)) && error.to_string().contains("launch the node anew"),
             "{error}"

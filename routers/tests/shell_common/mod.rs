@@ -49,7 +49,7 @@ pub(crate) struct Side {
     pub(crate) node: Arc<Node>,
     pub(crate) settings: Settings,
     /// What launch keeps for its routers; none: each makes its own.
-    pub(crate) socket: Option<OwnedFd>,
+    pub(crate) sockets: Vec<OwnedFd>,
     pub(crate) shell: Option<Shell>,
 }
 
@@ -105,7 +105,7 @@ impl Side {
             flows: vec![declared(module(own), there)],
             real_time_from: 0,
         };
-        Self { node, settings, socket: None, shell: None }
+        Self { node, settings, sockets: Vec::new(), shell: None }
     }
 
     /// Ends its router, if it has one, and starts it anew.
@@ -114,9 +114,9 @@ impl Side {
         self.settings.incarnation += 1;
         let name = router(self.settings.own);
         let (settings, faults, clock) = (self.settings.clone(), Arc::new(Words), self.clock());
-        let socket = self.socket.as_ref().map(|kept| kept.try_clone().unwrap());
+        let sockets = self.sockets.iter().map(|kept| kept.try_clone().unwrap()).collect();
         let is_sealed = settings.is_sealed();
-        let parts = Parts { node: &self.node, name, settings, faults, socket, impair: None, clock };
+        let parts = Parts { node: &self.node, name, settings, faults, sockets, impair: None, clock };
         let shell = if is_sealed { Shell::start_sealed(parts, keys()) } else { Shell::start(parts) };
         self.shell = Some(shell.unwrap());
     }

@@ -155,7 +155,7 @@ impl Station {
             name,
             settings,
             faults: Arc::new(Silence),
-            socket: None,
+            sockets: Vec::new(),
             impair: None,
             clock: Some(clock),
         };

@@ -70,8 +70,8 @@ impl Module for RouterModule {
         let faults = Arc::new(faults::Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
-        let (name, socket) = (context.me(), kept());
-        let parts = Parts { node: &node, name, settings, faults, socket, impair, clock };
+        let (name, sockets) = (context.me(), kept());
+        let parts = Parts { node: &node, name, settings, faults, sockets, impair, clock };
         let shell = match keys {
             Some(keys) => Shell::start_sealed(parts, keys)?,
             None => Shell::start(parts)?,
