@@ -1,6 +1,7 @@
 //! Modules that end, and what launch does then.
 
 use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
+use crate::output::lines;
 use nix::sys::signal::Signal;
 use std::time::{Duration, Instant};
 
@@ -114,4 +115,40 @@ fn launch_stops_while_a_module_waits_to_be_started_again() {
     launch.stop();
     assert_eq!(place.recorded("start"), 1);
     place.assert_empty();
+}
+
+/// The first ends are told whole, the tenth, the twentieth and so on in one line each; so on the terminal, and in the log.
+#[test]
+fn a_module_that_ends_again_and_again_floods_neither_the_terminal_nor_the_log() {
+    for (settings, cause, lines_of_each_end) in [
+        ("exit-at-start = 3", "a probe was asked to end with 3", 4),
+        ("panic-at-start = true", "a probe was asked to panic", 16),
+    ] {
+        let place = Place::new();
+        let restart = "restart = { policy = \"always\", backoff = \"1 ms\", at-most = 1000, within = \"50 ms\" }";
+        let config = place.config(&[OUTPUT, &probe("probe.0", settings, restart), &probe("probe.1", "", "")]);
+        let mut launch = place.launch(&config);
+        let robot = place.robot(&config, "main", &mut launch);
+        wait("it ends again and again", || (place.recorded("start") > 41).then_some(()));
+        wait("the list says that it is started again", || {
+            let list = place.say(&["list"]).out;
+            list.lines().any(|line| line.starts_with("probe.0") && line.contains("restarting (")).then_some(())
+        });
+        let log = lines(&place, "probe.0");
+        drop(robot);
+        let out = launch.stop();
+        let ends = place.recorded("start");
+        assert!(ends < 160, "{ends} ends, of which the last that is told is the eightieth at most");
+        let told = out.lines().filter(|line| line.starts_with("probe.0 ") && line.contains("starts again in ")).count();
+        assert!((8..=9).contains(&told), "{told} of {ends} are told: {out}");
+        let count = |text: &str| out.lines().filter(|line| line.contains(text)).count();
+        assert_eq!((count(" times in "), count(" in a row; its last words: ")), (told - 5, told - 5), "{out}");
+        assert!(count(cause) <= told, "{out}");
+        let lines_max = 5 * lines_of_each_end + told + 6;
+        assert!(out.lines().count() <= lines_max, "{out}");
+        assert!(log.len() <= lines_max, "{} lines: {log:#?}", log.len());
+        let causes = log.iter().filter(|line| line["text"].as_str().unwrap().contains(cause)).count();
+        assert!((5..=told).contains(&causes), "{causes}: {log:#?}");
+        place.assert_empty();
+    }
 }

@@ -1,23 +1,23 @@
 //! One module's process: started, watched, started again, stopped. Nothing here waits: each step looks, and says when to
 //! look again.
 
+mod ended;
 mod ending;
 
 pub(super) use ending::Then;
 
 use super::control::{ChildState, Phase};
 use super::health::Health;
-use super::policy::{Next, Policy};
+use super::policy::{Policy, STEADY};
 use super::printed::Printed;
 use super::program::Program;
+use super::repeats::Repeats;
 use crate::output::Relay;
-use crate::runtime::StartError;
 use ending::Ending;
 use nix::sys::signal::Signal;
-use rohrpost_config::{Installation, Module, Restart, Start};
+use rohrpost_config::{Installation, Module, Start};
 use rohrpost_mailbox::{ModuleState, Name, Node};
 use std::io;
-use std::os::unix::process::ExitStatusExt;
 use std::process::{Child as Process, ExitStatus};
 use std::time::{Duration, Instant};
 
@@ -49,6 +49,8 @@ pub(super) struct Child {
     names: Vec<Name>,
     program: Program,
     policy: Policy,
+    /// How much is said of its ends.
+    repeats: Repeats,
     /// Whether it is switched on when it is ready: as configured, or as somebody has switched it since.
     turn_on: bool,
     /// This process was on, or was in error on its way there: if it is off now, somebody wants it so.
@@ -87,6 +89,7 @@ impl Child {
             names: module.names().collect(),
             program,
             policy: Policy::new(module.restart),
+            repeats: Repeats::default(),
             turn_on: configured_on,
             was_on: false,
             configured_on,
@@ -222,17 +225,18 @@ impl Child {
             Err(error) => {
                 let how = format!("could not be started: {}: {error}", self.program.path().display());
                 let next = self.policy.ended(false, now);
-                Some(self.follow(next, false, &how, "", now))
+                self.follow(next, false, &how, "", now)
             }
         }
     }
 
     fn try_spawn(&mut self) -> io::Result<Process> {
         // First: a process whose words nobody reads would be stuck at the first of them too many.
-        let pipes = self.printed.begin()?;
+        let quiet = self.repeats.is_quiet().then_some(STEADY);
+        let pipes = self.printed.begin(quiet)?;
         // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes before any
         // word of launch's: so it switches itself on. At the first start launch does, when all are ready.
-        self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, pipes)
+        self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, quiet, pipes)
     }
 
     /// Looks after it; what there is to say.
@@ -319,54 +323,6 @@ impl Child {
             Some(ModuleState::Off) if self.was_on => self.turn_on = false,
             _ => {}
         }
-    }
-
-    /// It has ended: again, or not, as was asked for, or as its policy has it.
-    fn ended(&mut self, status: ExitStatus, now: Instant) -> Option<String> {
-        let how = match (status.code(), status.signal()) {
-            (Some(code), _) => format!("ended with {code}"),
-            (None, Some(signal)) => format!("was killed by signal {signal}"),
-            (None, None) => "ended".to_owned(),
-        };
-        if let Some(ending) = self.ending.take() {
-            self.printed.pass_on(None);
-            return self.ended_as_told(&ending, &how, now);
-        }
-        // Whoever waits for its work expects it to go on as configured; but what a person has switched off stays off.
-        self.turn_on &= self.configured_on;
-        let printed = self.printed.below();
-        // Started again, it would find the same configuration.
-        let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
-        let success = status.success();
-        let next = if misconfigured || self.last_life { Next::Stay } else { self.policy.ended(success, now) };
-        Some(self.follow(next, success, &how, &printed, now))
-    }
-
-    /// What follows an end of its own accord; what there is to say about it.
-    fn follow(&mut self, next: Next, success: bool, how: &str, printed: &str, now: Instant) -> String {
-        self.last_end = format!("{how}{printed}");
-        let told = match next {
-            Next::Stay => {
-                self.rest(if success { Phase::Ended } else { Phase::Failed });
-                how.to_owned()
-            }
-            Next::GivenUp => {
-                let Restart { at_most, within, .. } = self.policy.restart();
-                self.rest(Phase::Failed);
-                let told = format!("{how}; given up after {at_most} restarts within {within:?}");
-                self.last_end = format!("{told}{printed}");
-                told
-            }
-            Next::Again(pause) => {
-                self.restarts += 1;
-                self.phase = Phase::Waiting;
-                self.since = now + pause;
-                format!("{how}; starts again in {pause:?}")
-            }
-        };
-        self.health.ended((!success).then_some(&self.last_end));
-        self.printed.pass_on((!success).then_some(&told));
-        format!("{} {told}{printed}{}", self.text, self.printed.trace_below())
     }
 
     /// It is not started again unless somebody asks for it, and then finds empty mailboxes: what was meant for this run must

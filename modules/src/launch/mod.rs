@@ -27,6 +27,7 @@ mod look;
 mod policy;
 mod printed;
 mod program;
+mod repeats;
 mod serve;
 mod start;
 

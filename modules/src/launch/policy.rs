@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// Longest pause before a restart, unless the configured one is longer, or the time in which restarts are counted is shorter.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
 /// Without an end for so long, and for the time in which restarts are counted, the next begins with the short pause again.
-const STEADY: Duration = Duration::from_secs(10);
+pub(super) const STEADY: Duration = Duration::from_secs(10);
 
 /// What follows an end.
 #[derive(Debug, PartialEq, Eq)]
@@ -26,12 +26,14 @@ pub(super) struct Policy {
     /// When it ended, of the times it was to be started again; the last of them, in which restarts are counted.
     ends: VecDeque<Instant>,
     last_end: Option<Instant>,
+    /// Ends since it last worked for long.
+    in_a_row: u32,
     backoff: Duration,
 }
 
 impl Policy {
     pub(super) fn new(restart: Restart) -> Self {
-        Self { restart, ends: VecDeque::new(), last_end: None, backoff: restart.backoff }
+        Self { restart, ends: VecDeque::new(), last_end: None, in_a_row: 0, backoff: restart.backoff }
     }
 
     pub(super) fn restart(&self) -> Restart {
@@ -41,6 +43,11 @@ impl Policy {
     /// Restarts that count now.
     pub(super) fn counted(&self) -> u32 {
         self.ends.len() as u32
+    }
+
+    /// Ends since it last worked for long, with the present one.
+    pub(super) fn in_a_row(&self) -> u32 {
+        self.in_a_row
     }
 
     /// A process has ended by itself.
@@ -61,7 +68,9 @@ impl Policy {
         let steady = self.restart.within.max(STEADY);
         if self.last_end.replace(now).is_none_or(|last| now - last > steady) {
             self.backoff = self.restart.backoff;
+            self.in_a_row = 0;
         }
+        self.in_a_row = self.in_a_row.saturating_add(1);
         let pause = self.backoff;
         let longest = BACKOFF_MAX.min(self.restart.within).max(self.restart.backoff);
         self.backoff = (self.backoff * 2).min(longest);
@@ -121,8 +130,10 @@ mod tests {
                 now += pause;
             }
             assert_eq!(pauses[0], ms(10));
+            assert_eq!(policy.in_a_row(), 20);
             assert!(pauses.is_sorted() && pauses[7..].iter().all(|pause| *pause == second), "{life:?}: {pauses:?}");
             assert_eq!(policy.ended(false, now + STEADY + second * 2), Next::Again(ms(10)), "it worked for long");
+            assert_eq!(policy.in_a_row(), 1);
         }
     }
 }

@@ -25,11 +25,12 @@ const LINE_BYTES_MAX: u64 = 4096;
 const HOLD: Duration = Duration::from_millis(200);
 
 /// What one process printed: the one that runs, or the one that ended last.
-#[derive(Default)]
 pub(super) struct Printed {
     lines: Arc<Mutex<Lines>>,
     readers: Vec<JoinHandle<()>>,
     voice: Option<Voice>,
+    /// How long a line is held.
+    hold: Duration,
     /// Where the panic came from that was told last.
     told: Vec<String>,
 }
@@ -53,12 +54,14 @@ struct Held {
 impl Printed {
     /// Of a module; `voice` speaks for it, if anybody listens.
     pub(super) fn new(voice: Option<Voice>) -> Self {
-        Self { lines: Arc::default(), readers: Vec::new(), voice, told: Vec::new() }
+        Self { lines: Arc::default(), readers: Vec::new(), voice, hold: HOLD, told: Vec::new() }
     }
 
     /// Where the next process prints to: its standard output and standard error. What the one before said is forgotten.
-    pub(super) fn begin(&mut self) -> io::Result<[PipeWriter; 2]> {
+    /// `quiet`: for so long nothing of it is passed on.
+    pub(super) fn begin(&mut self, quiet: Option<Duration>) -> io::Result<[PipeWriter; 2]> {
         self.pass_on(None);
+        self.hold = quiet.unwrap_or(HOLD);
         // Of its own: who left processes behind that still print must not mix with what follows.
         self.lines = Arc::default();
         self.readers.clear();
@@ -96,9 +99,9 @@ impl Printed {
         text
     }
 
-    /// The last line, empty if there is none.
+    /// The last line that says something, empty if there is none.
     pub(super) fn last(&self) -> String {
-        lock(&self.lines).last.back().cloned().unwrap_or_default()
+        lock(&self.lines).last.iter().rev().find(|line| !line.is_empty()).cloned().unwrap_or_default()
     }
 
     /// Says of the module what launch has seen.
@@ -114,7 +117,7 @@ impl Printed {
         loop {
             // One at a time: the thread that reads must not wait for the collector's mailbox.
             let mut lines = lock(&self.lines);
-            let Some(line) = lines.held.pop_front_if(|line| now >= line.since + HOLD) else { break };
+            let Some(line) = lines.held.pop_front_if(|line| now >= line.since + self.hold) else { break };
             drop(lines);
             voice.say(line.level, line.time_ns, line.text);
         }
@@ -123,8 +126,13 @@ impl Printed {
 
     /// When to attend to it again.
     pub(super) fn attend_at(&self) -> Option<Instant> {
-        let held = lock(&self.lines).held.front().map(|line| line.since + HOLD);
+        let held = lock(&self.lines).held.front().map(|line| line.since + self.hold);
         held.into_iter().chain(self.voice.as_ref()?.retry_at()).min()
+    }
+
+    /// Its process has ended, and what is held is not to be said: launch has told the like before.
+    pub(super) fn drop_held(&mut self) {
+        lock(&self.lines).held.clear();
     }
 
     /// Its process has ended: passes on what is held. If that was a failure, what came by standard error were its last words,

@@ -8,6 +8,7 @@ use std::os::fd::{AsRawFd, OwnedFd};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 /// Where launch has the right to it, it goes before ordinary programs by so much: on a busy computer a router that died is to be there again before
 /// calls that wait for it run out of time.
@@ -65,9 +66,20 @@ impl Program {
         &self.path
     }
 
-    /// Starts a process, in a process group of its own so that a Ctrl-C is launch's to handle. `on`: it switches itself on.
-    pub(super) fn spawn(&self, on: bool, restarts: u32, [stdout, stderr]: [PipeWriter; 2]) -> io::Result<Child> {
+    /// Starts a process, in a process group of its own so that a Ctrl-C is launch's to handle. `on`: it switches itself on. `quiet`: for so
+    /// long it keeps its lines of output to itself.
+    pub(super) fn spawn(
+        &self,
+        on: bool,
+        restarts: u32,
+        quiet: Option<Duration>,
+        [stdout, stderr]: [PipeWriter; 2],
+    ) -> io::Result<Child> {
         let mut command = Command::new(&self.path);
+        match quiet {
+            Some(quiet) => command.env(environment::QUIET_MS, quiet.as_millis().to_string()),
+            None => command.env_remove(environment::QUIET_MS),
+        };
         if !on {
             command.env(environment::OFF, "1");
         }

@@ -25,6 +25,7 @@ pub use format::{Format, iso};
 pub(crate) use print::print;
 pub(crate) use relay::{Relay, Voice, Whisper};
 pub(crate) use trace::LINES_MAX as TRACE_LINES_MAX;
+pub(crate) use way::install_quiet;
 pub(crate) use way::is_installed;
 pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppressed};
 #[cfg(feature = "builtin")]

@@ -17,9 +17,22 @@ pub(super) struct Out {
     way: Mutex<Way>,
     /// Whether `way` holds a line back.
     pub(super) held: AtomicBool,
+    /// Until then nothing is sent.
+    quiet_until: Option<Instant>,
 }
 
 impl Out {
+    /// One by which nothing is sent for so long.
+    pub(super) fn quiet(quiet: Duration) -> Self {
+        let quiet_until = (!quiet.is_zero()).then(|| Instant::now() + quiet);
+        Self { way: Mutex::new(Way { retry_at: quiet_until, ..Way::default() }), quiet_until, ..Self::default() }
+    }
+
+    /// Whether nothing is sent yet.
+    pub(super) fn is_quiet(&self) -> bool {
+        self.quiet_until.is_some_and(|until| Instant::now() < until)
+    }
+
     /// None: another thread has it.
     pub(super) fn way(&self) -> Option<MutexGuard<'_, Way>> {
         match self.way.try_lock() {

@@ -92,9 +92,20 @@ pub(super) struct Output {
 
 /// Makes this process's `tracing` events and panics lines of this module. The first caller in a process decides.
 pub fn install(participant: &Arc<Participant>, installation: &Installation, me: Name, launched: bool) {
+    install_quiet(participant, installation, me, launched, Duration::ZERO);
+}
+
+/// The same, and for so long lines wait in this process; they are dropped if it ends before.
+pub(crate) fn install_quiet(
+    participant: &Arc<Participant>,
+    installation: &Installation,
+    me: Name,
+    launched: bool,
+    quiet: Duration,
+) {
     // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard error.
     let print = if launched { Print::Errors } else { Print::All };
-    if let Some(output) = Output::new(participant, installation, me, me, Arc::default(), print)
+    if let Some(output) = Output::new(participant, installation, me, me, Arc::new(Out::quiet(quiet)), print)
         && OUTPUT.set(output).is_ok()
     {
         layer::listen();
@@ -329,7 +340,7 @@ impl Output {
     fn flush(&self) {
         let until = Instant::now() + LAST_LINES;
         self.drain();
-        while !self.is_done() && Instant::now() < until {
+        while !self.out.is_quiet() && !self.is_done() && Instant::now() < until {
             std::thread::sleep(LAST_LOOK);
             self.hurry();
             self.drain();

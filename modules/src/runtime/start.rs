@@ -34,6 +34,8 @@ pub(crate) mod environment {
     pub(crate) const OFF: &str = "ROHRPOST_OFF";
     /// Numbers of the descriptors that launch keeps for all processes of this module, with commas.
     pub(crate) const KEPT: &str = "ROHRPOST_KEPT";
+    /// So long it keeps its lines of output to itself: those before it said the like and ended soon.
+    pub(crate) const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
 }
 
 /// What launch keeps for all processes of this module, one after the other, in its order. To be asked for once. Nothing of a module for which it keeps
@@ -180,7 +182,9 @@ impl Start {
         participant.set_state(ModuleState::Starting);
         participant.set_restarts(self.restarts);
         let stop = stop_on_signals(&participant, module.stop_within)?;
-        output::install(&participant, &installation, self.name, self.launcher.is_some());
+        let quiet = std::env::var(environment::QUIET_MS).ok().filter(|_| self.launcher.is_some());
+        let quiet = quiet.and_then(|ms| ms.parse().ok()).map_or(Duration::ZERO, Duration::from_millis);
+        output::install_quiet(&participant, &installation, self.name, self.launcher.is_some(), quiet);
         schedule(installation.scheduling(self.name.class()));
         // The mailboxes themselves know numbers only.
         let receiver = |name: Name, spec: &MailboxSpec| {

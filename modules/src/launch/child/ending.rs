@@ -1,6 +1,6 @@
 //! A process on its way to its end, because somebody wants it so.
 
-use super::{Child, Phase};
+use super::{Child, Phase, Repeats};
 use crate::launch::leftovers::KILL_TIME;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -66,6 +66,7 @@ impl Child {
         self.last_life |= then == Then::End;
         if then == Then::Start {
             self.policy.begin_anew();
+            self.repeats = Repeats::default();
         }
         if let Some(ending) = &mut self.ending {
             ending.then = then;

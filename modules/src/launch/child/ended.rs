@@ -1,0 +1,90 @@
+//! What follows when a process has ended, and what is said about it.
+
+use super::{Child, Phase, cut};
+use crate::launch::policy::Next;
+use crate::launch::repeats::Tell;
+use crate::runtime::StartError;
+use rohrpost_config::Restart;
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
+use std::time::Instant;
+
+impl Child {
+    /// It has ended: again, or not, as was asked for, or as its policy has it.
+    pub(super) fn ended(&mut self, status: ExitStatus, now: Instant) -> Option<String> {
+        let how = match (status.code(), status.signal()) {
+            (Some(code), _) => format!("ended with {code}"),
+            (None, Some(signal)) => format!("was killed by signal {signal}"),
+            (None, None) => "ended".to_owned(),
+        };
+        if let Some(ending) = self.ending.take() {
+            self.printed.pass_on(None);
+            return self.ended_as_told(&ending, &how, now);
+        }
+        // Whoever waits for its work expects it to go on as configured; but what a person has switched off stays off.
+        self.turn_on &= self.configured_on;
+        let printed = self.printed.below();
+        // Started again, it would find the same configuration.
+        let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
+        let success = status.success();
+        let next = if misconfigured || self.last_life { Next::Stay } else { self.policy.ended(success, now) };
+        self.follow(next, success, &how, &printed, now)
+    }
+
+    /// What follows an end of its own accord; what there is to say about it.
+    pub(super) fn follow(
+        &mut self,
+        next: Next,
+        success: bool,
+        how: &str,
+        printed: &str,
+        now: Instant,
+    ) -> Option<String> {
+        self.last_end = format!("{how}{printed}");
+        let (told, tell) = match next {
+            Next::Stay => {
+                self.rest(if success { Phase::Ended } else { Phase::Failed });
+                (how.to_owned(), self.repeats.is_over())
+            }
+            Next::GivenUp => {
+                let Restart { at_most, within, .. } = self.policy.restart();
+                self.rest(Phase::Failed);
+                let told = format!("{how}; given up after {at_most} restarts within {within:?}");
+                self.last_end = format!("{told}{printed}");
+                (told, self.repeats.is_over())
+            }
+            Next::Again(pause) => {
+                self.restarts += 1;
+                self.phase = Phase::Waiting;
+                self.since = now + pause;
+                let tell = self.repeats.ended(self.policy.in_a_row(), &self.last_end, now);
+                (format!("{how}; starts again in {pause:?}"), tell)
+            }
+        };
+        self.health.ended((!success).then_some(&self.last_end));
+        let (told, below) = match tell {
+            Tell::Whole(0) => (told, format!("{printed}{}", self.printed.trace_below())),
+            Tell::Whole(untold) => {
+                (format!("{told} ({})", unsaid(untold)), format!("{printed}{}", self.printed.trace_below()))
+            }
+            Tell::Sum(times, within) => {
+                let last = self.printed.last();
+                let words = if last.is_empty() { String::new() } else { format!("; its last words: {}", cut(&last)) };
+                let row = self.policy.in_a_row();
+                self.printed.drop_held();
+                (format!("{told} ({times} times in {within:.1?}, {row} in a row{words})"), String::new())
+            }
+            Tell::Nothing => {
+                self.printed.drop_held();
+                return None;
+            }
+        };
+        self.printed.pass_on((!success).then_some(&told));
+        Some(format!("{} {told}{below}", self.text))
+    }
+}
+
+/// That ends were not told.
+fn unsaid(ends: u32) -> String {
+    if ends == 1 { "1 end before it was not told".into() } else { format!("{ends} ends before it were not told") }
+}
