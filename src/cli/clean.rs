@@ -1,9 +1,9 @@
 //! `rohrpost clean`.
 
-use super::demo::abandoned;
+use super::demo::remove_abandoned;
 use super::{Failure, say};
 use rohrpost::mailbox::{Node, NodeError, base_directory, remove_base_if_empty};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -25,9 +25,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             outcome => done.push((path, outcome)),
         }
     }
-    // Somebody else may have removed one meanwhile.
-    let demos = abandoned(&std::env::temp_dir()).into_iter().filter(|folder| std::fs::remove_dir_all(folder).is_ok());
-    let demos: Vec<PathBuf> = demos.collect();
+    let demos = remove_abandoned(&std::env::temp_dir());
     if arguments.json {
         let nodes: Vec<serde_json::Value> = done.iter().map(|(path, outcome)| json(path, outcome)).collect();
         say(serde_json::json!({ "directory": base, "nodes": nodes, "demos": demos }));

@@ -16,7 +16,7 @@ use super::speech::Speech;
 use super::summary::print_classes;
 use super::{Failure, say};
 use folder::Folder;
-pub(super) use folder::abandoned;
+pub(super) use folder::remove_abandoned;
 use rohrpost::common::State;
 use rohrpost::config::Installation;
 use rohrpost::interface::Interface;

@@ -2,10 +2,12 @@
 
 use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, runs, wait};
 use crate::process::Running;
-use nix::sys::signal::Signal;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use rohrpost::launch::{Phase, launcher_of};
 use rohrpost_routers::lab::stalls::{Watched, judged};
-use std::path::Path;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
 
@@ -224,4 +226,70 @@ fn a_log_that_is_none_is_told_and_fails() {
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.out.contains("is it a CARMEN log?"), "{said:?}");
     place.assert_empty();
+}
+
+/// Folders of demos among these temporary files.
+fn folders(temp: &Path) -> Vec<PathBuf> {
+    let mut folders: Vec<PathBuf> = std::fs::read_dir(temp).unwrap().map(|entry| entry.unwrap().path()).collect();
+    folders.sort();
+    folders
+}
+
+/// Starts a demo with these temporary files, and waits until all its modules are on; with its processes.
+fn demo_on(place: &Place, temp: &Path) -> (Running, Vec<u32>) {
+    let mut command = place.command(&["demo", "--no-gui", "--quiet"]);
+    command.env("TMPDIR", temp).process_group(0);
+    let mut demo = Running::start(command);
+    let pids = wait("the demo is on", || {
+        demo.assert_runs();
+        let said = place.say(&["list", "--json"]);
+        let list: serde_json::Value = serde_json::from_str(&said.out).ok()?;
+        let modules = list["modules"].as_array()?;
+        let pids =
+            modules.iter().map(|module| module["pid"].as_u64().map(|pid| pid as u32)).collect::<Option<Vec<_>>>()?;
+        modules.iter().all(|module| module["state"] == "on").then_some(pids)
+    });
+    (demo, pids)
+}
+
+#[test]
+fn the_files_of_a_killed_demo_are_removed_and_those_of_one_that_runs_are_not() {
+    for remover in [&["clean"][..], &["demo", "--no-gui", "--quiet", "--seconds", "0.1"]] {
+        let (killed_place, place) = (Place::new(), Place::new());
+        let temp = killed_place.path("temp");
+        std::fs::create_dir(&temp).unwrap();
+        let (mut killed, pids) = demo_on(&killed_place, &temp);
+        let left = folders(&temp);
+        assert_eq!(left.len(), 1, "{left:?}");
+        let (mut runs_on, _) = demo_on(&place, &temp);
+        assert_eq!(folders(&temp).len(), 2, "the first one runs, and the second leaves it alone");
+
+        killed.signal(Signal::SIGKILL);
+        killed.end();
+        // Some have ended by themselves.
+        for pid in &pids {
+            let _ = kill(Pid::from_raw(*pid as i32), Signal::SIGKILL);
+        }
+        wait("all its processes have ended", || (!pids.iter().any(|pid| runs(*pid))).then_some(()));
+        assert!(left[0].exists(), "nobody has removed it yet");
+
+        let mut command = killed_place.command(remover);
+        command.env("TMPDIR", &temp);
+        let said = Running::start(command).said();
+        assert_eq!(said.code, Some(0), "{said:?}");
+        if remover == ["clean"] {
+            let line = format!("removed {}, the files of a demo", left[0].display());
+            assert_eq!(
+                said.out.lines().filter(|told| told.contains("the files of a demo")).collect::<Vec<_>>(),
+                [line]
+            );
+        }
+        assert!(!left[0].exists(), "{remover:?} removes it");
+        assert_eq!(folders(&temp).len(), 1, "and leaves the other alone");
+        runs_on.assert_runs();
+        runs_on.stop();
+        assert_eq!(folders(&temp), Vec::<PathBuf>::new());
+        killed_place.assert_empty();
+        place.assert_empty();
+    }
 }

@@ -10,6 +10,9 @@ const PREFIX: &str = "rohrpost-demo-";
 /// The file in it that is locked as long as the demo runs, by whatever it ends.
 const IN_USE: &str = "in-use";
 
+/// What that file is called until it is locked.
+const NOT_LOCKED: &str = "not-locked-yet";
+
 /// A demo's folder; gone with it.
 pub(super) struct Folder {
     folder: TempDir,
@@ -17,15 +20,19 @@ pub(super) struct Folder {
 }
 
 impl Folder {
-    /// Among temporary files.
+    /// Among temporary files. What killed demos left there is removed.
     pub(super) fn new() -> io::Result<Self> {
-        Self::new_in(&std::env::temp_dir())
+        let temp = std::env::temp_dir();
+        remove_abandoned(&temp);
+        Self::new_in(&temp)
     }
 
     fn new_in(temp: &Path) -> io::Result<Self> {
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(temp)?;
-        let in_use = File::create(folder.path().join(IN_USE))?;
+        // Under its name it is locked from the first moment on: without a lock, another demo would take the folder for one that was left.
+        let in_use = File::create(folder.path().join(NOT_LOCKED))?;
         in_use.lock()?;
+        fs::rename(folder.path().join(NOT_LOCKED), folder.path().join(IN_USE))?;
         Ok(Self { folder, _in_use: in_use })
     }
 
@@ -34,8 +41,14 @@ impl Folder {
     }
 }
 
-/// Folders there of this user's demos that do not run any more.
-pub(in crate::cli) fn abandoned(temp: &Path) -> Vec<PathBuf> {
+/// Removes the folders there of this user's demos that do not run any more; says which. Somebody else may have removed one meanwhile.
+pub(in crate::cli) fn remove_abandoned(temp: &Path) -> Vec<PathBuf> {
+    let mut folders = abandoned(temp);
+    folders.retain(|folder| fs::remove_dir_all(folder).is_ok());
+    folders
+}
+
+fn abandoned(temp: &Path) -> Vec<PathBuf> {
     let Ok(us) = fs::metadata("/proc/self").map(|own| own.uid()) else { return Vec::new() };
     let entries = fs::read_dir(temp).into_iter().flatten().flatten();
     let ours = entries.filter(|entry| {
