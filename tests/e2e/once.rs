@@ -1,6 +1,7 @@
 //! At most once, from end to end: whatever is lost, repeated or restarted, no command runs twice.
 
-use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, wait};
+use crate::output::lines;
 use crate::probe::{COUNT, COUNT_AGAIN, ProbingInterface};
 use nix::sys::signal::Signal;
 use rohrpost::common;
@@ -123,7 +124,7 @@ fn duplicates_of_an_order_to_launch_restart_a_module_once() {
 #[test]
 fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
     let place = Place::new();
-    let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     let mut raw = Raw::new(&robot, "probe.0");
     for (incarnation, sequence, number) in [(7, 1, 1), (7, 2, 2), (8, 1, 3), (8, 2, 4)] {
         raw.send(COUNT, Raw::envelope(incarnation, sequence, 0), number);
@@ -137,6 +138,19 @@ fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
         let refused = (ReplyEnvelope { incarnation: 7, sequence }, Err(Fault::EarlierIncarnation));
         assert_eq!(raw.answer(), refused);
     }
+    // The server says so too, once in a while.
+    wait("the server's line", || {
+        let log = lines(&place, "probe.0");
+        let told = log.iter().filter(|line| {
+            let text = line["text"].as_str().unwrap();
+            line["level"] == "warn"
+                && text.contains("a later incarnation of it has called")
+                && text.contains("clock was set back")
+        });
+        let told = told.count();
+        assert!(told <= 1, "{log:#?}");
+        (told == 1).then_some(())
+    });
     raw.send(COUNT, Raw::envelope(8, 3, 0), 7);
     assert_eq!(raw.answer().0, ReplyEnvelope { incarnation: 8, sequence: 3 });
     // The same with real tools: each is a new life under the same name, with numbers from 1 on.

@@ -24,6 +24,8 @@ pub(crate) enum Cause {
     OtherNumber,
     /// An earlier life of the module asked for it.
     EarlierLife,
+    /// It is of an earlier incarnation of its sender than one that is remembered. Told, and not counted: it passes by itself.
+    EarlierIncarnation,
 }
 
 impl Cause {
@@ -36,6 +38,10 @@ impl Cause {
             Self::Unasked => Some("nobody subscribed to it"),
             Self::OtherPublisher => Some("the subscription follows another module"),
             Self::OtherNumber => Some("the subscription is to other data of that module"),
+            Self::EarlierIncarnation => Some(
+                "a later incarnation of it has called before. If this goes on, two programs have that name: end one of them; or its computer's \
+                 clock was set back before its node was launched: set it right, and launch that again",
+            ),
             Self::EarlierLife => None,
         }
     }
@@ -53,26 +59,29 @@ pub(crate) struct Refusals {
 impl Refusals {
     /// Counts one.
     pub(crate) fn note(&mut self, cause: Cause, from: Name) {
-        let counts = &mut self.counts;
-        *match cause {
-            Cause::NotAllowed => &mut counts.not_allowed,
-            Cause::NoPlace => &mut counts.no_place,
-            Cause::Malformed => &mut counts.malformed,
-            Cause::Unasked => &mut counts.unasked,
-            Cause::OtherPublisher => &mut counts.other_publisher,
-            Cause::OtherNumber => &mut counts.other_number,
-            Cause::EarlierLife => &mut counts.earlier_life,
-        } += 1;
+        let count = self.count(cause).map(|count| *count += 1);
         let Some(words) = cause.words() else { return };
         self.untold += 1;
         let now = Instant::now();
         if self.told.is_none_or(|told| now >= told + TELL) {
             let packages = std::mem::take(&mut self.untold);
             self.told = Some(now);
-            tracing::warn!(
-                "took nothing of {packages} packages, the last of them from {from}: {words} (`rohrpost status --json` \
-                 counts them by cause)"
-            );
+            let counted = if count.is_some() { " (`rohrpost status --json` counts them by cause)" } else { "" };
+            tracing::warn!("took nothing of {packages} packages, the last of them from {from}: {words}{counted}");
+        }
+    }
+
+    fn count(&mut self, cause: Cause) -> Option<&mut u64> {
+        let counts = &mut self.counts;
+        match cause {
+            Cause::NotAllowed => Some(&mut counts.not_allowed),
+            Cause::NoPlace => Some(&mut counts.no_place),
+            Cause::Malformed => Some(&mut counts.malformed),
+            Cause::Unasked => Some(&mut counts.unasked),
+            Cause::OtherPublisher => Some(&mut counts.other_publisher),
+            Cause::OtherNumber => Some(&mut counts.other_number),
+            Cause::EarlierLife => Some(&mut counts.earlier_life),
+            Cause::EarlierIncarnation => None,
         }
     }
 }

@@ -60,8 +60,10 @@ impl Desk {
             Verdict::Ignore => return true,
             Verdict::Again(error, body) => (error, body),
             Verdict::Refuse(fault) => {
-                if fault == Fault::Busy {
-                    servant.refuse(Cause::NoPlace, head.from);
+                match fault {
+                    Fault::Busy => servant.refuse(Cause::NoPlace, head.from),
+                    Fault::EarlierIncarnation => servant.refuse(Cause::EarlierIncarnation, head.from),
+                    _ => {}
                 }
                 fill(&mut self.reply, &fault);
                 (true, &self.reply)
