@@ -277,6 +277,13 @@ impl Election {
         }
     }
 
+    /// Whether a master that stood still for so long may be none any more, and not find out: others may have begun a time of which they know that
+    /// nobody else has one, in lives that this node does not know and so does not hear.
+    pub(super) fn may_be_forgotten(&self, stood_ns: u64) -> bool {
+        let is_alone = self.masters.len() < 2;
+        matches!(self.state, State::Master(_)) && !is_alone && stood_ns > self.begins_after_ns.saturating_mul(2)
+    }
+
     /// Somebody that has time sent in the place of the master.
     pub(super) fn replaced(&mut self, received_ns: u64) {
         self.timed_heard_ns = Some(received_ns);

@@ -27,6 +27,18 @@ struct Other {
     heard_ns: u64,
     /// This node says nothing before that, local ns.
     until_ns: u64,
+    /// The same for what it said of time alone: who follows it goes on for a while without it, whatever became of it.
+    follows_until_ns: u64,
+    /// When it has shown last that it lives and says what time it is, local ns; 0: never.
+    told_ns: u64,
+}
+
+impl Other {
+    /// It said at that time what time it is.
+    fn follows(&mut self, local_ns: u64) {
+        self.follows_until_ns = local_ns.saturating_add(YIELDS_NS);
+        self.until_ns = self.until_ns.max(self.follows_until_ns);
+    }
 }
 
 /// Those that were heard.
@@ -57,9 +69,19 @@ impl Others {
         if local_ns.saturating_sub(other.heard_ns) > APART_NS {
             other.since_ns = local_ns;
         }
-        other.heard_ns = local_ns;
+        (other.heard_ns, other.told_ns) = (local_ns, local_ns);
         if (theirs > own && !broken!(NeverYieldsToOthers)) || local_ns.saturating_sub(other.since_ns) > grace_ns {
-            other.until_ns = local_ns.saturating_add(YIELDS_NS);
+            other.follows(local_ns);
+        }
+    }
+
+    /// The same, of a node that has not shown now that it lives: it has, shortly before, and this one says nothing because of that. So what somebody
+    /// has kept of it silences this node no longer than a refusal.
+    pub(super) fn overhears(&mut self, node: NodeIndex, local_ns: u64, digest: u64) {
+        let other = self.all.get_mut(usize::from(node)).and_then(Option::as_mut);
+        let told_lately = |other: &&mut Other| local_ns.saturating_sub(other.told_ns) < REFUSED_NS - YIELDS_NS;
+        if let Some(other) = other.filter(|other| other.digest == digest && other.told_ns > 0).filter(told_lately) {
+            other.follows(local_ns);
         }
     }
 
@@ -72,15 +94,14 @@ impl Others {
 
     /// A node goes by this configuration.
     pub(super) fn agrees(&mut self, node: NodeIndex) {
-        if let Some(other) = self.all.get_mut(usize::from(node)) {
-            *other = None;
-        }
+        self.is_heard(node, u64::MAX);
     }
 
-    /// A node was heard, by this configuration, at that time: what was heard of it before is over.
+    /// A node was heard, by this configuration, at that time: what it refused before is over. Who followed it before may not know yet.
     pub(super) fn is_heard(&mut self, node: NodeIndex, local_ns: u64) {
-        if let Some(other) = self.all.get_mut(usize::from(node)) {
-            *other = other.filter(|other| other.heard_ns >= local_ns);
+        let other = self.all.get_mut(usize::from(node)).and_then(Option::as_mut);
+        if let Some(other) = other.filter(|other| other.heard_ns < local_ns) {
+            other.until_ns = other.follows_until_ns;
         }
     }
 
@@ -110,10 +131,11 @@ impl Others {
     fn other(&mut self, node: Option<NodeIndex>, digest: u64, local_ns: u64) -> &mut Other {
         let last = self.all.len() - 1;
         let at = node.map_or(last, |node| usize::from(node).min(last));
-        let new = Other { digest, since_ns: local_ns, heard_ns: local_ns, until_ns: 0 };
+        let new =
+            Other { digest, since_ns: local_ns, heard_ns: local_ns, until_ns: 0, follows_until_ns: 0, told_ns: 0 };
         let other = self.all[at].get_or_insert(new);
         if other.digest != digest {
-            *other = Other { until_ns: other.until_ns, ..new };
+            *other = Other { until_ns: other.until_ns, follows_until_ns: other.follows_until_ns, ..new };
         }
         other
     }
@@ -170,6 +192,25 @@ mod tests {
         refused.is_heard(0, MS + 1);
         assert!(silent(&refused, MS), "another goes by it still");
         refused.agrees(2);
+        assert!(silent(&refused, MS), "who followed it may go on for a while");
+        assert!(!silent(&refused, MS + YIELDS_NS));
+        let mut refused = others();
+        refused.refuses(0, MS, 9);
+        refused.agrees(0);
         assert!(!silent(&refused, MS));
+    }
+
+    #[test]
+    fn who_has_shown_that_it_lives_is_overheard_for_no_longer_than_a_refusal() {
+        let mut lesser = others();
+        lesser.overhears(1, MS, 9);
+        assert!(!silent(&lesser, MS), "it has shown nothing");
+        lesser.hears(Some(1), MS, (true, 9), (false, 6));
+        lesser.overhears(1, 900 * MS, 8);
+        assert!(!silent(&lesser, MS + YIELDS_NS), "that was of another file");
+        for ms in (100..100_000).step_by(100) {
+            lesser.overhears(1, ms * MS, 9);
+            assert_eq!(silent(&lesser, ms * MS), ms * MS < REFUSED_NS, "{ms} ms");
+        }
     }
 }

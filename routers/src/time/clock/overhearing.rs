@@ -32,11 +32,14 @@ impl Clock {
         if self.is_unsteady(now_ns) {
             return Err(Ignored::Unsteady);
         }
-        if self.is_parted(now_ns) || (is_other && broken!(DeafToOtherTables)) {
-            return Err(Ignored::OtherTable);
-        }
         let message = Message::parse(head.kind, rest)?;
         let theirs = claim(head, &message).filter(|_| is_other);
+        if self.is_parted(now_ns) || (is_other && broken!(DeafToOtherTables)) {
+            if theirs.is_some() {
+                self.others.overhears(head.from, received.ns, head.digest);
+            }
+            return Err(Ignored::OtherTable);
+        }
         let told = match &message {
             Message::Sync(sync) if sync.replacement => None,
             Message::Sync(sync) => Some(Told { epoch: sync.epoch, system_ns: sync.sent_ns, error_ns: 0 }),

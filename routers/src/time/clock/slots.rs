@@ -146,11 +146,16 @@ impl Clock {
         let cycle = self.line.at(now_ns).ns / self.interval_ns;
         let Some(slots) = &mut self.slots else { return };
         let before_ns = std::mem::replace(&mut slots.advanced_ns, now_ns);
-        if now_ns.saturating_sub(before_ns) > 2 * self.interval_ns {
-            slots.awake_cycle = cycle;
-            self.election.awakes(before_ns, now_ns);
-            slots.overheard.awakes(now_ns.saturating_sub(before_ns));
-            self.election.overhears(&slots.overheard);
+        let stood_ns = now_ns.saturating_sub(before_ns);
+        if stood_ns <= 2 * self.interval_ns {
+            return;
+        }
+        slots.awake_cycle = cycle;
+        self.election.awakes(before_ns, now_ns);
+        slots.overheard.awakes(stood_ns);
+        self.election.overhears(&slots.overheard);
+        if self.election.may_be_forgotten(stood_ns) {
+            self.step_back(now_ns);
         }
     }
 
