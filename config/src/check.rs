@@ -8,6 +8,8 @@ use crate::reader::Reader;
 use crate::tdma;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Tools that may be inside a module's command mailbox at the same time.
 const TOOLS: usize = 2;
@@ -27,6 +29,7 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], reader: &Read
     for flow in &installation.flows {
         self::flow(installation, flow, lines, reader);
     }
+    carried_twice(installation, reader);
     // What follows from other mistakes is not worth judging.
     if reader.is_content() {
         tdma::judge(installation, reader);
@@ -119,6 +122,28 @@ fn flow(installation: &Installation, flow: &Flow, lines: &[Lines], reader: &Read
                 size_text(flow.size.into())
             ),
         );
+    }
+}
+
+/// Of the flows between two modules each carries something else: a package is of one of them.
+fn carried_twice(installation: &Installation, reader: &Reader<'_>) {
+    let mut lines = BTreeMap::new();
+    for flow in &installation.flows {
+        let Some(carries) = flow.carries else { continue };
+        match lines.entry((flow.from.raw(), flow.to.raw(), carries)) {
+            Entry::Vacant(place) => _ = place.insert(flow.line),
+            Entry::Occupied(first) => {
+                let name = |name| installation.classes.format(name);
+                let (from, to, line) = (name(flow.from), name(flow.to), first.get());
+                reader.report(
+                    flow.line,
+                    format!(
+                        "[[flow]] from `{from}` to `{to}`: the flow in line {line} carries `{carries}` already; \
+                         let each carry something else, or make one of them"
+                    ),
+                );
+            }
+        }
     }
 }
 

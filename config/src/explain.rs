@@ -306,9 +306,10 @@ impl Page<'_> {
         self.line("");
         for flow in flows {
             let words = format!(
-                "{} to {}: {} every {}, there within {}",
+                "{} to {}: {}{} every {}, there within {}",
                 self.name(flow.from),
                 self.name(flow.to),
+                flow.carries.map(|carries| format!("{carries}, ")).unwrap_or_default(),
                 size_text(flow.size.into()),
                 duration_text(flow.period),
                 duration_text(flow.deadline)

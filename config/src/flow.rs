@@ -1,5 +1,6 @@
 //! Flows: what passes regularly between two modules, and how soon it must arrive. Routers plan their time slots by them.
 
+use crate::contents::{Contents, ContentsError};
 use crate::directory::{Directory, Unknown};
 use crate::reader::Section;
 use crate::units::duration_text;
@@ -13,6 +14,8 @@ pub struct Flow {
     pub from: Name,
     /// Module that receives.
     pub to: Name,
+    /// What it carries, if the file says so: by this, flows between the same modules are told apart.
+    pub carries: Option<Contents>,
     /// Bytes of a body, at most.
     pub size: u32,
     /// Time from one package to the next.
@@ -35,6 +38,11 @@ impl Flow {
             })
         };
         let (from, to) = (end("from", "laser.0"), end("to", "mapper.0"));
+        let mut carries = Some(None);
+        if let Some(item) = section.get("carries") {
+            let wrong = |error: &ContentsError| item.report(format!("`carries`: {error}"));
+            carries = item.text("data 1").and_then(|text| text.parse().inspect_err(wrong).ok()).map(Some);
+        }
         let size = section.required("size", "size = \"2 KiB\"");
         let size = size.and_then(|item| item.size(1..=BODY_BYTES_MAX as u64, "2 KiB"));
         let period = section.required("period", "period = \"100 ms\"");
@@ -54,6 +62,7 @@ impl Flow {
         }
         let line = section.line;
         section.finish();
-        Some(Self { from: from?, to: to?, size: size? as u32, period: period?, deadline: deadline?, line })
+        let (from, to, carries) = (from?, to?, carries?);
+        Some(Self { from, to, carries, size: size? as u32, period: period?, deadline: deadline?, line })
     }
 }

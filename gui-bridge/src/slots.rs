@@ -175,7 +175,8 @@ impl View for Flows {
             let place = format!("{} {index}", node.node);
             let [slowest, bound] = ["slowest", "at worst"].map(|series| ["slots", "flows", &place, series]);
             if scene.charts.is_first(&place) {
-                let name = format!("{} → {}, {} B", flow.from, flow.to, flow.size);
+                let what = if flow.carries.is_empty() { format!("{} B", flow.size) } else { flow.carries.clone() };
+                let name = format!("{} → {}, {what}", flow.from, flow.to);
                 let colour = palette::series(colour(datum.installation, flow));
                 scene.series(&slowest, &name, colour, 1.5);
                 scene.series(&bound, &format!("{name}: at worst"), palette::muted(colour), 1.0);
@@ -196,8 +197,11 @@ impl View for Flows {
 /// Of all nodes' flows, by their place in the configuration.
 fn colour(installation: &Installation, flow: &FlowState) -> usize {
     let format = |name| installation.classes.format(name);
-    let is_it =
-        |known: &Flow| format(known.from) == flow.from && format(known.to) == flow.to && known.size == flow.size;
+    let carries = |known: &Flow| known.carries.map(|carries| carries.to_string()).unwrap_or_default();
+    let is_it = |known: &Flow| {
+        let ends = format(known.from) == flow.from && format(known.to) == flow.to;
+        ends && carries(known) == flow.carries && known.size == flow.size
+    };
     installation.flows.iter().position(is_it).unwrap_or(0)
 }
 
@@ -303,6 +307,7 @@ mod tests {
         let flow = |packages, bound_ns| FlowState {
             from: "laser.0".into(),
             to: "pilot.0".into(),
+            carries: String::new(),
             size: 800,
             packages,
             worst_ns: 5_000_000,

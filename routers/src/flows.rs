@@ -10,7 +10,7 @@
 
 use crate::latencies::Latencies;
 use crate::stats::{Cause, Count};
-use rohrpost_config::{Installation, Module, bounds};
+use rohrpost_config::{Contents, Installation, Module, bounds};
 use rohrpost_mailbox::{Head, Kind, Latency, Name};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -22,6 +22,8 @@ pub struct Flow {
     pub from: Vec<Name>,
     /// The module that receives, in the same way.
     pub to: Vec<Name>,
+    /// What it carries, if that is said.
+    pub carries: Option<Contents>,
     /// Bytes of a body, at most.
     pub size: u32,
     /// Shortest time from one package to the next.
@@ -44,6 +46,7 @@ impl Flow {
             (from.node == node && to.node != node && on_lan).then(|| Self {
                 from: names(flow.from, from),
                 to: names(flow.to, to),
+                carries: flow.carries,
                 size: flow.size,
                 period: flow.period,
                 deadline: flow.deadline,
@@ -57,6 +60,7 @@ impl Flow {
         let pairs = self.from.iter().flat_map(|from| self.to.iter().map(move |to| (from, to)));
         pairs.enumerate().map(move |(place, (from, to))| Entry {
             ends: (from.module().raw(), to.module().raw()),
+            carries: self.carries,
             is_other: place > 0,
             size: self.size,
             period_ns: ns(self.period),
@@ -137,7 +141,7 @@ impl FlowCounts {
 /// All flows of a router, and which packages are of them.
 #[derive(Debug)]
 pub struct Flows {
-    /// By the names of both ends, then by size and period.
+    /// By the names of both ends, then by what they carry (first those of which it is not said), size and period.
     entries: Box<[Entry]>,
     counts: Box<[FlowCounts]>,
 }
@@ -145,6 +149,7 @@ pub struct Flows {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Entry {
     ends: (u32, u32),
+    carries: Option<Contents>,
     /// By another name than the declared one.
     is_other: bool,
     size: u32,
@@ -168,18 +173,18 @@ impl Flows {
         &self.counts
     }
 
-    /// The flow of a package. Of several between the same modules it is the smallest that holds it; of those of one size replies are the
+    /// The flow of a package. Of several between the same modules it is the one that carries its type, then the one that carries its kind.
+    /// What none of them carries is of those of which it is not said: of the smallest that holds it; of those of one size replies are the
     /// rarest, and all else is the most frequent.
     pub(crate) fn of(&self, head: &Head) -> Option<u16> {
         let ends = (head.from.module().raw(), head.to.module().raw());
         let behind = &self.entries[self.entries.partition_point(|entry| entry.ends < ends)..];
         let between = &behind[..behind.partition_point(|entry| entry.ends == ends)];
-        let largest = between.last()?;
-        let size = between.iter().map(|entry| entry.size).find(|size| *size >= u32::from(head.len));
-        let size = size.unwrap_or(largest.size);
-        let mut fitting = between.iter().filter(|entry| entry.size == size);
-        let entry = if matches!(head.kind.kind(), Kind::Reply(_)) { fitting.next_back() } else { fitting.next() };
-        entry.map(|entry| entry.flow)
+        let (unsaid, said) = between.split_at(between.partition_point(|entry| entry.carries.is_none()));
+        let carrying = |contents| said.iter().find(|entry| entry.carries == Some(contents));
+        let exact = Contents::of(head.kind.kind());
+        let carrying = exact.and_then(|exact| carrying(exact).or_else(|| carrying(exact.without_number())));
+        carrying.or_else(|| by_size(unsaid, head)).map(|entry| entry.flow)
     }
 
     /// `kept`: no slot was left out since its publishing.
@@ -192,6 +197,15 @@ impl Flows {
             self.counts[usize::from(flow)].lost[cause as usize].add(1);
         }
     }
+}
+
+/// Of flows of which it is not said what they carry.
+fn by_size<'a>(entries: &'a [Entry], head: &Head) -> Option<&'a Entry> {
+    let largest = entries.last()?;
+    let size = entries.iter().map(|entry| entry.size).find(|size| *size >= u32::from(head.len));
+    let size = size.unwrap_or(largest.size);
+    let mut fitting = entries.iter().filter(|entry| entry.size == size);
+    if matches!(head.kind.kind(), Kind::Reply(_)) { fitting.next_back() } else { fitting.next() }
 }
 
 fn ns(duration: Duration) -> u64 {
@@ -233,6 +247,40 @@ mod tests {
             (wheels, pilot, data, 1, None, "not declared either"),
         ] {
             let head = Head { len, kind, ..head(to, from, 90) };
+            assert_eq!(flows.of(&head), expected, "{why}");
+        }
+    }
+
+    #[test]
+    fn flows_of_one_pair_and_one_size_are_told_apart_by_what_they_carry() {
+        use Contents::{Command, Data, Reply};
+        let (laser, pilot, planner) = (module(200, 0), module(50, 1), module(52, 1));
+        let carrying = |to, carries, size| Flow { carries, ..flow(laser, to, size) };
+        let flows = Flows::new(&[
+            carrying(pilot, Some(Data(Some(2))), 64),
+            carrying(pilot, Some(Data(Some(1))), 64),
+            carrying(pilot, Some(Reply(None)), 64),
+            carrying(pilot, None, 800),
+            carrying(pilot, Some(Reply(Some(16))), 64),
+            carrying(pilot, None, 16),
+            carrying(planner, Some(Data(None)), 64),
+            carrying(planner, Some(Command(Some(16))), 64),
+        ]);
+        for (to, kind, len, expected, why) in [
+            (pilot, Type::data(1), 64, Some(1), "this data"),
+            (pilot, Type::data(2), 64, Some(0), "and that"),
+            (pilot, Type::data(2), 900, Some(0), "whatever its size"),
+            (pilot, Type::reply(16), 64, Some(4), "this reply, though a flow carries all replies"),
+            (pilot, Type::reply(1), 64, Some(2), "no reply of a number of its own"),
+            (pilot, Type::data(3), 10, Some(5), "what none carries, by size"),
+            (pilot, Type::command(1), 64, Some(3), "a command, which none carries, by size"),
+            (planner, Type::data(7), 10, Some(6), "any data"),
+            (planner, Type::command(16), 10, Some(7), "this command"),
+            (planner, Type::command(17), 10, None, "another command is of none"),
+            (planner, Type::reply(16), 10, None, "nor is a reply"),
+            (planner, Type::default(), 10, None, "nor what has no type"),
+        ] {
+            let head = Head { len, kind, ..head(to, laser, 90) };
             assert_eq!(flows.of(&head), expected, "{why}");
         }
     }

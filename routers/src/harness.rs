@@ -63,7 +63,7 @@ pub(crate) fn settings(own: NodeIndex, nodes: NodeIndex) -> Settings {
 /// A flow that has 10 ms, and for which 5 ms are sure.
 pub(crate) fn flow(from: Name, to: Name, size: u32) -> Flow {
     let ms = Duration::from_millis;
-    Flow { from: vec![from], to: vec![to], size, period: ms(90), deadline: ms(10), bound: Some(ms(5)) }
+    Flow { from: vec![from], to: vec![to], carries: None, size, period: ms(90), deadline: ms(10), bound: Some(ms(5)) }
 }
 
 pub(crate) fn head(to: Name, from: Name, priority: u8) -> Head {

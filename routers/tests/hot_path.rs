@@ -64,6 +64,7 @@ fn settings(own: NodeIndex) -> Settings {
         flows: vec![Flow {
             from: vec![module(own)],
             to: vec![module(other)],
+            carries: None,
             size: 9000,
             period: Duration::from_millis(1),
             deadline: Duration::from_millis(10),

@@ -101,7 +101,7 @@ fn installation(plan: &Plan) -> Installation {
     for flow in declared(plan) {
         let period = Duration::from_nanos(flow.period_ns * PERIOD_MIN_PERCENT / 100);
         let (from, to, size) = (flow.from.module(), flow.to.module(), flow.bytes.1 as u32);
-        installation.flows.push(Flow { from, to, size, period, deadline: period, line: 0 });
+        installation.flows.push(Flow { from, to, carries: None, size, period, deadline: period, line: 0 });
         // So its packages have the priority of the sender.
         let sender = installation.modules.iter_mut().find(|module| module.name == from);
         sender.expect("it is in the text").calls.push(to);

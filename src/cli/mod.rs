@@ -43,6 +43,7 @@ mod time;
 mod top;
 mod units;
 mod version;
+mod vocabulary;
 mod watch;
 
 use clap::{FromArgMatches, Parser, Subcommand};

@@ -158,7 +158,8 @@ fn time_slots_are_drawn_and_the_worst_of_each_flow_is_said() {
         let worst = flow["at_worst"]["latency_ms"].as_f64().unwrap();
         assert!(worst > 5.0 && worst < flow["deadline_ms"].as_f64().unwrap(), "a cycle at least: {flow}");
         let (from, to) = (flow["from"].as_str().unwrap(), flow["to"].as_str().unwrap());
-        assert!(page.contains(&format!("  {from} → {to} ")), "{page}");
+        let carries = flow["carries"].as_str().unwrap();
+        assert!(page.contains(&format!("  {from} → {to} {carries} ")), "{page}");
     }
     let nodes = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo-nodes.toml");
     let json = place.say(&["check", nodes, "--json"]).json();

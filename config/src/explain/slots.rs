@@ -75,7 +75,8 @@ impl Page<'_> {
             .iter()
             .map(|bound| {
                 let flow = &self.installation.flows[bound.flow];
-                format!("{} → {}", self.name(flow.from), self.name(flow.to))
+                let carries = flow.carries.map(|carries| format!(" {carries}")).unwrap_or_default();
+                format!("{} → {}{carries}", self.name(flow.from), self.name(flow.to))
             })
             .collect();
         let width = flows.iter().map(|flow| flow.chars().count()).max().unwrap_or(0).max(4);

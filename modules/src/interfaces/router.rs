@@ -302,7 +302,9 @@ pub struct FlowState {
     pub from: String,
     /// The module that receives.
     pub to: String,
-    /// Bytes of a body at most, as declared: several flows between the same modules are told apart by it.
+    /// What it carries, as declared: `data 1`, `reply`. By this, flows between the same modules are told apart. Empty: the file does not say so.
+    pub carries: String,
+    /// Bytes of a body at most, as declared: flows between the same modules that do not say what they carry are told apart by it.
     pub size: u32,
     /// Packages sent.
     pub packages: u64,

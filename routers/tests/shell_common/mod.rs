@@ -194,7 +194,7 @@ impl Pair {
 /// All that the module of one node sends to that of the other.
 fn declared(from: Name, to: Name) -> Flow {
     let (period, deadline) = (Duration::from_micros(10), Duration::from_millis(100));
-    Flow { from: vec![from], to: vec![to], size: u16::MAX.into(), period, deadline, bound: None }
+    Flow { from: vec![from], to: vec![to], carries: None, size: u16::MAX.into(), period, deadline, bound: None }
 }
 
 pub(crate) fn label(from: Name, priority: u8, id: u16) -> Label {

@@ -43,8 +43,8 @@ pub(super) fn installation(installation: &Installation, only: Option<&str>, miss
     let flows = installation.flows.iter().enumerate().map(|(index, flow)| {
         let bound = bounds.iter().find(|bound| bound.flow == index);
         json!({
-            "from": text(flow.from), "to": text(flow.to), "size": flow.size, "period_ms": ms(flow.period),
-            "deadline_ms": ms(flow.deadline), "at_worst": bound.map(at_worst),
+            "from": text(flow.from), "to": text(flow.to), "carries": flow.carries.map(|carries| carries.to_string()),
+            "size": flow.size, "period_ms": ms(flow.period), "deadline_ms": ms(flow.deadline), "at_worst": bound.map(at_worst),
         })
     });
     let notes = missing.iter().map(

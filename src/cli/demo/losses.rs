@@ -1,8 +1,11 @@
 //! What was lost of the declared flows, from end to end: as the modules at both ends have counted it.
 
 use crate::cli::table::table;
+use crate::cli::vocabulary::{Vocabulary, built_in};
 use rohrpost::common::Exchange;
 use rohrpost::config::{Flow, Installation};
+use rohrpost::description::Description;
+use rohrpost::mailbox::Kind;
 use rohrpost::{Name, ToolLink};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -44,8 +47,13 @@ impl Losses {
         Self { told }
     }
 
-    /// A row for each kind of package that each declared flow between nodes carries.
-    pub(super) fn table(&self, installation: &Installation) -> String {
+    /// A row for each kind of package that each declared flow between nodes carries. `ask` asks a module for its interface.
+    pub(super) fn table(
+        &self,
+        installation: &Installation,
+        vocabulary: &mut Vocabulary,
+        mut ask: impl FnMut(Name) -> Option<Description>,
+    ) -> String {
         let name = |name| installation.classes.format(name);
         let mut rows: Vec<[String; 6]> = Vec::new();
         let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
@@ -55,7 +63,13 @@ impl Losses {
                 let of_calls = |count: u64| if exchange.data.is_some() { "-".into() } else { count.to_string() };
                 let [again, late] = [exchange.repeated, exchange.late].map(of_calls);
                 let [packages, lost] = [exchange.packages, exchange.lost].map(|count| count.to_string());
-                rows.push([between.clone(), what.into(), packages, again, late, lost]);
+                let number = exchange.data.map(|number| {
+                    let ask = |module| built_in(installation, module).or_else(|| ask(module));
+                    let word = vocabulary.word(Kind::Data(number), flow.from, flow.to, ask);
+                    format!(" {}", word.unwrap_or_else(|| number.to_string()))
+                });
+                let what = format!("{what}{}", number.unwrap_or_default());
+                rows.push([between.clone(), what, packages, again, late, lost]);
             }
         }
         rows.sort_unstable();

@@ -8,6 +8,7 @@ use super::{Arguments, FIRST_FUNCTION, Joined, copy, drawn};
 use crate::cli::launch::{Nodes, lab};
 use crate::cli::speech::Speech;
 use crate::cli::summary::print_classes;
+use crate::cli::vocabulary::Vocabulary;
 use crate::cli::{Failure, say};
 use crate::cli::{flows, slots};
 use rohrpost::common::{GET_DATA, State};
@@ -105,6 +106,11 @@ fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, boo
     let kept = in_slots(installation, &mut tool)?;
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
     let beyond = beyond::ask(installation, &mut tool)?;
+    let mut vocabulary = Vocabulary::default();
+    let late = flows::measured(installation, &late, &links.iter().collect::<Vec<_>>(), &mut vocabulary, |module| {
+        tool.describe(module).ok()
+    });
+    let losses = losses.table(installation, &mut vocabulary, |module| tool.describe(module).ok());
     tool.close();
     let balance = Balance::of(&links, installation.classes.tool().0, &died);
     let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
@@ -119,14 +125,13 @@ fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, boo
         text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
         text += &slots::kept(&kept);
     }
-    let late = flows::measured(installation, &late, &links.iter().collect::<Vec<_>>());
     if !late.is_empty() {
         text +=
             &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
     }
     if !installation.flows.is_empty() {
         text += "\nDeclared flows from end to end, as the modules themselves have counted; too late: answered, but after the caller's time:\n\n";
-        text += &losses.table(installation);
+        text += &losses;
     }
     text += &format!("\n{balance}\n{clocks}");
     let deaths = seen.text();

@@ -7,15 +7,14 @@ use super::sight::Silence;
 use super::table::table;
 use super::target::{Running, Target};
 use super::units::{Stop, bytes, seconds};
+use super::vocabulary::{Vocabulary, answered};
 use super::watch::Tracks;
 use super::{Failure, say};
 use rohrpost::Name;
-use rohrpost::description::Description;
 use rohrpost::mailbox::{FlowInfo, Kind};
 use rohrpost::output::plain;
 use rohrpost::survey::{Scope, Standing, Survey, is_hop};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -158,7 +157,7 @@ impl Graph {
         let interval_s = began.elapsed().as_secs_f64();
         let away_names: Vec<&str> = away.iter().map(|silence| silence.node.as_str()).collect();
         let survey = Survey::joined(surveys, &away_names, &running.installation);
-        let mut names = Names { running, survey: &survey, descriptions: BTreeMap::new() };
+        let mut names = Names { running, survey: &survey, vocabulary: Vocabulary::default() };
         let mut edges: Vec<Edge> = Vec::new();
         // What a router delivers for a node that is seen too is counted there.
         let is_seen = |node: &str| nodes.contains(&node) && !away_names.contains(&node);
@@ -278,7 +277,7 @@ impl Edge {
 struct Names<'a> {
     running: &'a Running,
     survey: &'a Survey,
-    descriptions: BTreeMap<Name, Option<Description>>,
+    vocabulary: Vocabulary,
 }
 
 impl Names<'_> {
@@ -288,11 +287,6 @@ impl Names<'_> {
         self.running.text(name)
     }
 
-    fn description(&mut self, module: Name) -> Option<&Description> {
-        let ask = || self.running.describe(module).ok();
-        self.descriptions.entry(module).or_insert_with(ask).as_ref()
-    }
-
     /// Whether output lines go there. Any other module's mailbox of that local id is its own, for whatever data it likes.
     fn is_collector(&self, mailbox: Name) -> bool {
         let class = self.running.installation.classes.id(rohrpost::output::CLASS);
@@ -300,51 +294,22 @@ impl Names<'_> {
     }
 
     fn what(&mut self, flow: &FlowInfo) -> (Carries, String) {
-        let of = |number, name: Option<&String>| name.cloned().unwrap_or_else(|| format!("number {number}"));
-        match flow.kind.kind() {
-            Kind::Command(number) if number < rohrpost::common::FIRST_OWN => (Carries::Common, common(number)),
-            Kind::Command(number) => {
-                let description = self.description(flow.to.module());
-                let function = description.and_then(|found| found.functions.iter().find(|f| f.number == number));
-                (Carries::Command, of(number, function.map(|function| &function.name)))
-            }
-            Kind::Reply(number) if number < rohrpost::common::FIRST_OWN => {
-                (Carries::Reply, format!("{} answered", common(number)))
-            }
-            Kind::Reply(number) => {
-                let description = self.description(flow.from.module());
-                let function = description.and_then(|found| found.functions.iter().find(|f| f.number == number));
-                (Carries::Reply, format!("{} answered", of(number, function.map(|function| &function.name))))
-            }
-            Kind::Data(_) if self.is_collector(flow.to) => (Carries::Output, "lines".into()),
-            Kind::Data(number) => {
-                let description = self.description(flow.from.module());
-                let item = description.and_then(|found| found.data.iter().find(|item| item.number == number));
-                (Carries::Data, of(number, item.map(|item| &item.name)))
-            }
-            Kind::None => (Carries::Common, "refused before it had a type".into()),
+        let kind = flow.kind.kind();
+        if matches!(kind, Kind::Data(_)) && self.is_collector(flow.to) {
+            return (Carries::Output, "lines".into());
         }
+        let ask = |module| self.running.describe(module).ok();
+        let word = self.vocabulary.word(kind, flow.from, flow.to, ask);
+        let unknown = |number| format!("number {number}");
+        let (carries, unnamed) = match kind {
+            Kind::Command(number) if number < rohrpost::common::FIRST_OWN => (Carries::Common, unknown(number)),
+            Kind::Command(number) => (Carries::Command, unknown(number)),
+            Kind::Reply(number) => (Carries::Reply, answered(&unknown(number))),
+            Kind::Data(number) => (Carries::Data, unknown(number)),
+            Kind::None => (Carries::Common, "refused before it had a type".into()),
+        };
+        (carries, word.unwrap_or(unnamed))
     }
-}
-
-/// The functions that every module has.
-fn common(number: u16) -> String {
-    use rohrpost::common as c;
-    let name = match number {
-        c::ON => "on",
-        c::OFF => "off",
-        c::STATUS => "status",
-        c::GET_DATA => "get",
-        c::SUBSCRIBE => "subscribe",
-        c::UNSUBSCRIBE => "unsubscribe",
-        c::OUTPUT_LEVEL => "output-level",
-        c::DESCRIBE => "describe",
-        c::PARAMETERS => "param get",
-        c::SET_PARAMETERS => "param set",
-        c::TIME => "time",
-        other => return format!("number {other}"),
-    };
-    name.into()
 }
 
 fn in_text(graph: &Graph) -> String {

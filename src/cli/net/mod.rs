@@ -4,6 +4,7 @@ mod beyond;
 mod show;
 
 use super::round::{Round, Rounds};
+use super::vocabulary::Vocabulary;
 use super::{Failure, say};
 use rohrpost::interfaces::{
     BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, Links, RouterInterface, SlotState, TcpInterface,
@@ -68,6 +69,7 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
     let alone = "this installation has one node, and so no routers; `rohrpost list` shows what runs";
     let mut round = rounds.begin(alone, |installation| installation.network.is_some() || installation.tcp.is_some())?;
     let mut before = look(&mut round);
+    let mut vocabulary = Vocabulary::default();
     let mut wait = LOOK_AGAIN;
     let mut stopped = round.stop.within(wait);
     let mut well = false;
@@ -77,7 +79,8 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
             told.rates = rates(before, told);
         }
         well = now.iter().all(Told::is_well);
-        let text = if rounds.json { serde_json::to_string(&now)? } else { show::text(&round.running, &now) };
+        let text =
+            if rounds.json { serde_json::to_string(&now)? } else { show::text(&round.running, &now, &mut vocabulary) };
         if !say(text.trim_end()) || !rounds.watch {
             break;
         }

@@ -6,13 +6,14 @@ use crate::cli::slots::kept;
 use crate::cli::table::{table, time};
 use crate::cli::target::Running;
 use crate::cli::units::{bytes, fine};
+use crate::cli::vocabulary::Vocabulary;
 use rohrpost::Class;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
 use rohrpost::output::plain;
 use std::time::Duration;
 
 /// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
-pub(super) fn text(running: &Running, all: &[Told]) -> String {
+pub(super) fn text(running: &Running, all: &[Told], vocabulary: &mut Vocabulary) -> String {
     let mut parts = vec![links(all)];
     parts.extend(
         all.iter()
@@ -40,7 +41,7 @@ pub(super) fn text(running: &Running, all: &[Told]) -> String {
         clocks(all),
         kept(slots),
     ]);
-    parts.push(measured(running, all));
+    parts.push(measured(running, all, vocabulary));
     parts.extend(beyond::text(running, all));
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
@@ -179,10 +180,11 @@ fn losses(running: &Running, all: &[Told]) -> String {
 }
 
 /// Declared flows; nothing without any.
-fn measured(running: &Running, all: &[Told]) -> String {
+fn measured(running: &Running, all: &[Told], vocabulary: &mut Vocabulary) -> String {
     let links: Vec<&Links> = all.iter().filter_map(|told| told.links.as_ref()).collect();
     let states = all.iter().filter_map(|told| told.flows.as_ref());
-    let table = flows::measured(&running.installation, states, &links);
+    let table =
+        flows::measured(&running.installation, states, &links, vocabulary, |module| running.describe(module).ok());
     if table.is_empty() { table } else { format!("{table}({})\n", flows::LEGEND) }
 }
 

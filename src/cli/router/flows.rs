@@ -24,6 +24,7 @@ fn state(flow: &Flow, counts: &FlowCounts, classes: &ClassTable) -> FlowState {
     FlowState {
         from: name(&flow.from),
         to: name(&flow.to),
+        carries: flow.carries.map(|carries| carries.to_string()).unwrap_or_default(),
         size: flow.size,
         packages: latency.count(),
         worst_ns: ns(latency.max),
