@@ -199,6 +199,52 @@ pub(crate) fn start_window() -> Result<(), OpenError> {
 mod tests {
     use super::*;
     use crate::Scene;
+    use std::sync::{Arc, Mutex};
+    use tracing::span::{Attributes, Id, Record};
+    use tracing::{Event, Level, Metadata, Subscriber};
+
+    /// Notes how important events are.
+    #[derive(Default)]
+    struct Levels(Arc<Mutex<Vec<Level>>>);
+
+    impl Subscriber for Levels {
+        fn enabled(&self, _: &Metadata<'_>) -> bool {
+            true
+        }
+
+        fn new_span(&self, _: &Attributes<'_>) -> Id {
+            Id::from_u64(1)
+        }
+
+        fn record(&self, _: &Id, _: &Record<'_>) {}
+
+        fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+        fn event(&self, event: &Event<'_>) {
+            self.0.lock().unwrap().push(*event.metadata().level());
+        }
+
+        fn enter(&self, _: &Id) {}
+
+        fn exit(&self, _: &Id) {}
+    }
+
+    /// Rows of different modules do not come in the order of their time stamps, which Rerun tells its developers: as a warning, if `re_log`
+    /// is built with debug assertions. Then each drawing would have one.
+    #[test]
+    fn what_rerun_tells_its_developers_is_no_warning() {
+        let levels = Levels::default();
+        let noted = levels.0.clone();
+        tracing::subscriber::with_default(levels, || {
+            rerun::external::re_log::debug_warn!("Found out-of-order timelines");
+            rerun::external::re_log::debug_warn_once!("Found out-of-order timelines");
+        });
+        let noted = noted.lock().unwrap();
+        assert!(
+            !noted.is_empty() && noted.iter().all(|level| *level > Level::INFO),
+            "{noted:?}; see `re_log` in Cargo.toml"
+        );
+    }
 
     #[test]
     fn a_file_is_whole_when_its_scene_was_closed() {
