@@ -33,6 +33,12 @@ pub fn slept_ns() -> u64 {
     (0..READ_TRIES).map(|_| look()).min().map_or(0, |(_, slept_ns)| slept_ns)
 }
 
+/// For how long it has slept at least, ns, if it was then so late by [`monotonic_ns`]; quicker to tell than [`slept_ns`].
+#[inline]
+pub(crate) fn slept_ns_min(passed_ns: u64) -> u64 {
+    passed_ns.saturating_sub(now_ns(libc::CLOCK_MONOTONIC))
+}
+
 /// Nanoseconds since 1970 as this computer's wall clock has them. It may be set, even backwards.
 pub fn realtime_ns() -> u64 {
     now_ns(libc::CLOCK_REALTIME)

@@ -5,7 +5,7 @@
 //! an *epoch* it only moves forward; a step is a new epoch, which readers can see. Timeouts and leases never use it: they
 //! are measured by the monotonic clock.
 
-use crate::clock::{monotonic_ns, realtime_ns, slept_ns};
+use crate::clock::{monotonic_ns, realtime_ns, slept_ns, slept_ns_min};
 use crate::files::{allocate, open_shared};
 use crate::memory::{Mapping, Use};
 use crate::node::{Node, NodeError};
@@ -77,6 +77,14 @@ pub struct TimeRecord {
 }
 
 impl TimeRecord {
+    /// The same if the computer has slept for so long since it was written: its clocks count how long it slept, some of them in seconds, so nobody
+    /// knows how far off its master's time is.
+    #[must_use]
+    pub fn after_sleep(self, slept_ns: u64) -> Self {
+        let is_known = self.source != TimeSource::Master || slept_ns < SLEPT_NS_MIN;
+        if is_known { self } else { Self { error_ns: ERROR_UNKNOWN_NS, drift_ns_s: 0, ..self } }
+    }
+
     /// System time at this moment of the monotonic clock. Another process wrote the record: whatever it says, this is a time.
     pub fn at(&self, monotonic_ns: u64) -> SystemTime {
         let since = i128::from(monotonic_ns) - i128::from(self.monotonic_ns);
@@ -114,6 +122,25 @@ struct SharedRecord {
     pace_ppb: AtomicU64,
     error_ns: AtomicU64,
     drift_ns_s: AtomicU64,
+    slept_ns: AtomicU64,
+}
+
+/// A record, and for how long the computer had slept when it was written, ns.
+#[derive(Clone, Copy)]
+struct Written {
+    record: TimeRecord,
+    slept_ns: u64,
+}
+
+impl Written {
+    fn now(record: TimeRecord) -> Self {
+        Self { record, slept_ns: slept_ns() }
+    }
+
+    /// What it says when the computer has slept for so long.
+    fn read(self, slept_ns: u64) -> TimeRecord {
+        self.record.after_sleep(slept_ns.saturating_sub(self.slept_ns))
+    }
 }
 
 /// The file `time`.
@@ -122,18 +149,16 @@ pub(crate) struct TimePage {
     /// Records written so far; the last is in place `index % 2`. 0: none yet.
     index: AtomicU64,
     writer_pid: AtomicU32,
-    padding: AtomicU32,
-    /// For how long the computer had slept when the last record was written, ns.
-    slept_ns: AtomicU64,
-    rest: [AtomicU32; 10],
+    rest: [AtomicU32; 13],
     records: [SharedRecord; 2],
 }
-const _: () = assert!(size_of::<TimePage>() == 192);
+const _: () = assert!(size_of::<TimePage>() == 192 && std::mem::offset_of!(TimePage, records) == 64);
+const _: () = assert!(std::mem::offset_of!(SharedRecord, slept_ns) == 56);
 
 impl SharedRecord {
-    fn load(&self) -> Option<TimeRecord> {
+    fn load(&self) -> Option<Written> {
         let load = |field: &AtomicU64| field.load(Ordering::Relaxed);
-        Some(TimeRecord {
+        let record = TimeRecord {
             epoch: load(&self.epoch),
             source: TimeSource::from_code(load(&self.source))?,
             monotonic_ns: load(&self.monotonic_ns),
@@ -141,10 +166,11 @@ impl SharedRecord {
             pace_ppb: load(&self.pace_ppb),
             error_ns: load(&self.error_ns),
             drift_ns_s: load(&self.drift_ns_s),
-        })
+        };
+        Some(Written { record, slept_ns: load(&self.slept_ns) })
     }
 
-    fn store(&self, record: &TimeRecord) {
+    fn store(&self, Written { record, slept_ns }: &Written) {
         let store = |field: &AtomicU64, value| {
             field.store(value, Ordering::Relaxed);
             step!("time: field");
@@ -156,16 +182,17 @@ impl SharedRecord {
         store(&self.pace_ppb, record.pace_ppb);
         store(&self.error_ns, record.error_ns);
         store(&self.drift_ns_s, record.drift_ns_s);
+        store(&self.slept_ns, *slept_ns);
     }
 }
 
 impl TimePage {
-    fn read(&self) -> Option<TimeRecord> {
-        self.read_while(|| ()).map(|(record, ())| record)
+    fn read(&self) -> Option<Written> {
+        self.read_while(|| ()).map(|(written, ())| written)
     }
 
     /// The record, and what `meanwhile` said while it was the valid one.
-    fn read_while<T>(&self, meanwhile: impl Fn() -> T) -> Option<(TimeRecord, T)> {
+    fn read_while<T>(&self, meanwhile: impl Fn() -> T) -> Option<(Written, T)> {
         for _ in 0..READ_TRIES {
             // ORDERING: Acquire (A); pairs with (B): the record that the index names is whole.
             let index = self.index.load(Ordering::Acquire);
@@ -194,11 +221,11 @@ impl TimePage {
     }
 
     /// Writes the record that the index does not name.
-    fn fill(&self, record: &TimeRecord) {
+    fn fill(&self, written: &Written) {
         let next = self.next();
         // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
         fence(Ordering::Release);
-        self.records[(next % 2) as usize].store(record);
+        self.records[(next % 2) as usize].store(written);
     }
 
     /// Makes the record just filled the valid one.
@@ -236,7 +263,7 @@ impl SystemClock {
         // The clock is read while the record is valid. By an older record it could be later, and by a newer one earlier,
         // than what the next reading says.
         match self.mapping.as_ref().and_then(|mapping| mapping.at::<TimePage>(0).read_while(monotonic_ns)) {
-            Some((record, now)) => record.at(now),
+            Some((written, now)) => written.read(slept_ns_min(now)).at(now),
             None => self.at(monotonic_ns()),
         }
     }
@@ -253,9 +280,10 @@ impl SystemClock {
         }
     }
 
-    /// What the page says; none without one.
+    /// What the page says; none without one. If the computer has slept since it was written, nobody knows how far off that is.
     pub fn record(&self) -> Option<TimeRecord> {
-        self.mapping.as_ref()?.at::<TimePage>(0).read()
+        let written = self.mapping.as_ref()?.at::<TimePage>(0).read()?;
+        Some(written.read(slept_ns_min(monotonic_ns())))
     }
 }
 
@@ -274,8 +302,8 @@ impl TimeKeeper {
         let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
-        let epoch = page.read().map_or(1, |last| last.epoch.saturating_add(1));
-        page.fill(&TimeRecord {
+        let epoch = page.read().map_or(1, |last| last.record.epoch.saturating_add(1));
+        page.fill(&Written::now(TimeRecord {
             epoch,
             source,
             monotonic_ns: monotonic_ns(),
@@ -283,7 +311,7 @@ impl TimeKeeper {
             pace_ppb: (pace.clamp(0.0, 1000.0) * 1e9) as u64,
             error_ns: 0,
             drift_ns_s: 0,
-        });
+        }));
         page.turn();
         Ok(keeper)
     }
@@ -322,27 +350,22 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
-    /// What the page says; none if nobody wrote it yet. If the computer has slept since, nobody knows how far off that is: its clocks count how long it
-    /// slept, some of them in seconds.
+    /// What the page says; none if nobody wrote it yet. If the computer has slept since, nobody knows how far off that is.
     pub fn record(&self) -> Option<TimeRecord> {
         let page: &TimePage = self.mapping.at(0);
-        let record = page.read()?;
-        let slept_ns = slept_ns().saturating_sub(page.slept_ns.load(Ordering::Relaxed));
-        let is_known = record.source != TimeSource::Master || slept_ns < SLEPT_NS_MIN;
-        Some(if is_known { record } else { TimeRecord { error_ns: ERROR_UNKNOWN_NS, drift_ns_s: 0, ..record } })
+        Some(page.read()?.read(slept_ns()))
     }
 
     /// Makes this the page's record. False, and the page stays as it was, if time would go back within its epoch just now: because the
     /// record is of a slower pace, and this thread was held up until it was too late for it.
     pub fn write(&mut self, record: &TimeRecord) -> bool {
         let page: &TimePage = self.mapping.at(0);
-        let last = page.read().filter(|last| last.epoch == record.epoch);
-        page.fill(record);
+        let last = page.read().map(|last| last.record).filter(|last| last.epoch == record.epoch);
+        page.fill(&Written::now(*record));
         // From here to the turn are nanoseconds, as in `set_pace`.
         let now_ns = monotonic_ns();
         let goes_on = last.is_none_or(|last| last.at(now_ns).ns <= record.at(now_ns).ns);
         if goes_on {
-            page.slept_ns.store(slept_ns(), Ordering::Relaxed);
             page.turn();
         }
         goes_on
@@ -352,7 +375,7 @@ impl TimeKeeper {
     /// each time it tried.
     pub fn set_pace(&mut self, pace: f64) -> bool {
         let page: &TimePage = self.mapping.at(0);
-        let Some(last) = page.read() else { return false };
+        let Some(Written { record: last, slept_ns }) = page.read() else { return false };
         let pace_ppb = (pace.clamp(0.0, 1000.0) * 1e9) as u64;
         // Until the index turns, readers go by the old pace. So that the new record is never behind what they read till
         // then, a slower pace begins a little in the future.
@@ -360,7 +383,8 @@ impl TimeKeeper {
         for _ in 0..WRITE_TRIES {
             let begin_ns = monotonic_ns() + lead_ns;
             let system_ns = last.at(begin_ns).ns;
-            page.fill(&TimeRecord { monotonic_ns: begin_ns, system_ns, pace_ppb, ..last });
+            let record = TimeRecord { monotonic_ns: begin_ns, system_ns, pace_ppb, ..last };
+            page.fill(&Written { record, slept_ns });
             // From here to the turn are nanoseconds; a thread held up just there for longer than the lead would be late.
             if lead_ns == 0 || monotonic_ns() < begin_ns {
                 page.turn();

@@ -14,8 +14,13 @@ const MARK_NS: u64 = 1_000_000_000_000_000;
 #[test]
 fn role() {
     let Some((role, ground)) = common::role() else { return };
-    assert_eq!(role, "write");
     let node = ground.node();
+    if role == "read" {
+        let clock = SystemClock::open(&node);
+        let (now, record) = (clock.now(), clock.record().unwrap());
+        return tell(format_args!("{} {}", now.error.as_nanos(), record.error_ns));
+    }
+    assert_eq!(role, "write");
     tell("writing");
     for turn in u64::from(std::process::id()).. {
         let pace = 1 + turn % 9;
@@ -131,6 +136,25 @@ fn who_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
     drop(TimeKeeper::begin(&node, TimeSource::Simulation, 5, 1.0).unwrap());
     let again = TimeKeeper::await_master(&node).unwrap().record().unwrap();
     assert_eq!((again.epoch, again.error_ns), (6, ERROR_UNKNOWN_NS), "a simulation's time is not the master's");
+}
+
+/// In a time namespace, in which the computer has slept for an hour more than it has; that takes root.
+#[test]
+fn who_reads_after_a_sleep_is_told_that_nobody_knows_although_nobody_wrote_since() {
+    let may = std::process::Command::new("unshare").args(["--time", "--boottime", "3600", "true"]).status();
+    if !may.is_ok_and(|status| status.success()) {
+        eprintln!("SKIPPED: no time namespace for this user");
+        return;
+    }
+    for (source, slept_ns) in [(TimeSource::Master, ERROR_UNKNOWN_NS), (TimeSource::Simulation, 10)] {
+        let ground = Ground::new();
+        let mut keeper = TimeKeeper::await_master(&ground.node()).unwrap();
+        let unknown = keeper.record().unwrap();
+        assert!(keeper.write(&TimeRecord { epoch: 4, source, error_ns: 10, ..unknown }));
+        assert_eq!(ground.start("read").hear(), "10 10");
+        let asleep = ground.start_behind("unshare", &["--time", "--boottime", "3600"], "read");
+        assert_eq!(asleep.hear(), format!("{slept_ns} {slept_ns}"), "{source:?}");
+    }
 }
 
 #[test]

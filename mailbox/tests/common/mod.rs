@@ -78,7 +78,18 @@ impl Ground {
 
     /// The same, prepared in some way.
     pub(crate) fn start_with(&self, role: &str, prepare: impl FnOnce(&mut Command)) -> Process {
-        let mut command = Command::new(std::env::current_exe().unwrap());
+        self.start_by(Command::new(std::env::current_exe().unwrap()), role, prepare)
+    }
+
+    /// By another program, whose command line ends with this binary.
+    #[allow(dead_code, reason = "each test uses a part")]
+    pub(crate) fn start_behind(&self, program: &str, arguments: &[&str], role: &str) -> Process {
+        let mut command = Command::new(program);
+        command.args(arguments).arg(std::env::current_exe().unwrap());
+        self.start_by(command, role, |_| ())
+    }
+
+    fn start_by(&self, mut command: Command, role: &str, prepare: impl FnOnce(&mut Command)) -> Process {
         command
             .args(["--exact", "role", "--nocapture", "--test-threads=1"])
             .env("ROHRPOST_TEST_ROLE", role)

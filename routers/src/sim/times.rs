@@ -59,11 +59,10 @@ impl Times {
 
     /// What a node's page says, for its next router.
     ///
-    /// Of a computer that has slept since, nothing: as whoever keeps the page has it.
+    /// As whoever reads the page has it: of a computer that has slept since, nobody knows how far off it is.
     pub fn page(&self, now: Now, node: usize) -> Option<TimeRecord> {
         let page = self.pages.get(node)?;
-        let has_slept = page.slept_ns != now.slept_ns;
-        page.record.map(|record| if has_slept { TimeRecord { error_ns: ERROR_UNKNOWN_NS, ..record } } else { record })
+        page.record.map(|record| record.after_sleep(now.slept_ns.saturating_sub(page.slept_ns)))
     }
 
     /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that.
@@ -105,8 +104,8 @@ impl Times {
 
     /// A module reads its node's page, whether its router lives or not.
     pub fn read(&mut self, now: Now, node: usize, problems: &mut Vec<Problem>) {
+        let Some(record) = self.page(now, node) else { return };
         let page = &mut self.pages[node];
-        let Some(record) = page.record else { return };
         let time = record.at(now.monotonic_ns);
         let broken = |promise, text| Problem { promise, at_ns: now.true_ns, text };
         if let Some((epoch, ns)) = page.last.replace((time.epoch, time.ns))
