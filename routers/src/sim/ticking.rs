@@ -112,7 +112,8 @@ pub struct Ticking {
 impl Ticking {
     /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
     pub fn new(settings: TimeSettings, now: Now, page: Option<TimeRecord>, has_stamps: bool) -> Self {
-        let clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, page);
+        let mut clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, page);
+        clock.look_at_clocks(seen(now));
         Self {
             clock,
             has_stamps,
@@ -253,8 +254,7 @@ impl Ticking {
     }
 
     fn look_at_clocks(&mut self, io: &mut Io<'_>) {
-        let Now { monotonic_ns: local_ns, unslewed_ns, slept_ns, .. } = io.now;
-        if let Some(why) = self.clock.look_at_clocks(Looked { local_ns, unslewed_ns, apart_ns: APART_NS, slept_ns }) {
+        if let Some(why) = self.clock.look_at_clocks(seen(io.now)) {
             io.line(|| format!("time: {why}"));
             io.book.saw("time: unsteady");
         }
@@ -268,6 +268,11 @@ impl Ticking {
         self.was_master = is_master;
         io.book.times.look(io.now, io.node, &self.clock, &mut io.book.problems);
     }
+}
+
+/// The clocks as a node sees them.
+fn seen(Now { monotonic_ns: local_ns, unslewed_ns, slept_ns, .. }: Now) -> Looked {
+    Looked { local_ns, unslewed_ns, apart_ns: APART_NS, slept_ns }
 }
 
 impl Layer for Ticking {

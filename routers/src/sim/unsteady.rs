@@ -44,11 +44,22 @@ impl Plan {
                     false => Fault::Slew { node, slewed_ppb: chance.pick(&SLEWED_PPB) },
                 };
                 let until_ns = if let Fault::Sleep { .. } = fault { until_ns.max(from_ns + S / 2) } else { until_ns };
-                self.faults.push(Planned { from_ns, until_ns: until_ns.min(self.mended_ns), fault });
+                let until_ns = until_ns.min(self.mended_ns);
+                if let Fault::Sleep { .. } = fault {
+                    // On a computer that sleeps nothing starts, and nobody ends it.
+                    self.faults
+                        .retain(|other| !starts(other, node) || other.until_ns < from_ns || other.from_ns > until_ns);
+                }
+                self.faults.push(Planned { from_ns, until_ns, fault });
             }
         }
         self.mended_ns += STEADY_NS;
     }
+}
+
+/// Whether it starts a router of this node.
+fn starts(planned: &Planned, of: usize) -> bool {
+    matches!(planned.fault, Fault::Restart { node } | Fault::Edited { node, .. } if node == of)
 }
 
 fn node_of(fault: &Fault) -> Option<usize> {

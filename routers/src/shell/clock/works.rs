@@ -105,9 +105,12 @@ impl Works {
         let socket = TimeSocket::open(at, &nodes, settings.digest, kernel_stamps)
             .map_err(|error| ClockError::Socket(at, error))?;
         let keeper = node.as_ref().map(TimeKeeper::resume).transpose()?;
-        let page = keeper.as_ref().and_then(TimeKeeper::record);
         let local = LocalClock::new(skew);
-        let clock = Clock::new(settings, local.now_ns(), realtime_ns(), page);
+        // Before the page is read: should the computer sleep from here on, that is seen.
+        let looked = local.looked();
+        let page = keeper.as_ref().and_then(TimeKeeper::record);
+        let mut clock = Clock::new(settings, local.now_ns(), realtime_ns(), page);
+        clock.look_at_clocks(looked);
         let snapshot = Snapshot::of(&clock, local.now_ns());
         Ok(Self {
             clock,

@@ -19,8 +19,11 @@ impl Time {
     /// What an earlier life of this client wrote goes on.
     pub(super) fn new(node: &Arc<Node>) -> Result<Self, NodeError> {
         let keeper = TimeKeeper::resume(node)?;
+        // Before the page is read: should the computer sleep from here on, that is seen.
+        let mut steadiness = Steadiness::default();
+        steadiness.look(looked());
         let follower = Follower::new(monotonic_ns(), realtime_ns(), keeper.record());
-        Ok(Self { follower, keeper, steadiness: Steadiness::default() })
+        Ok(Self { follower, keeper, steadiness })
     }
 
     /// Whether this computer's clock is one to measure by. If it slept, or its clock is slewed, nothing is known any more.
