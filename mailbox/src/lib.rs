@@ -123,7 +123,7 @@ pub use registry::CreateError;
 pub use routes::ROUTES_MAX;
 pub use sender::{Label, Loan, SendError, Sender};
 pub use slots::{Full, SLOTS_MAX};
-pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource};
+pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
 pub use waiting::{Waiting, wait_above, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};
 pub use work::{InHand, Work};

@@ -24,6 +24,8 @@ const WRITE_TRIES: usize = 8;
 /// The error bound of who does not know the time: 292 years.
 pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
+/// No clock is that slow.
+const NO_RATE: u64 = i64::MIN.cast_unsigned();
 /// Two readings of how long a computer has slept are off by less.
 const SLEPT_NS_MIN: u64 = 5_000_000;
 
@@ -100,6 +102,21 @@ impl TimeRecord {
     }
 }
 
+/// What was seen last of the computer's clocks by whoever writes a node's time: its next life sees what they did while nobody watched.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Watched {
+    /// The clock of the page, [`monotonic_ns`].
+    pub local_ns: u64,
+    /// One that nobody slews, ns.
+    pub unslewed_ns: u64,
+    /// How long the two readings lay apart at most, ns.
+    pub apart_ns: u64,
+    /// For how long the computer had slept, ns.
+    pub slept_ns: u64,
+    /// How much faster than its oscillator the first clock was, ns a second; none if that was not known yet.
+    pub rate_ppb: Option<i64>,
+}
+
 /// System time as one reader computed it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SystemTime {
@@ -149,10 +166,15 @@ pub(crate) struct TimePage {
     /// Records written so far; the last is in place `index % 2`. 0: none yet.
     index: AtomicU64,
     writer_pid: AtomicU32,
-    rest: [AtomicU32; 13],
+    padding: AtomicU32,
+    /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which its next life takes for a clock that
+    /// is not to be believed.
+    watched: [AtomicU64; 5],
+    rest: [AtomicU32; 2],
     records: [SharedRecord; 2],
 }
 const _: () = assert!(size_of::<TimePage>() == 192 && std::mem::offset_of!(TimePage, records) == 64);
+const _: () = assert!(std::mem::offset_of!(TimePage, watched) == 16);
 const _: () = assert!(std::mem::offset_of!(SharedRecord, slept_ns) == 56);
 
 impl SharedRecord {
@@ -354,6 +376,25 @@ impl TimeKeeper {
     pub fn record(&self) -> Option<TimeRecord> {
         let page: &TimePage = self.mapping.at(0);
         Some(page.read()?.read(slept_ns()))
+    }
+
+    /// What was seen last of this computer's clocks, if anything was.
+    pub fn watched(&self) -> Option<Watched> {
+        let page: &TimePage = self.mapping.at(0);
+        let [local_ns, unslewed_ns, apart_ns, slept_ns, rate] =
+            page.watched.each_ref().map(|field| field.load(Ordering::Relaxed));
+        let rate_ppb = (rate != NO_RATE).then_some(rate.cast_signed());
+        (local_ns > 0).then_some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb })
+    }
+
+    /// Notes what was seen, for the next life of whoever writes here.
+    pub fn note_watched(&mut self, watched: &Watched) {
+        let Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb } = *watched;
+        let rate = rate_ppb.map_or(NO_RATE, i64::cast_unsigned);
+        let page: &TimePage = self.mapping.at(0);
+        for (field, value) in page.watched.iter().zip([local_ns, unslewed_ns, apart_ns, slept_ns, rate]) {
+            field.store(value, Ordering::Relaxed);
+        }
     }
 
     /// Makes this the page's record. False, and the page stays as it was, if time would go back within its epoch just now: because the

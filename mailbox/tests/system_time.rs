@@ -5,7 +5,9 @@
 mod common;
 
 use common::{Ground, tell};
-use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemClock, TimeKeeper, TimeRecord, TimeSource, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{
+    ERROR_UNKNOWN_NS, SystemClock, TimeKeeper, TimeRecord, TimeSource, Watched, monotonic_ns, realtime_ns,
+};
 use std::time::{Duration, Instant};
 
 /// The killed writer's mark: an epoch of pace p begins at p times this.
@@ -136,6 +138,18 @@ fn who_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
     drop(TimeKeeper::begin(&node, TimeSource::Simulation, 5, 1.0).unwrap());
     let again = TimeKeeper::await_master(&node).unwrap().record().unwrap();
     assert_eq!((again.epoch, again.error_ns), (6, ERROR_UNKNOWN_NS), "a simulation's time is not the master's");
+}
+
+#[test]
+fn what_was_seen_of_the_clocks_is_left_to_the_next_writer() {
+    let ground = Ground::new();
+    let mut keeper = TimeKeeper::resume(&ground.node()).unwrap();
+    assert_eq!(keeper.watched(), None);
+    for rate_ppb in [None, Some(0), Some(-83_000_000)] {
+        let watched = Watched { local_ns: 5, unslewed_ns: 4, apart_ns: 3, slept_ns: 2, rate_ppb };
+        keeper.note_watched(&watched);
+        assert_eq!(TimeKeeper::resume(&ground.node()).unwrap().watched(), Some(watched));
+    }
 }
 
 /// In a time namespace, in which the computer has slept for an hour more than it has; that takes root.

@@ -5,6 +5,7 @@ use super::clock::Now;
 use super::plan::{Plan, S, SYSTEM};
 use super::seals::TimeSeals;
 use super::station::{Arrived, Io, Layer, Port, Sent};
+use super::times::Left;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::security::Acquaintances;
 use crate::tdma::{Permit, Table};
@@ -13,7 +14,6 @@ use crate::time::{
     Allowed, Clock, JOINING_SYNCS, Looked, RATE_MAX_PPB, Reckoning, Role, SentId, Stamp, Step, TIME_BYTES, Term,
     TimeSettings,
 };
-use rohrpost_mailbox::TimeRecord;
 use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -111,8 +111,8 @@ pub struct Ticking {
 
 impl Ticking {
     /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
-    pub fn new(settings: TimeSettings, now: Now, page: Option<TimeRecord>, has_stamps: bool) -> Self {
-        let mut clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, page);
+    pub fn new(settings: TimeSettings, now: Now, left: Left, has_stamps: bool) -> Self {
+        let mut clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, left.record).watching(left.watched);
         clock.look_at_clocks(seen(now));
         Self {
             clock,

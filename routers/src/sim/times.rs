@@ -6,7 +6,7 @@
 use super::book::{Problem, Promise};
 use super::clock::{Clock, Now};
 use crate::time::{Clock as Core, Role, Term};
-use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord};
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, Watched};
 use std::collections::BTreeMap;
 
 /// After so long a node knows that its clock does what bounds exclude: it looks once a cycle, or ten times a second, and its thread may wake late.
@@ -35,8 +35,18 @@ struct Page {
     noticed_ns: Option<u64>,
     /// For how long the computer had slept when that was written.
     slept_ns: u64,
+    watched: Option<Watched>,
     /// Epoch and time that it was last seen to say.
     last: Option<(u64, u64)>,
+}
+
+/// What the routers of a node leave to the next one.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Left {
+    /// What the page says.
+    pub record: Option<TimeRecord>,
+    /// What was seen last of the clocks.
+    pub watched: Option<Watched>,
 }
 
 /// All pages and terms.
@@ -63,6 +73,11 @@ impl Times {
     pub fn page(&self, now: Now, node: usize) -> Option<TimeRecord> {
         let page = self.pages.get(node)?;
         page.record.map(|record| record.after_sleep(now.slept_ns.saturating_sub(page.slept_ns)))
+    }
+
+    /// What a node's next router goes on from.
+    pub fn left(&self, now: Now, node: usize) -> Left {
+        Left { record: self.page(now, node), watched: self.pages.get(node).and_then(|page| page.watched) }
     }
 
     /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that.
@@ -94,7 +109,7 @@ impl Times {
         let term = core.reading(now.monotonic_ns).term;
         let page = &mut self.pages[node];
         page.noticed_ns.get_or_insert(now.true_ns);
-        page.slept_ns = now.slept_ns;
+        (page.slept_ns, page.watched) = (now.slept_ns, core.watched());
         page.record = Some(*core.record());
         if !term.is_none() {
             (page.digest, page.term) = (core.digest(), term);

@@ -9,6 +9,7 @@
 
 use super::limits::LIMITS;
 use crate::broken::broken;
+use rohrpost_mailbox::Watched;
 
 /// The line is drawn anew after so long: readings are then worth a few ppm.
 const SPAN_NS: u64 = 100_000_000;
@@ -60,6 +61,21 @@ pub(crate) struct Steadiness {
 }
 
 impl Steadiness {
+    /// Goes on from what an earlier life has seen.
+    pub(crate) fn of(watched: Option<Watched>) -> Self {
+        let Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb }) = watched else {
+            return Self::default();
+        };
+        let began = Some(Looked { local_ns, unslewed_ns, apart_ns, slept_ns });
+        Self { began, rate_ppb, slept_ns: Some(slept_ns), ..Self::default() }
+    }
+
+    /// What the next life goes on from.
+    pub(crate) fn watched(&self) -> Option<Watched> {
+        let Looked { local_ns, unslewed_ns, apart_ns, .. } = self.began?;
+        Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns: self.slept_ns?, rate_ppb: self.rate_ppb })
+    }
+
     /// Looks at the clocks; what is wrong, if this look shows that something is.
     pub(crate) fn look(&mut self, now: Looked) -> Option<Unsteady> {
         let found = self.slept(now).or_else(|| self.slewed(now));
@@ -160,6 +176,20 @@ mod tests {
                 assert_eq!(computer.runs(1_000 * MS, fast_ppb), None);
             }
         }
+    }
+
+    #[test]
+    fn what_a_clock_did_while_nobody_watched_is_seen_by_the_next_life() {
+        for (gained_ns, slept_ns, is_seen) in [(0, 0, false), (100_000, 0, true), (0, 100 * MS, true)] {
+            let mut computer = Computer::new();
+            assert_eq!(computer.runs(1_000 * MS, 100_000), None);
+            computer.steadiness = Steadiness::of(computer.steadiness.watched());
+            computer.now.unslewed_ns += 1_000 * MS;
+            computer.now.local_ns += 1_000 * MS + 100_000 + gained_ns + slept_ns;
+            computer.now.slept_ns += slept_ns;
+            assert_eq!(computer.steadiness.look(computer.now).is_some(), is_seen, "{gained_ns}, {slept_ns}");
+        }
+        assert_eq!(Steadiness::of(None).watched(), None);
     }
 
     #[test]

@@ -106,13 +106,11 @@ impl Works {
             .map_err(|error| ClockError::Socket(at, error))?;
         let keeper = node.as_ref().map(TimeKeeper::resume).transpose()?;
         let local = LocalClock::new(skew);
-        // Before the page is read: should the computer sleep from here on, that is seen.
-        let looked = local.looked();
         let page = keeper.as_ref().and_then(TimeKeeper::record);
-        let mut clock = Clock::new(settings, local.now_ns(), realtime_ns(), page);
-        clock.look_at_clocks(looked);
+        let watched = keeper.as_ref().and_then(TimeKeeper::watched);
+        let clock = Clock::new(settings, local.now_ns(), realtime_ns(), page).watching(watched);
         let snapshot = Snapshot::of(&clock, local.now_ns());
-        Ok(Self {
+        let mut works = Self {
             clock,
             local,
             socket,
@@ -125,7 +123,9 @@ impl Works {
             snapshot,
             system,
             refuse: None,
-        })
+        };
+        works.look_at_clocks();
+        Ok(works)
     }
 
     /// From now on it seals what it sends, and takes only what is sealed to it, if there is something to seal with.
@@ -189,6 +189,9 @@ impl Works {
             && was_steady
         {
             tracing::warn!("nothing is known of the time until it has been measured anew: {why}");
+        }
+        if let Some((keeper, watched)) = self.keeper.as_mut().zip(self.clock.watched()) {
+            keeper.note_watched(&watched);
         }
     }
 

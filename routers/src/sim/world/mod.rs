@@ -19,18 +19,19 @@ use super::modules::DATA_MAILBOXES;
 use super::plan::{MS, Plan, RECOVERY_NS, S};
 use super::station::{Arrived, Layer, Sent, Station};
 use super::ticking;
+use super::times::Left;
 use super::times::Times;
 use super::trace::Trace;
 use super::wire::Wire;
 use event::Entry;
-use rohrpost_mailbox::{Name, TimeRecord, local};
+use rohrpost_mailbox::{Name, local};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
 
 /// Makes the layers of a router that begins to live: node, which edition of the configuration it has, life, its clocks, what its page of system
 /// time says.
-pub type NewLayers<'a> = Box<dyn FnMut(usize, usize, u32, Now, Option<TimeRecord>) -> Vec<Box<dyn Layer>> + 'a>;
+pub type NewLayers<'a> = Box<dyn FnMut(usize, usize, u32, Now, Left) -> Vec<Box<dyn Layer>> + 'a>;
 
 /// One run.
 pub struct World<'a> {

@@ -16,7 +16,7 @@ impl World<'_> {
         let life = self.lives;
         self.living[node] = life;
         let now = self.now(node);
-        let layers = (self.new_layers)(node, self.stations[node].edition, life, now, self.book.times.page(now, node));
+        let layers = (self.new_layers)(node, self.stations[node].edition, life, now, self.book.times.left(now, node));
         self.stations[node].router = Some(Router { life, layers, sent: Default::default() });
         self.trace.line(self.now_ns, || format!("{node}/{life} the router starts"));
         if self.stations[node].runs() {

@@ -19,11 +19,11 @@ impl Time {
     /// What an earlier life of this client wrote goes on.
     pub(super) fn new(node: &Arc<Node>) -> Result<Self, NodeError> {
         let keeper = TimeKeeper::resume(node)?;
-        // Before the page is read: should the computer sleep from here on, that is seen.
-        let mut steadiness = Steadiness::default();
-        steadiness.look(looked());
         let follower = Follower::new(monotonic_ns(), realtime_ns(), keeper.record());
-        Ok(Self { follower, keeper, steadiness })
+        let steadiness = Steadiness::of(keeper.watched());
+        let mut time = Self { follower, keeper, steadiness };
+        time.is_steady();
+        Ok(time)
     }
 
     /// Whether this computer's clock is one to measure by. If it slept, or its clock is slewed, nothing is known any more.
@@ -38,6 +38,9 @@ impl Time {
             if was_steady {
                 tracing::warn!("nothing is known of the time until it has been measured anew: {why}");
             }
+        }
+        if let Some(watched) = self.steadiness.watched() {
+            self.keeper.note_watched(&watched);
         }
         self.steadiness.why(looked.local_ns).is_none()
     }

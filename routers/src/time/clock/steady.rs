@@ -2,7 +2,8 @@
 
 use super::Clock;
 use crate::time::UNSYNCHRONISED_NS;
-use crate::time::steadiness::{Looked, Unsteady};
+use crate::time::steadiness::{Looked, Steadiness, Unsteady};
+use rohrpost_mailbox::Watched;
 
 impl Clock {
     /// Looks whether the local clock keeps what bounds assume of it. To be called before anything else, at least once a cycle in time slots; what is
@@ -11,6 +12,18 @@ impl Clock {
         let found = self.steadiness.look(looked)?;
         self.distrust(looked.local_ns);
         Some(found)
+    }
+
+    /// Goes on watching where an earlier life has ended; for a clock that is new.
+    #[must_use]
+    pub fn watching(mut self, watched: Option<Watched>) -> Self {
+        self.steadiness = Steadiness::of(watched);
+        self
+    }
+
+    /// What the next life of this node's clock goes on from.
+    pub fn watched(&self) -> Option<Watched> {
+        self.steadiness.watched()
     }
 
     /// Why nothing is known of the time though it may be heard: what [`Self::look_at_clocks`] found.
