@@ -42,10 +42,22 @@ impl Bare {
     /// # Errors
     /// [`Failure::Skipped`] where the kernel reserves no time.
     pub fn turn(stage: &Stage, plan: &Plan, loaded: bool, watched: Duration) -> Result<Self, Failure> {
+        Self::beside(plan, || loaded.then(|| stage.load()).transpose(), watched)
+    }
+
+    /// The same beside whatever `load` starts, until that is dropped.
+    ///
+    /// # Errors
+    /// As for [`Self::turn`], and what starting that failed with.
+    pub fn beside<L>(
+        plan: &Plan,
+        load: impl FnOnce() -> Result<L, Failure>,
+        watched: Duration,
+    ) -> Result<Self, Failure> {
         let ready = Shared::<Gate>::new()?;
         let said = || Ok(Said { late_us: Shared::new()?, standstills: Shared::new()? });
         let all = (0..NODES).map(|_| said()).collect::<Result<Vec<_>, Failure>>()?;
-        let _load = loaded.then(|| stage.load()).transpose()?;
+        let _load = load()?;
         let child = |(own, said): (u8, &Said)| Child::start(|| wake_up(plan, own, &ready, said));
         let mut children = (0..NODES).zip(&all).map(child).collect::<Result<Vec<_>, Failure>>()?;
         ready.meet_children(&mut children)?;

@@ -1,19 +1,23 @@
 //! Slots that are left out while somebody sends 500 000 datagrams a second to each port of a node, from an address that no node has; and without.
 //!
-//! The junk goes to the node that is no master, in place of the load of the other cases. Who sends it has a processor with what else runs there.
+//! The junk goes to the node that is no master, in place of the load of the other cases. Who sends it has a processor with what else runs there. The floor: bare
+//! threads that wake up for the same slots beside the same junk.
 
-use super::observed::{Observed, Way};
+use super::contest::BARE;
+use super::goals::{Goal, figure};
+use super::observed::{Observed, PORTS, Way, watched};
 use super::plans::LOADED;
 use crate::cases::Case;
 use crate::harness::Failure;
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
-use crate::statistics::{Summary, median};
+use crate::tdma::bare::Bare;
 use crate::tdma::rights::Rights;
 use crate::tdma::stage::Stage;
 
 /// A turn lasts long.
 const ROUNDS_MAX: usize = 3;
+const OF_NO_JUNK: [Goal; 1] = [Goal { name: "must 1.2", most: 1.2 }];
 
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     vec![Box::new(Junked)]
@@ -32,21 +36,31 @@ impl Case for Junked {
             let way = Way { rights: Rights::RealTime, loaded: false, junk };
             Observed::turn(&stage, &LOADED, way, settings)
         };
-        let mut seen = [Vec::new(), Vec::new()];
-        for _ in 0..settings.rounds.min(ROUNDS_MAX) {
-            seen[0].push(turn(true)?);
-            seen[1].push(turn(false)?);
-        }
-        let row = |who, unit, all: &[Observed], of: fn(&Observed) -> f64| {
-            let subject = Subject { case: self.name(), bytes: None, unit };
-            median(all.iter().map(of)).map(|median| Row::alone(subject, who, Ok(Summary::single(median))))
+        let bare = |junk: bool| {
+            let load = || junk.then(|| stage.junk(&PORTS)).transpose();
+            Bare::beside(&LOADED, load, watched(settings)).map(|bare| bare.omitted_percent())
         };
-        let [junk, quiet] = &seen;
-        let rows = [
-            row("left out, junk", "%", junk, Observed::omitted_percent),
-            row("left out, no junk", "%", quiet, Observed::omitted_percent),
-            row("junk to each port", "datagrams/s", junk, |seen| seen.junk_s.unwrap_or_default()),
-        ];
-        Ok(rows.into_iter().flatten().collect())
+        let (mut seen, mut floor) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
+        for _ in 0..settings.rounds.min(ROUNDS_MAX) {
+            for (at, junk) in [true, false].into_iter().enumerate() {
+                seen[at].push(turn(junk)?);
+                floor[at].push(bare(junk)?);
+            }
+        }
+        let [junk, quiet] = seen.each_ref().map(|all| all.iter().map(Observed::omitted_percent).collect::<Vec<_>>());
+        let sent: Vec<f64> = seen[0].iter().filter_map(|seen| seen.junk_s).collect();
+        let subject = |unit, what| Subject { case: format!("{}, {what}", self.name()), bytes: None, unit };
+        // A round in which nothing was left out without junk says nothing about the ratio.
+        let both = junk.iter().zip(&quiet).filter(|(_, quiet)| **quiet > 0.0);
+        let ratios: Vec<f64> = both.map(|(junk, quiet)| junk / quiet).collect();
+        Ok([
+            figure(&subject("%", "omitted"), "rohrpost", &junk, &[]),
+            figure(&subject("%", "omitted"), "no junk", &quiet, &[]),
+            figure(&subject("of no junk", "omitted"), "rohrpost", &ratios, &OF_NO_JUNK),
+            figure(&subject("%", "omitted"), BARE, &floor[0], &[]),
+            figure(&subject("%", "omitted"), "bare threads, no junk", &floor[1], &[]),
+            figure(&subject("datagrams/s", "to each port"), "junk", &sent, &[]),
+        ]
+        .concat())
     }
 }

@@ -21,7 +21,7 @@ const WATCHED_QUICK: Duration = Duration::from_secs(1);
 const SETTLES: Duration = Duration::from_secs(1);
 
 /// Of packages and of time.
-const PORTS: [u16; 2] = [PORT, PORT + 1];
+pub(super) const PORTS: [u16; 2] = [PORT, PORT + 1];
 
 /// All nodes.
 pub(super) const ALL: [u8; NODES as usize] = [0, 1, 2];
