@@ -67,7 +67,15 @@ impl Steadiness {
             return Self::default();
         };
         let began = Some(Looked { local_ns, unslewed_ns, apart_ns, slept_ns });
-        Self { began, rate_ppb, slept_ns: Some(slept_ns), ..Self::default() }
+        let seen = Self { began, rate_ppb, slept_ns: Some(slept_ns), ..Self::default() };
+        match rate_ppb.filter(|rate_ppb| rate_ppb.abs() > LIMITS.slewed_ppb) {
+            // Who slewed it then may go on.
+            Some(rate_ppb) => {
+                let until_ns = local_ns.saturating_add(STEADY_AFTER_NS);
+                Self { why: Some(Unsteady::Slewed { rate_ppb }), until_ns, ..seen }
+            }
+            None => seen,
+        }
     }
 
     /// What the next life goes on from.
@@ -189,6 +197,10 @@ mod tests {
             computer.now.slept_ns += slept_ns;
             assert_eq!(computer.steadiness.look(computer.now).is_some(), is_seen, "{gained_ns}, {slept_ns}");
         }
+        let mut slewed = Computer::new();
+        while slewed.runs(SPAN_NS, 300_000).is_none() || slewed.steadiness.rate_ppb.is_none() {}
+        let next = Steadiness::of(slewed.steadiness.watched());
+        assert!(next.why(slewed.now.local_ns).is_some(), "who slewed it may go on");
         assert_eq!(Steadiness::of(None).watched(), None);
     }
 
