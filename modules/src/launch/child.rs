@@ -12,6 +12,7 @@ use super::policy::{Policy, STEADY};
 use super::printed::Printed;
 use super::program::Program;
 use super::repeats::Repeats;
+use crate::common::OutputLevel;
 use crate::output::Relay;
 use ending::Ending;
 use nix::sys::signal::Signal;
@@ -212,7 +213,7 @@ impl Child {
     /// Starts the process; what there is to say if that fails. That is an end without success: the program may be replaced just
     /// now, or the computer be short of something for moments.
     pub(super) fn spawn(&mut self, now: Instant) -> Option<String> {
-        match self.try_spawn() {
+        match self.try_spawn(now) {
             Ok(process) => {
                 self.process = Some(process);
                 self.phase = Phase::Starting;
@@ -230,10 +231,10 @@ impl Child {
         }
     }
 
-    fn try_spawn(&mut self) -> io::Result<Process> {
+    fn try_spawn(&mut self, now: Instant) -> io::Result<Process> {
         // First: a process whose words nobody reads would be stuck at the first of them too many.
         let quiet = self.repeats.is_quiet().then_some(STEADY);
-        let pipes = self.printed.begin(quiet)?;
+        let pipes = self.printed.begin(quiet.map(|quiet| now + quiet))?;
         // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes before any
         // word of launch's: so it switches itself on. At the first start launch does, when all are ready.
         self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, quiet, pipes)
@@ -303,7 +304,7 @@ impl Child {
             "is busy: {}; until that comes back it hears nobody, and what is sent to it waits or is lost",
             working.told(node, &self.names)
         );
-        self.printed.warn(&told);
+        self.printed.say(OutputLevel::Warn, &told);
         Some(format!("{} {told}", self.text))
     }
 

@@ -29,8 +29,6 @@ pub(super) struct Printed {
     lines: Arc<Mutex<Lines>>,
     readers: Vec<JoinHandle<()>>,
     voice: Option<Voice>,
-    /// How long a line is held.
-    hold: Duration,
     /// Where the panic came from that was told last.
     told: Vec<String>,
 }
@@ -41,6 +39,28 @@ struct Lines {
     /// Where its panic came from.
     trace: Vec<String>,
     held: VecDeque<Held>,
+    /// Nothing is passed on before.
+    quiet_until: Option<Instant>,
+}
+
+impl Lines {
+    /// Takes the next line that was held long enough.
+    fn take_due(&mut self, now: Instant) -> Option<Held> {
+        if self.due_at()? <= now { self.held.pop_front() } else { None }
+    }
+
+    /// When the next line has been held long enough.
+    fn due_at(&self) -> Option<Instant> {
+        let at = self.held.front()?.since + HOLD;
+        Some(self.quiet_until.map_or(at, |until| until.max(at)))
+    }
+
+    /// Drops what is held, if its process has ended while nothing was to be passed on.
+    fn drop_quiet(&mut self, ended: Instant) {
+        if self.quiet_until.is_some_and(|until| ended < until) {
+            self.held.clear();
+        }
+    }
 }
 
 /// A line that is to be passed on.
@@ -54,16 +74,15 @@ struct Held {
 impl Printed {
     /// Of a module; `voice` speaks for it, if anybody listens.
     pub(super) fn new(voice: Option<Voice>) -> Self {
-        Self { lines: Arc::default(), readers: Vec::new(), voice, hold: HOLD, told: Vec::new() }
+        Self { lines: Arc::default(), readers: Vec::new(), voice, told: Vec::new() }
     }
 
     /// Where the next process prints to: its standard output and standard error. What the one before said is forgotten.
-    /// `quiet`: for so long nothing of it is passed on.
-    pub(super) fn begin(&mut self, quiet: Option<Duration>) -> io::Result<[PipeWriter; 2]> {
-        self.pass_on(None);
-        self.hold = quiet.unwrap_or(HOLD);
+    /// `quiet_until`: before then nothing of it is passed on.
+    pub(super) fn begin(&mut self, quiet_until: Option<Instant>) -> io::Result<[PipeWriter; 2]> {
+        self.pass_on(false);
         // Of its own: who left processes behind that still print must not mix with what follows.
-        self.lines = Arc::default();
+        self.lines = Arc::new(Mutex::new(Lines { quiet_until, ..Lines::default() }));
         self.readers.clear();
         let out = self.read("stdout", OutputLevel::Info)?;
         Ok([out, self.read("stderr", OutputLevel::Warn)?])
@@ -105,9 +124,9 @@ impl Printed {
     }
 
     /// Says of the module what launch has seen.
-    pub(super) fn warn(&self, text: &str) {
+    pub(super) fn say(&self, level: OutputLevel, text: &str) {
         if let Some(voice) = &self.voice {
-            voice.say(OutputLevel::Warn, voice.now_ns(), text.to_owned());
+            voice.say(level, voice.now_ns(), text.to_owned());
         }
     }
 
@@ -116,9 +135,8 @@ impl Printed {
         let Some(voice) = &self.voice else { return };
         loop {
             // One at a time: the thread that reads must not wait for the collector's mailbox.
-            let mut lines = lock(&self.lines);
-            let Some(line) = lines.held.pop_front_if(|line| now >= line.since + self.hold) else { break };
-            drop(lines);
+            let due = lock(&self.lines).take_due(now);
+            let Some(line) = due else { break };
             voice.say(line.level, line.time_ns, line.text);
         }
         voice.attend();
@@ -126,27 +144,23 @@ impl Printed {
 
     /// When to attend to it again.
     pub(super) fn attend_at(&self) -> Option<Instant> {
-        let held = lock(&self.lines).held.front().map(|line| line.since + self.hold);
-        held.into_iter().chain(self.voice.as_ref()?.retry_at()).min()
+        let due_at = lock(&self.lines).due_at();
+        due_at.into_iter().chain(self.voice.as_ref()?.retry_at()).min()
     }
 
-    /// Its process has ended, and what is held is not to be said: launch has told the like before.
-    pub(super) fn drop_held(&mut self) {
-        lock(&self.lines).held.clear();
+    /// Its process has ended, and launch has told the like before: what it printed while nothing was to be passed on is not said.
+    pub(super) fn drop_quiet(&mut self, now: Instant) {
+        lock(&self.lines).drop_quiet(now);
     }
 
-    /// Its process has ended: passes on what is held. If that was a failure, what came by standard error were its last words,
-    /// and `why` is said below them.
-    pub(super) fn pass_on(&mut self, why: Option<&str>) {
+    /// Its process has ended: passes on what is held. If it failed, what came by standard error were its last words.
+    pub(super) fn pass_on(&mut self, failed: bool) {
         let Some(voice) = &self.voice else { return };
         let held = std::mem::take(&mut lock(&self.lines).held);
         for line in held {
-            let last_words = why.is_some() && line.level == OutputLevel::Warn;
+            let last_words = failed && line.level == OutputLevel::Warn;
             let level = if last_words { OutputLevel::Error } else { line.level };
             voice.say(level, line.time_ns, line.text);
-        }
-        if let Some(why) = why {
-            voice.say(OutputLevel::Error, voice.now_ns(), why.to_owned());
         }
     }
 }
@@ -192,6 +206,51 @@ fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<Lines>, whisper: Opt
         drop(lines);
         if let (Some(voice), Some(line)) = (voice, pressed) {
             voice.say(line.level, line.time_ns, line.text);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const QUIET: Duration = Duration::from_secs(10);
+
+    /// Of a process that was started at `start` and printed at these times after it.
+    fn printed(start: Instant, quiet: Option<Duration>, after: &[Duration]) -> Lines {
+        let line = |&after| Held { level: OutputLevel::Info, time_ns: 0, since: start + after, text: String::new() };
+        Lines {
+            held: after.iter().map(line).collect(),
+            quiet_until: quiet.map(|quiet| start + quiet),
+            ..Lines::default()
+        }
+    }
+
+    #[test]
+    fn a_line_is_held_for_a_moment_and_the_first_ones_until_it_is_no_longer_quiet() {
+        let (start, day) = (Instant::now(), Duration::from_secs(86_400));
+        for (quiet, after, due) in [
+            (None, Duration::ZERO, HOLD),
+            (None, day, day + HOLD),
+            (Some(QUIET), Duration::ZERO, QUIET),
+            (Some(QUIET), QUIET - HOLD / 2, QUIET + HOLD / 2),
+            (Some(QUIET), day, day + HOLD),
+        ] {
+            let mut lines = printed(start, quiet, &[after]);
+            assert_eq!(lines.due_at(), Some(start + due), "quiet for {quiet:?}, printed after {after:?}");
+            assert!(lines.take_due(start + due - Duration::from_nanos(1)).is_none());
+            assert!(lines.take_due(start + due).is_some());
+            assert_eq!(lines.due_at(), None);
+        }
+    }
+
+    #[test]
+    fn what_it_printed_last_is_dropped_only_if_it_ended_while_quiet() {
+        let start = Instant::now();
+        for (quiet, ended, left) in [(Some(QUIET), QUIET / 2, 0), (Some(QUIET), QUIET * 3, 2), (None, HOLD / 2, 2)] {
+            let mut lines = printed(start, quiet, &[ended - HOLD / 2, ended - HOLD / 4]);
+            lines.drop_quiet(start + ended);
+            assert_eq!(lines.held.len(), left, "quiet for {quiet:?}, ended after {ended:?}");
         }
     }
 }

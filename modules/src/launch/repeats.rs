@@ -24,7 +24,7 @@ pub(super) enum Tell {
 /// The ends of one module, as far as they were told.
 #[derive(Default)]
 pub(super) struct Repeats {
-    /// Of the end that was told whole last, without its numbers: process ids and times differ from end to end.
+    /// Of the end that was told whole last, as [`comparable`].
     cause: String,
     told_at: Option<Instant>,
     untold: u32,
@@ -36,7 +36,7 @@ pub(super) struct Repeats {
 impl Repeats {
     /// It has ended for so many times in a row, and is started again.
     pub(super) fn ended(&mut self, in_a_row: u32, cause: &str, now: Instant) -> Tell {
-        let cause: String = cause.chars().filter(|letter| !letter.is_ascii_digit()).collect();
+        let cause = comparable(cause);
         let passed = self.told_at.map_or(Duration::MAX, |at| now.saturating_duration_since(at));
         let is_other = cause != self.cause && passed >= OTHER_EVERY;
         self.is_quiet = in_a_row >= WHOLE;
@@ -62,6 +62,18 @@ impl Repeats {
     pub(super) fn is_quiet(&self) -> bool {
         self.is_quiet
     }
+}
+
+/// A cause without what differs from end to end: process ids, times, addresses, temporary names. Each word with a digit becomes one mark.
+fn comparable(cause: &str) -> String {
+    let in_word = |letter: char| letter.is_alphanumeric() || matches!(letter, '-' | '_' | '.');
+    let words = cause.split_inclusive(|letter| !in_word(letter));
+    // Each is a word and the letter behind it, or that letter alone.
+    let marked = words.map(|word| match word.contains(|letter: char| letter.is_ascii_digit()) {
+        true => format!("#{}", word.trim_start_matches(in_word)),
+        false => word.to_owned(),
+    });
+    marked.collect()
 }
 
 #[cfg(test)]
@@ -98,6 +110,24 @@ mod tests {
         assert!(all.contains(&(33, Tell::Whole(12))), "{all:?}");
         let all = told(100, Duration::from_secs(1), |end| if end % 2 == 0 { "no disk" } else { "no wheels" }.into());
         assert!(all.len() <= 5 + 10, "{all:?}");
+    }
+
+    #[test]
+    fn addresses_and_temporary_names_are_no_other_cause() {
+        let cause = |end: u32| {
+            let random = end.wrapping_mul(0x9e37_79b9);
+            format!(
+                "killed by signal 6\n  free(): invalid pointer: 0x7ffe{random:08x} in /tmp/run-{random:x}/map, \
+                 job {random:08x}-beef-{:04x}-cafe, [{}.{end:06}s]",
+                random >> 16,
+                end * 7
+            )
+        };
+        let all = told(200, Duration::from_secs(11), cause);
+        let whole = all.iter().filter(|(_, tell)| matches!(tell, Tell::Whole(_))).count();
+        assert_eq!(whole, 5, "{all:?}");
+        assert_ne!(comparable("bad pointer 0x7f in map"), comparable("bad pointer 0x7f in wheels"));
+        assert_eq!(comparable("a 0x7f, b-1c: 9\n"), "a #, #: #\n");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What follows when a process has ended, and what is said about it.
 
 use super::{Child, Phase, cut};
+use crate::common::OutputLevel;
 use crate::launch::policy::Next;
 use crate::launch::repeats::Tell;
 use crate::runtime::StartError;
@@ -18,7 +19,7 @@ impl Child {
             (None, None) => "ended".to_owned(),
         };
         if let Some(ending) = self.ending.take() {
-            self.printed.pass_on(None);
+            self.printed.pass_on(false);
             return self.ended_as_told(&ending, &how, now);
         }
         // Whoever waits for its work expects it to go on as configured; but what a person has switched off stays off.
@@ -71,15 +72,19 @@ impl Child {
                 let last = self.printed.last();
                 let words = if last.is_empty() { String::new() } else { format!("; its last words: {}", cut(&last)) };
                 let row = self.policy.in_a_row();
-                self.printed.drop_held();
+                self.printed.drop_quiet(now);
                 (format!("{told} ({times} times in {within:.1?}, {row} in a row{words})"), String::new())
             }
             Tell::Nothing => {
-                self.printed.drop_held();
+                self.printed.drop_quiet(now);
+                self.printed.pass_on(!success);
                 return None;
             }
         };
-        self.printed.pass_on((!success).then_some(&told));
+        self.printed.pass_on(!success);
+        if !success {
+            self.printed.say(OutputLevel::Error, &told);
+        }
         Some(format!("{} {told}{below}", self.text))
     }
 }
