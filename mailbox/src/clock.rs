@@ -33,7 +33,7 @@ pub fn slept_ns() -> u64 {
     (0..READ_TRIES).map(|_| look()).min().map_or(0, |(_, slept_ns)| slept_ns)
 }
 
-/// For how long it has slept at least, ns, if it was then so late by [`monotonic_ns`]; quicker to tell than [`slept_ns`].
+/// For how long it has slept at least, ns; quicker to tell than [`slept_ns`]. `passed_ns`: a reading of [`monotonic_ns`] just before.
 #[inline]
 pub(crate) fn slept_ns_min(passed_ns: u64) -> u64 {
     passed_ns.saturating_sub(now_ns(libc::CLOCK_MONOTONIC))

@@ -10,6 +10,7 @@ use std::os::fd::{AsRawFd, BorrowedFd, FromRawFd, OwnedFd, RawFd};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How a process is scheduled.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -202,29 +203,47 @@ fn check(result: i32) -> io::Result<()> {
     if result < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
 }
 
-/// Has a process keep these descriptors under their numbers, which it has to be told: see [`adopt`]. They are open in it although each is marked to be
-/// closed there, so no other process that is started meanwhile has them. They have to stay open until it is started.
-pub fn hand_on(command: &mut Command, descriptors: &[OwnedFd]) {
-    let numbers: Vec<RawFd> = descriptors.iter().map(AsRawFd::as_raw_fd).collect();
+/// Numbers of the descriptors that were handed on to this process, with commas.
+const HANDED_ON: &str = "ROHRPOST_HANDED_ON";
+
+/// Has a process that is to be started keep copies of these descriptors: see [`handed_on`]. In this process they stay close-on-exec, so no other one that is
+/// started meanwhile has them; the mark is cleared in that process alone.
+///
+/// # Errors
+/// When there can be no further descriptors.
+pub fn hand_on(command: &mut Command, descriptors: &[OwnedFd]) -> io::Result<()> {
+    let copies = descriptors.iter().map(OwnedFd::try_clone).collect::<io::Result<Vec<_>>>()?;
+    let numbers: Vec<String> = copies.iter().map(|copy| copy.as_raw_fd().to_string()).collect();
+    command.env(HANDED_ON, numbers.join(","));
     let keep = move || {
-        for number in &numbers {
-            // SAFETY: `fcntl` looks up the number and nothing else; one that is not open is an error.
-            let descriptor = unsafe { BorrowedFd::borrow_raw(*number) };
-            fcntl(descriptor, FcntlArg::F_SETFD(FdFlag::empty()))?;
+        for copy in &copies {
+            fcntl(copy, FcntlArg::F_SETFD(FdFlag::empty()))?;
         }
         Ok(())
     };
-    // SAFETY: between fork and exec the closure makes system calls that are safe there (signal-safety(7)), takes no lock and no memory: the numbers were
-    // collected before.
+    // SAFETY: between fork and exec the closure makes system calls that are safe there (signal-safety(7)), and takes no lock and no memory.
     unsafe { command.pre_exec(keep) };
+    Ok(())
 }
 
-/// Takes over a descriptor that whoever started this process has [handed on](hand_on), under this number. Only once: from then on it is closed in processes
-/// that this one starts, as all that this one has opened itself.
-///
-/// # Errors
-/// When nothing was handed on under this number.
-pub fn adopt(number: RawFd) -> io::Result<OwnedFd> {
+/// Has a process that is to be started know of no descriptors: those of this process are not its.
+pub fn hand_nothing_on(command: &mut Command) {
+    command.env_remove(HANDED_ON);
+}
+
+/// Takes over the descriptors that whoever started this process has [handed on](hand_on), in their order; up to the first that is not there. Once: asked again,
+/// there are none.
+pub fn handed_on() -> Vec<OwnedFd> {
+    static WERE_TAKEN: AtomicBool = AtomicBool::new(false);
+    if WERE_TAKEN.swap(true, Ordering::Relaxed) {
+        return Vec::new();
+    }
+    let numbers = std::env::var(HANDED_ON).unwrap_or_default();
+    numbers.split(',').map_while(|number| adopt(number.parse().ok()?).ok()).collect()
+}
+
+/// Takes over a descriptor under this number. From then on it is closed in processes that this one starts, as all that this one has opened itself.
+fn adopt(number: RawFd) -> io::Result<OwnedFd> {
     if number < 0 {
         return Err(io::ErrorKind::InvalidInput.into());
     }
@@ -235,7 +254,8 @@ pub fn adopt(number: RawFd) -> io::Result<OwnedFd> {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("descriptor {number} was not handed on")));
     }
     fcntl(descriptor, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC))?;
-    // SAFETY: it is open, and nobody in this process has it: Rust marks all that it opens to be closed in further processes, and this one was not.
+    // SAFETY: it is open, whoever started this process says that it is ours, and nobody else in this process has taken it: each number is asked for once, and what
+    // this process has opened itself is marked to be closed in further ones, which this one was not.
     Ok(unsafe { OwnedFd::from_raw_fd(number) })
 }
 
@@ -286,14 +306,15 @@ mod tests {
         let kept = [OwnedFd::from(reader)];
         let number = kept[0].as_raw_fd();
         let cat = || {
-            let mut command = Command::new("cat");
-            command.arg(format!("/proc/self/fd/{number}")).stderr(std::process::Stdio::null());
+            let mut command = Command::new("sh");
+            command.args(["-c", "cat /proc/self/fd/${ROHRPOST_HANDED_ON:-$0}", &number.to_string()]);
+            command.stderr(std::process::Stdio::null());
             command
         };
         assert!(!cat().status().unwrap().success(), "it is not open in others");
         assert!(adopt(number).is_err(), "it is of this process, which has opened it");
         let mut command = cat();
-        hand_on(&mut command, &kept);
+        hand_on(&mut command, &kept).unwrap();
         assert_eq!(command.output().unwrap().stdout, b"handed on");
 
         // As in a process that it was handed on to.

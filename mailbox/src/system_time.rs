@@ -24,7 +24,7 @@ const WRITE_TRIES: usize = 8;
 /// The error bound of who does not know the time: 292 years.
 pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
-/// No clock is that slow.
+/// Stands for a rate that is not known.
 const NO_RATE: u64 = i64::MIN.cast_unsigned();
 /// Two readings of how long a computer has slept are off by less.
 const SLEPT_NS_MIN: u64 = 5_000_000;
@@ -115,6 +115,8 @@ pub struct Watched {
     pub slept_ns: u64,
     /// How much faster than its oscillator the first clock was, ns a second; none if that was not known yet.
     pub rate_ppb: Option<i64>,
+    /// Until when the clock is not to be believed, by itself; a time that has passed if it is.
+    pub unsteady_until_ns: u64,
 }
 
 /// System time as one reader computed it.
@@ -169,8 +171,7 @@ pub(crate) struct TimePage {
     padding: AtomicU32,
     /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which its next life takes for a clock that
     /// is not to be believed.
-    watched: [AtomicU64; 5],
-    rest: [AtomicU32; 2],
+    watched: [AtomicU64; 6],
     records: [SharedRecord; 2],
 }
 const _: () = assert!(size_of::<TimePage>() == 192 && std::mem::offset_of!(TimePage, records) == 64);
@@ -312,6 +313,8 @@ impl SystemClock {
 /// Writes a node's system time. There is one: the launch of the node, or the router that hears the master.
 pub struct TimeKeeper {
     mapping: Mapping,
+    /// What this life has noted last.
+    watched: Option<Watched>,
 }
 
 impl TimeKeeper {
@@ -321,7 +324,7 @@ impl TimeKeeper {
     /// When the page cannot be made.
     pub fn begin(node: &Arc<Node>, source: TimeSource, system_ns: u64, pace: f64) -> Result<Self, NodeError> {
         let failed = |error| NodeError::of(&node.path().join("time"), error);
-        let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
+        let keeper = Self { mapping: map(node.path(), true).map_err(failed)?, watched: None };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
         let epoch = page.read().map_or(1, |last| last.record.epoch.saturating_add(1));
@@ -366,7 +369,7 @@ impl TimeKeeper {
     /// When the page cannot be made.
     pub fn resume(node: &Arc<Node>) -> Result<Self, NodeError> {
         let failed = |error| NodeError::of(&node.path().join("time"), error);
-        let keeper = Self { mapping: map(node.path(), true).map_err(failed)? };
+        let keeper = Self { mapping: map(node.path(), true).map_err(failed)?, watched: None };
         let page: &TimePage = keeper.mapping.at(0);
         page.writer_pid.store(std::process::id(), Ordering::Relaxed);
         Ok(keeper)
@@ -381,18 +384,23 @@ impl TimeKeeper {
     /// What was seen last of this computer's clocks, if anything was.
     pub fn watched(&self) -> Option<Watched> {
         let page: &TimePage = self.mapping.at(0);
-        let [local_ns, unslewed_ns, apart_ns, slept_ns, rate] =
+        let [local_ns, unslewed_ns, apart_ns, slept_ns, rate, unsteady_until_ns] =
             page.watched.each_ref().map(|field| field.load(Ordering::Relaxed));
         let rate_ppb = (rate != NO_RATE).then_some(rate.cast_signed());
-        (local_ns > 0).then_some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb })
+        (local_ns > 0).then_some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns })
     }
 
-    /// Notes what was seen, for the next life of whoever writes here.
+    /// Notes what was seen, for the next life of whoever writes here. Records that are written from then on are of this moment: if the computer sleeps before
+    /// one is written, its readers see that.
     pub fn note_watched(&mut self, watched: &Watched) {
-        let Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb } = *watched;
+        if self.watched.replace(*watched) == Some(*watched) {
+            return;
+        }
+        let Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns } = *watched;
         let rate = rate_ppb.map_or(NO_RATE, i64::cast_unsigned);
         let page: &TimePage = self.mapping.at(0);
-        for (field, value) in page.watched.iter().zip([local_ns, unslewed_ns, apart_ns, slept_ns, rate]) {
+        let all = [local_ns, unslewed_ns, apart_ns, slept_ns, rate, unsteady_until_ns];
+        for (field, value) in page.watched.iter().zip(all) {
             field.store(value, Ordering::Relaxed);
         }
     }
@@ -402,7 +410,7 @@ impl TimeKeeper {
     pub fn write(&mut self, record: &TimeRecord) -> bool {
         let page: &TimePage = self.mapping.at(0);
         let last = page.read().map(|last| last.record).filter(|last| last.epoch == record.epoch);
-        page.fill(&Written::now(*record));
+        page.fill(&Written { record: *record, slept_ns: self.watched.map_or_else(slept_ns, |seen| seen.slept_ns) });
         // From here to the turn are nanoseconds, as in `set_pace`.
         let now_ns = monotonic_ns();
         let goes_on = last.is_none_or(|last| last.at(now_ns).ns <= record.at(now_ns).ns);

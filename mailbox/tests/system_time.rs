@@ -146,7 +146,7 @@ fn what_was_seen_of_the_clocks_is_left_to_the_next_writer() {
     let mut keeper = TimeKeeper::resume(&ground.node()).unwrap();
     assert_eq!(keeper.watched(), None);
     for rate_ppb in [None, Some(0), Some(-83_000_000)] {
-        let watched = Watched { local_ns: 5, unslewed_ns: 4, apart_ns: 3, slept_ns: 2, rate_ppb };
+        let watched = Watched { local_ns: 5, unslewed_ns: 4, apart_ns: 3, slept_ns: 2, rate_ppb, unsteady_until_ns: 1 };
         keeper.note_watched(&watched);
         assert_eq!(TimeKeeper::resume(&ground.node()).unwrap().watched(), Some(watched));
     }

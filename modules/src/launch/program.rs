@@ -4,7 +4,7 @@ use crate::runtime::environment;
 use rohrpost_config::{Installation, Module, Program as Configured, Scheduling, find_program};
 use rohrpost_mailbox::sys;
 use std::io::{self, PipeWriter};
-use std::os::fd::{AsRawFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -83,10 +83,9 @@ impl Program {
         if !on {
             command.env(environment::OFF, "1");
         }
-        command.env_remove(environment::KEPT);
-        if !self.kept.is_empty() {
-            let numbers: Vec<String> = self.kept.iter().map(|kept| kept.as_raw_fd().to_string()).collect();
-            sys::hand_on(command.env(environment::KEPT, numbers.join(",")), &self.kept);
+        match self.kept.is_empty() {
+            true => sys::hand_nothing_on(&mut command),
+            false => sys::hand_on(&mut command, &self.kept)?,
         }
         // Launch alone speaks to the service manager.
         for variable in ["NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "JOURNAL_STREAM"] {

@@ -32,8 +32,6 @@ pub(crate) mod environment {
     pub(crate) const RESTARTS: &str = "ROHRPOST_RESTARTS";
     /// Set: it begins switched off, and launch switches it on when it is time.
     pub(crate) const OFF: &str = "ROHRPOST_OFF";
-    /// Numbers of the descriptors that launch keeps for all processes of this module, with commas.
-    pub(crate) const KEPT: &str = "ROHRPOST_KEPT";
     /// So long it keeps its lines of output to itself: those before it said the like and ended soon.
     pub(crate) const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
 }
@@ -41,8 +39,7 @@ pub(crate) mod environment {
 /// What launch keeps for all processes of this module, one after the other, in its order. To be asked for once. Nothing of a module for which it keeps
 /// nothing, and of one that was started by hand.
 pub fn kept() -> Vec<OwnedFd> {
-    let numbers = std::env::var(environment::KEPT).unwrap_or_default();
-    numbers.split(',').filter_map(|number| sys::adopt(number.parse().ok()?).ok()).collect()
+    sys::handed_on()
 }
 
 /// Why a module did not start.

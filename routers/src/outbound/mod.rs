@@ -103,8 +103,8 @@ pub struct Outbound {
     reached: u64,
     /// Those whose way has no room just now, one bit each: they are passed over.
     full: u64,
-    /// Those that hear this life of ours, as far as that has to be waited for, one bit each.
-    awaited: u64,
+    /// Peers to which packages may go since they have said that they hear this life, one bit each; all where that is not waited for.
+    hearing: u64,
     /// What is real time, if this is not: all that leaves leaves at one rate. And how much of it was counted, bytes.
     shares_with: Option<(Arc<Stats>, u64)>,
     /// It sends in time slots only.
@@ -119,6 +119,8 @@ struct Peer {
     /// When it is to be told at the latest that we are still there: if nothing goes to it, and anyway, ns.
     quiet_until_ns: u64,
     tell_ns: u64,
+    /// The life of it that was heard when that was looked at last.
+    life: u64,
 }
 
 impl Outbound {
@@ -141,7 +143,7 @@ impl Outbound {
             acquaintances: None,
             reached: u64::MAX,
             full: 0,
-            awaited: u64::MAX,
+            hearing: u64::MAX,
             shares_with: None,
             in_slots: settings.tdma.is_some(),
             alive_ns: 0,
@@ -154,14 +156,15 @@ impl Outbound {
     /// From now on datagrams are sealed, by who has them sent, and only for those who are known.
     #[must_use]
     pub fn sealed(self, acquaintances: Arc<Acquaintances>) -> Self {
-        Self { reached: 0, acquaintances: Some(acquaintances), ..self }
+        Self { reached: 0, hearing: u64::MAX, acquaintances: Some(acquaintances), ..self }
     }
 
-    /// From now on it sends what is not real time: at the rate that is left by what is, which counts here, and to those peers that have said
-    /// to it that they hear this life. Others take nothing of this life at the port of what is not real time.
+    /// From now on it sends what is not real time, at the rate that what is real time leaves. Where nothing is sealed, a package waits until its
+    /// peer has said that it hears this life: before that the peer takes nothing of it at the port of what is not real time. To be called
+    /// before [`Self::sealed`].
     #[must_use]
     pub fn behind(self, real_time: &Arc<Stats>) -> Self {
-        Self { awaited: 0, shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
+        Self { hearing: 0, shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
     }
 
     /// The ways to these peers, one bit each, have no room just now: what is for them waits, and keeps nobody else waiting.
@@ -214,10 +217,11 @@ impl Outbound {
         !self.queue.is_empty()
     }
 
-    /// Whether so much waits that more is of use only if it is more important: it fills datagrams, and half of what one sender may have.
+    /// Whether so much waits that more is of use only if it is more important: it fills datagrams, and half of what one sender may have. Not
+    /// where all of it waits for peers to which nothing may leave: others must not wait for these.
     pub fn has_plenty(&self) -> bool {
         let enough = (2 * self.datagram_bytes).max(self.settings.network.quota_bytes / 2);
-        self.queue.used_bytes() >= enough as u64
+        self.queue.used_bytes() >= enough as u64 && self.first_level().is_some()
     }
 
     /// Bytes of memory that packages take of those who share a quota with this one.
@@ -341,12 +345,12 @@ impl Outbound {
 
     fn reaches(&self, peer: NodeIndex) -> bool {
         let is_known = self.acquaintances.as_ref().is_none_or(|all| all.reached() & 1 << peer != 0);
-        is_known && self.full & 1 << peer == 0 && self.awaited & 1 << peer != 0
+        is_known && self.full & 1 << peer == 0 && self.hearing & 1 << peer != 0
     }
 
     /// Those to whom something may leave now.
     fn open(&self) -> u64 {
-        if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full & self.awaited }
+        if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full & self.hearing }
     }
 
     /// What is real time has left besides, at the same rate, and has heard of who hears us.
@@ -355,13 +359,13 @@ impl Outbound {
         let bytes = real_time.on_wire_bytes.get();
         self.pace.takes(now_ns, bytes.wrapping_sub(*counted) as usize);
         *counted = bytes;
-        let all = self.settings.peers().fold(0, |all, peer| all | 1 << peer);
-        if self.awaited != all {
-            let hears = |peer: &NodeIndex| real_time.peer(*peer).link.hears_us_ns.get() > 0;
-            let awaited = self.settings.peers().filter(hears).fold(0, |all, peer| all | 1 << peer);
-            if awaited != self.awaited {
-                (self.awaited, self.alive_ns) = (awaited, 0);
-            }
+        if self.acquaintances.is_some() {
+            return;
+        }
+        let hears = |peer: &NodeIndex| real_time.peer(*peer).link.hears_us_ns.get() > 0;
+        let hearing = self.settings.peers().filter(hears).fold(0, |all, peer| all | 1 << peer);
+        if hearing != self.hearing {
+            (self.hearing, self.alive_ns) = (hearing, 0);
         }
     }
 
@@ -371,6 +375,16 @@ impl Outbound {
         let reached = all.reached();
         if reached != self.reached {
             (self.reached, self.alive_ns) = (reached, 0);
+        }
+    }
+
+    /// A peer in a new life is told soon that it is heard: it may wait for that.
+    fn greet_new_lives(&mut self) {
+        for (peer, stats) in self.peers.iter_mut().zip(0..).map(|(peer, node)| (peer, self.stats.peer(node))) {
+            let life = stats.link.incarnation.get();
+            if std::mem::replace(&mut peer.life, life) != life {
+                (peer.tell_ns, self.alive_ns) = (0, 0);
+            }
         }
     }
 
@@ -410,6 +424,7 @@ impl Outbound {
     /// Drops what has waited too long behind others, and what goes to peers that are not there any more.
     fn sweep(&mut self, now_ns: u64, report: &mut impl Report) {
         self.sweep_ns = now_ns + SWEEP_EVERY_NS;
+        self.greet_new_lives();
         for peer in 0..self.settings.nodes.len() as NodeIndex {
             for level in 0..LEVELS as u8 {
                 while let Some(place) = self.queue.first_of(peer, level) {

@@ -112,7 +112,8 @@ pub struct Ticking {
 impl Ticking {
     /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
     pub fn new(settings: TimeSettings, now: Now, left: Left, has_stamps: bool) -> Self {
-        let mut clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, left.record).watching(left.watched);
+        let mut clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, left.record)
+            .watching(now.monotonic_ns, left.watched);
         clock.look_at_clocks(seen(now));
         Self {
             clock,

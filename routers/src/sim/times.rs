@@ -33,6 +33,8 @@ struct Page {
     /// Its clock did what bounds exclude: since when its router can have noticed, true ns; none: it has not run since.
     is_changed: bool,
     noticed_ns: Option<u64>,
+    /// When its router looked last, true ns: who stands still notices nothing.
+    looked_ns: u64,
     /// For how long the computer had slept when that was written.
     slept_ns: u64,
     watched: Option<Watched>,
@@ -80,9 +82,10 @@ impl Times {
         Left { record: self.page(now, node), watched: self.pages.get(node).and_then(|page| page.watched) }
     }
 
-    /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that.
+    /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that, or nobody knows any more what it would say.
     pub fn off_ns(&self, now: Now, node: usize, (digest, term): (u64, Term)) -> Option<u64> {
-        let (line, record) = (self.lines.get(&(digest, term))?, self.pages[node].record?);
+        let line = self.lines.get(&(digest, term)).filter(|line| !line.is_void)?;
+        let record = self.pages[node].record?;
         let off_ns = i128::from(record.at(now.monotonic_ns).ns) - self.at(line, now.true_ns);
         u64::try_from(off_ns.unsigned_abs()).ok()
     }
@@ -109,6 +112,7 @@ impl Times {
         let term = core.reading(now.monotonic_ns).term;
         let page = &mut self.pages[node];
         page.noticed_ns.get_or_insert(now.true_ns);
+        page.looked_ns = now.true_ns;
         (page.slept_ns, page.watched) = (now.slept_ns, core.watched());
         page.record = Some(*core.record());
         if !term.is_none() {
@@ -131,7 +135,7 @@ impl Times {
         }
         let (digest, term) = (page.digest, page.term);
         let is_slewed = self.clocks[node].is_slewed();
-        if page.is_changed && page.noticed_ns.is_none_or(|noticed_ns| now.true_ns < noticed_ns + NOTICED_NS) {
+        if page.is_changed && page.noticed_ns.is_none_or(|noticed_ns| page.looked_ns < noticed_ns + NOTICED_NS) {
             return;
         }
         if is_slewed && record.error_ns < ERROR_UNKNOWN_NS {

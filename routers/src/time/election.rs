@@ -277,11 +277,11 @@ impl Election {
         }
     }
 
-    /// Whether a master that stood still for so long may be none any more, and not find out: others may have begun a time of which they know that
-    /// nobody else has one, in lives that this node does not know and so does not hear.
+    /// Whether this node is a master that stood still for so long that others may have begun another time meanwhile. They may have done so in new
+    /// lives; with keys this node does not hear these before they have greeted each other.
     pub(super) fn may_be_forgotten(&self, stood_ns: u64) -> bool {
         let is_alone = self.masters.len() < 2;
-        matches!(self.state, State::Master(_)) && !is_alone && stood_ns > self.begins_after_ns.saturating_mul(2)
+        matches!(self.state, State::Master(_)) && !is_alone && stood_ns > self.begins_after_ns
     }
 
     /// Somebody that has time sent in the place of the master.

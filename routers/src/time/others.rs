@@ -27,9 +27,9 @@ struct Other {
     heard_ns: u64,
     /// This node says nothing before that, local ns.
     until_ns: u64,
-    /// The same for what it said of time alone: who follows it goes on for a while without it, whatever became of it.
+    /// The same because of what it said of time alone: who follows it goes on sending for a while, also if it stops.
     follows_until_ns: u64,
-    /// When it has shown last that it lives and says what time it is, local ns; 0: never.
+    /// When it has shown last that it lives and says what time it is, and this node yielded, local ns; 0: never.
     told_ns: u64,
 }
 
@@ -69,14 +69,15 @@ impl Others {
         if local_ns.saturating_sub(other.heard_ns) > APART_NS {
             other.since_ns = local_ns;
         }
-        (other.heard_ns, other.told_ns) = (local_ns, local_ns);
+        other.heard_ns = local_ns;
         if (theirs > own && !broken!(NeverYieldsToOthers)) || local_ns.saturating_sub(other.since_ns) > grace_ns {
+            other.told_ns = local_ns;
             other.follows(local_ns);
         }
     }
 
-    /// The same, of a node that has not shown now that it lives: it has, shortly before, and this one says nothing because of that. So what somebody
-    /// has kept of it silences this node no longer than a refusal.
+    /// The same, of a node that has not shown now that it lives. It counts if the node has shown that lately, and this one says nothing because of it:
+    /// so what somebody has kept of it silences this node no longer than a refusal.
     pub(super) fn overhears(&mut self, node: NodeIndex, local_ns: u64, digest: u64) {
         let other = self.all.get_mut(usize::from(node)).and_then(Option::as_mut);
         let told_lately = |other: &&mut Other| local_ns.saturating_sub(other.told_ns) < REFUSED_NS - YIELDS_NS;

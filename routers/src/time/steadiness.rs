@@ -39,6 +39,9 @@ pub enum Unsteady {
         /// About so long.
         slept_ns: u64,
     },
+    /// Shortly before this router was started, its earlier life found one of the others.
+    #[error("shortly before this router was started the computer slept, or its clock was slewed")]
+    Before,
     /// A time daemon slews it.
     #[error("its clock is slewed, by {} ppm: end the time daemon of this computer (`rohrpost doctor` names it)", rate_ppb / 1_000)]
     Slewed {
@@ -63,25 +66,20 @@ pub(crate) struct Steadiness {
 impl Steadiness {
     /// Goes on from what an earlier life has seen.
     pub(crate) fn of(watched: Option<Watched>) -> Self {
-        let Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb }) = watched else {
+        let Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns: until_ns }) =
+            watched
+        else {
             return Self::default();
         };
         let began = Some(Looked { local_ns, unslewed_ns, apart_ns, slept_ns });
-        let seen = Self { began, rate_ppb, slept_ns: Some(slept_ns), ..Self::default() };
-        match rate_ppb.filter(|rate_ppb| rate_ppb.abs() > LIMITS.slewed_ppb) {
-            // Who slewed it then may go on.
-            Some(rate_ppb) => {
-                let until_ns = local_ns.saturating_add(STEADY_AFTER_NS);
-                Self { why: Some(Unsteady::Slewed { rate_ppb }), until_ns, ..seen }
-            }
-            None => seen,
-        }
+        Self { began, rate_ppb, slept_ns: Some(slept_ns), until_ns, why: Some(Unsteady::Before) }
     }
 
     /// What the next life goes on from.
     pub(crate) fn watched(&self) -> Option<Watched> {
         let Looked { local_ns, unslewed_ns, apart_ns, .. } = self.began?;
-        Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns: self.slept_ns?, rate_ppb: self.rate_ppb })
+        let (slept_ns, rate_ppb, unsteady_until_ns) = (self.slept_ns?, self.rate_ppb, self.until_ns);
+        Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns })
     }
 
     /// Looks at the clocks; what is wrong, if this look shows that something is.
@@ -198,9 +196,11 @@ mod tests {
             assert_eq!(computer.steadiness.look(computer.now).is_some(), is_seen, "{gained_ns}, {slept_ns}");
         }
         let mut slewed = Computer::new();
-        while slewed.runs(SPAN_NS, 300_000).is_none() || slewed.steadiness.rate_ppb.is_none() {}
+        assert!(slewed.runs(SPAN_NS, 300_000).is_some());
         let next = Steadiness::of(slewed.steadiness.watched());
-        assert!(next.why(slewed.now.local_ns).is_some(), "who slewed it may go on");
+        let now_ns = slewed.now.local_ns;
+        assert_eq!(next.why(now_ns).map(|(why, _)| why), Some(Unsteady::Before), "who slewed it may go on");
+        assert_eq!(next.why(now_ns + STEADY_AFTER_NS + MS), None);
         assert_eq!(Steadiness::of(None).watched(), None);
     }
 

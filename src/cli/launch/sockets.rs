@@ -13,7 +13,6 @@ pub(super) fn of(installation: Arc<Installation>, node: String) -> impl Fn(&Modu
         let others = installation.lan_nodes().iter().filter(|other| other.name != node);
         let peers: Vec<_> = others.filter_map(|other| other.address).collect();
         let rest = installation.tdma.is_none().then(|| network.rest_port());
-        // Those that cannot be made now each process of the router makes itself, or says why it cannot.
-        rohrpost_routers::shell::listen(address, (network.port, rest), &peers).unwrap_or_default()
+        rohrpost_routers::shell::listen(address, (network.port, rest), &peers)
     }
 }

@@ -177,8 +177,8 @@ impl Flood {
             let (began, mut sent_bytes) = (Instant::now(), 0);
             Ok(move |message: &[u8]| {
                 let may_bytes = (began.elapsed().as_secs_f64() * bytes_s as f64) as u64;
-                // What it could not send before is not made up for at once, as a router does not.
-                sent_bytes = may_bytes.saturating_sub(bytes_s / 1_000).max(sent_bytes);
+                // A lull is made up for, as a router's queue lasts longer; more is not.
+                sent_bytes = may_bytes.saturating_sub((LULL.as_secs_f64() * bytes_s as f64) as u64).max(sent_bytes);
                 let may = sent_bytes <= may_bytes;
                 if may {
                     Inlet::send(&mut socket, message)?;

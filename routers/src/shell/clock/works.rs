@@ -108,7 +108,7 @@ impl Works {
         let local = LocalClock::new(skew);
         let page = keeper.as_ref().and_then(TimeKeeper::record);
         let watched = keeper.as_ref().and_then(TimeKeeper::watched);
-        let clock = Clock::new(settings, local.now_ns(), realtime_ns(), page).watching(watched);
+        let clock = Clock::new(settings, local.now_ns(), realtime_ns(), page).watching(local.now_ns(), watched);
         let snapshot = Snapshot::of(&clock, local.now_ns());
         let mut works = Self {
             clock,

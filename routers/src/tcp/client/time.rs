@@ -96,15 +96,15 @@ mod tests {
                 time.told(now_ns, Some(told(now_ns, ahead_ns)), answers);
             }
         };
-        let now_ns = monotonic_ns();
-        let before = Looked { local_ns: now_ns, unslewed_ns: 7, ..Looked::default() };
+        let before = looked();
+        let now_ns = before.local_ns;
         assert!(time.is_steady_by(before));
         tells(&mut time, now_ns, SECOND_NS);
         let page = SystemClock::open(&node);
         assert_eq!(page.record().unwrap().error_ns, 10_000_000);
         // An hour by clocks that count it, with an error of a second.
         let slept_ns = 3_600 * SECOND_NS;
-        let after = Looked { local_ns: now_ns + slept_ns, slept_ns, ..before };
+        let after = Looked { local_ns: now_ns + slept_ns, slept_ns: before.slept_ns + slept_ns, ..before };
         assert!(!time.is_steady_by(after));
         time.told(after.local_ns, None, 4);
         let record = page.record().unwrap();

@@ -16,8 +16,11 @@ impl Clock {
 
     /// Goes on watching where an earlier life has ended; for a clock that is new.
     #[must_use]
-    pub fn watching(mut self, watched: Option<Watched>) -> Self {
+    pub fn watching(mut self, now_ns: u64, watched: Option<Watched>) -> Self {
         self.steadiness = Steadiness::of(watched);
+        if self.is_unsteady(now_ns) {
+            self.distrust(now_ns);
+        }
         self
     }
 
