@@ -325,6 +325,10 @@ impl Clock {
             self.forget();
             self.hello_ns = now_ns;
         }
+        // What kept it from speaking may have been a refusal that is over, since its node was heard.
+        if self.election.waits(now_ns) && !self.is_parted(now_ns) && !self.is_unsteady(now_ns) {
+            self.election.waits_no_longer(now_ns);
+        }
         let origin = self.origin(now_ns);
         if let Some(term) = self.election.takes_over(now_ns, origin) {
             self.reign(now_ns, term, origin);

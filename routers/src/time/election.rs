@@ -305,6 +305,16 @@ impl Election {
         (self.state, self.quiet_since_ns, self.lost) = (State::Listening, now_ns, None);
     }
 
+    /// Whether it begins to listen only at some time to come.
+    pub(super) fn waits(&self, now_ns: u64) -> bool {
+        self.state == State::Listening && self.quiet_since_ns > now_ns
+    }
+
+    /// Nothing keeps it from speaking any more: it listens from now on.
+    pub(super) fn waits_no_longer(&mut self, now_ns: u64) {
+        self.quiet_since_ns = self.quiet_since_ns.min(now_ns);
+    }
+
     pub(super) fn speaks_of(&mut self, term: Term, epoch: u64) {
         self.highest = self.highest.max(term);
         self.highest_epoch = self.highest_epoch.max(epoch);
