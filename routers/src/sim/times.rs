@@ -82,10 +82,9 @@ impl Times {
         Left { record: self.page(now, node), watched: self.pages.get(node).and_then(|page| page.watched) }
     }
 
-    /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that, or nobody knows any more what it would say.
+    /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that.
     pub fn off_ns(&self, now: Now, node: usize, (digest, term): (u64, Term)) -> Option<u64> {
-        let line = self.lines.get(&(digest, term)).filter(|line| !line.is_void)?;
-        let record = self.pages[node].record?;
+        let (line, record) = (self.lines.get(&(digest, term))?, self.pages[node].record?);
         let off_ns = i128::from(record.at(now.monotonic_ns).ns) - self.at(line, now.true_ns);
         u64::try_from(off_ns.unsigned_abs()).ok()
     }
