@@ -84,8 +84,20 @@ const KEYS: [&str; 13] = [
 ];
 
 /// Units of which there may be none.
-const COUNTS: [&str; 11] =
-    ["a send", "%", "slots", "packages", "in 1e5 cycles", "us in", "ms/s", "a second", "KiB", "of ordinary", "of bare"];
+const COUNTS: [&str; 12] = [
+    "a send",
+    "%",
+    "slots",
+    "packages",
+    "in 1e5 cycles",
+    "us in",
+    "ms/s",
+    "a second",
+    "KiB",
+    "of ordinary",
+    "of bare",
+    "of no junk",
+];
 
 /// Keys are there; figures are times or rates that can be; ratios are there where both have figures.
 pub(crate) fn check_row(row: &Map<String, Value>) {
