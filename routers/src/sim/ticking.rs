@@ -52,8 +52,8 @@ struct Told {
     term: Term,
     /// It is of another configuration, and so of another table.
     is_other: bool,
-    /// How long it was on its way, from where it was handed over, ns.
-    way_ns: u64,
+    /// How long it was on its way, from where it was handed over, ns; none where nobody knows what time it is by its term.
+    way_ns: Option<u64>,
     /// When it came, true ns.
     came_ns: u64,
 }
@@ -73,9 +73,9 @@ fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &Me
         Message::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
         _ => return None,
     };
-    let now_ns = io.book.times.of_term_ns(io.now, (head.digest, term))?;
     let came_ns = arrived.stamp.true_ns;
-    let way_ns = now_ns.saturating_sub(sent_ns).saturating_sub(io.now.true_ns - came_ns);
+    let now_ns = io.book.times.of_term_ns(io.now, (head.digest, term));
+    let way_ns = now_ns.map(|now_ns| now_ns.saturating_sub(sent_ns).saturating_sub(io.now.true_ns - came_ns));
     Some(Told { term, is_other: head.digest != own, way_ns, came_ns })
 }
 
@@ -87,9 +87,10 @@ fn note(all: &mut VecDeque<Told>, told: Told) {
     }
 }
 
-fn are_late(told: &VecDeque<Told>, now: Now, way_ns: u64) -> bool {
+/// Whether all of them were on their way for longer, or may have been.
+fn are_late(told: &VecDeque<Told>, now: Now, most_ns: u64) -> bool {
     let drifted_ns = |told: &Told| (now.true_ns - told.came_ns) * 2 * RATE_MAX_PPB.unsigned_abs() / S;
-    told.iter().all(|told| told.way_ns + drifted_ns(told) > way_ns)
+    told.iter().all(|told| told.way_ns.is_none_or(|way_ns| way_ns + drifted_ns(told) > most_ns))
 }
 
 /// One life of a router's time.

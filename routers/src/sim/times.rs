@@ -17,7 +17,8 @@ const NOTICED_NS: u64 = 120_000_000;
 struct Line {
     node: usize,
     record: TimeRecord,
-    shift_ns: i128,
+    /// None: it goes on from one that nobody knows.
+    shift_ns: Option<i128>,
     /// Its master's clock did meanwhile what bounds exclude: nobody knows any more what it would say.
     is_void: bool,
 }
@@ -85,14 +86,14 @@ impl Times {
     /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that.
     pub fn off_ns(&self, now: Now, node: usize, (digest, term): (u64, Term)) -> Option<u64> {
         let (line, record) = (self.lines.get(&(digest, term))?, self.pages[node].record?);
-        let off_ns = i128::from(record.at(now.monotonic_ns).ns) - self.at(line, now.true_ns);
+        let off_ns = i128::from(record.at(now.monotonic_ns).ns) - self.at(line, now.true_ns)?;
         u64::try_from(off_ns.unsigned_abs()).ok()
     }
 
     /// What time it is by the master of a term of a configuration, ns; none if nobody began that.
     pub fn of_term_ns(&self, now: Now, (digest, term): (u64, Term)) -> Option<u64> {
         let line = self.lines.get(&(digest, term)).filter(|line| !line.is_void)?;
-        Some(line.record.at(self.clocks[line.node].at(now.true_ns).monotonic_ns).ns)
+        Some(self.of_line_ns(line, now.true_ns))
     }
 
     /// A node's clock does what bounds exclude. What time it is by those terms in which it is master, nobody can say any more.
@@ -142,8 +143,8 @@ impl Times {
             return problems.push(broken(Promise::TimeBound, text));
         }
         let line = self.lines.get(&(digest, term)).filter(|line| !line.is_void && record.error_ns < ERROR_UNKNOWN_NS);
-        let Some(line) = line else { return };
-        let off_ns = (i128::from(time.ns) - self.at(line, now.true_ns)).unsigned_abs();
+        let Some(line_ns) = line.and_then(|line| self.at(line, now.true_ns)) else { return };
+        let off_ns = (i128::from(time.ns) - line_ns).unsigned_abs();
         if off_ns > time.error.as_nanos() {
             let text = format!("node {node} is {off_ns} ns off the time of {term:?}, and says {time:?}");
             problems.push(broken(Promise::TimeBound, text));
@@ -151,8 +152,13 @@ impl Times {
         self.worst_ns = (self.worst_ns.0.max(record.error_ns), self.worst_ns.1.max(off_ns as u64));
     }
 
-    fn at(&self, line: &Line, true_ns: u64) -> i128 {
-        i128::from(line.record.at(self.clocks[line.node].at(true_ns).monotonic_ns).ns) + line.shift_ns
+    fn at(&self, line: &Line, true_ns: u64) -> Option<i128> {
+        Some(i128::from(self.of_line_ns(line, true_ns)) + line.shift_ns?)
+    }
+
+    /// What its master says.
+    fn of_line_ns(&self, line: &Line, true_ns: u64) -> u64 {
+        line.record.at(self.clocks[line.node].at(true_ns).monotonic_ns).ns
     }
 
     /// A master that was none before begins a term, which goes on from the time before unless an epoch began.
@@ -165,13 +171,13 @@ impl Times {
             }
             return;
         }
-        let mut line = Line { node, record, shift_ns: 0, is_void: self.clocks[node].is_slewed() };
+        let mut line = Line { node, record, shift_ns: Some(0), is_void: self.clocks[node].is_slewed() };
         let page = self.pages[node];
         if let (Some(before), Some(old)) = (self.lines.get(&(page.digest, page.term)), page.record)
             && old.epoch == record.epoch
         {
-            line.is_void |= before.is_void;
-            line.shift_ns = self.at(before, now.true_ns) - self.at(&line, now.true_ns);
+            let before_ns = self.at(before, now.true_ns).filter(|_| !before.is_void);
+            line.shift_ns = before_ns.map(|before_ns| before_ns - i128::from(self.of_line_ns(&line, now.true_ns)));
         }
         self.lines.insert((digest, term), line);
     }
