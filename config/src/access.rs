@@ -99,38 +99,11 @@ fn told(installation: &Installation, module: &Module, to: Name, access: &Access)
 mod tests {
     use super::*;
 
-    const FILE: &str = r#"
-installation = "guarded"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-motor = { id = 200 }
-pilot = { id = 140 }
-tool = { id = 16 }
-[network]
-security = "none"
-[time]
-source = "master"
-[nodes.base]
-address = "10.77.0.1"
-tools = [0, 3]
-[nodes.desk]
-address = "10.77.0.2"
-tools = [4, 7]
-[access]
-motor = ["pilot"]
-[[module]]
-name = "motor.0"
-node = "base"
-program = "motor"
-optional = true
-"#;
+    const FILE: &str = include_str!("../tests/two_nodes.toml");
 
     #[test]
     fn a_class_with_a_rule_is_commanded_by_those_listed_and_by_launch_of_its_node() {
-        let installation = Installation::parse(FILE, "guarded.toml".as_ref()).unwrap();
+        let installation = Installation::parse(FILE, "two_nodes.toml".as_ref()).unwrap();
         let motor = Name::new(1, 200, 0, 0);
         let line = 1 + FILE.lines().position(|line| line.starts_with("motor = [")).unwrap();
         for (from, to, refused, why) in [

@@ -123,14 +123,10 @@ impl Page<'_> {
             None => format!("at most {} a second", size_text(network.rate_bytes_s)),
             Some(_) => "in its time slots only".into(),
         };
-        let ports = match &self.installation.tdma {
-            None => format!(
-                "{} (packages), {} (time) and {} (packages that are not real time)",
-                network.port,
-                network.time_port(),
-                network.rest_port()
-            ),
-            Some(_) => format!("{} (packages) and {} (time)", network.port, network.time_port()),
+        let (port, time_port) = (network.port, network.time_port());
+        let ports = match self.installation.rest_port() {
+            Some(rest) => format!("{port} (packages), {time_port} (time) and {rest} (packages that are not real time)"),
+            None => format!("{port} (packages) and {time_port} (time)"),
         };
         self.entry(
             "network",

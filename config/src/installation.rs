@@ -147,6 +147,11 @@ impl Installation {
         self.scheduling.real_time_from
     }
 
+    /// The UDP port of what is not real time, where that goes its own way. In time slots all goes by one port, by its level.
+    pub fn rest_port(&self) -> Option<u16> {
+        self.network.filter(|_| self.tdma.is_none()).map(|network| network.rest_port())
+    }
+
     /// A path of the file as the process sees it: relative ones start from the file's folder.
     pub fn resolve(&self, path: impl AsRef<Path>) -> PathBuf {
         self.folder.join(path)

@@ -68,6 +68,14 @@ pub enum Security {
 }
 
 impl Security {
+    /// As the file writes it.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Keys => "keys",
+        }
+    }
+
     /// Bytes behind what each datagram says.
     pub const fn tag_bytes(self) -> usize {
         match self {
@@ -191,7 +199,8 @@ fn read_security(section: &Section<'_>) -> Security {
         section.report(format!("`security` is missing; {CHOICES}"));
         return Security::None;
     };
-    item.choice(&[("keys", Security::Keys), ("none", Security::None)]).unwrap_or(Security::None)
+    item.choice(&[Security::Keys, Security::None].map(|security| (security.as_str(), security)))
+        .unwrap_or(Security::None)
 }
 
 /// The folder with the keys; none if nothing is sealed.

@@ -50,44 +50,11 @@ impl Installation {
 mod tests {
     use super::*;
 
-    const FILE: &str = r#"
-installation = "shared"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-motor = { id = 200 }
-laser = { id = 150 }
-pilot = { id = 140 }
-tool = { id = 16 }
-[network]
-security = "none"
-[time]
-source = "master"
-[nodes.base]
-address = "10.77.0.1"
-tools = [0, 3]
-[nodes.desk]
-address = "10.77.0.2"
-tools = [4, 7]
-[[module]]
-name = "motor.0"
-faces = ["laser.0"]
-node = "base"
-program = "motor"
-optional = true
-[[module]]
-name = "pilot.0"
-node = "desk"
-program = "pilot"
-optional = true
-calls = ["motor.0"]
-"#;
+    const FILE: &str = include_str!("../tests/two_nodes.toml");
 
     #[test]
     fn each_name_uses_the_share_of_one_principal() {
-        let installation = Installation::parse(FILE, "shared.toml".as_ref()).unwrap();
+        let installation = Installation::parse(FILE, "two_nodes.toml".as_ref()).unwrap();
         let (motor, pilot) = (Name::new(1, 200, 0, 0), Name::new(1, 140, 0, 0));
         for (name, principal, why) in [
             (motor, Principal::Module(motor), "a module"),

@@ -114,6 +114,10 @@ fn what_a_file_means_can_be_read_by_programs() {
     assert_eq!((&motor["name"], &motor["scheduling"]["fifo"]), (&"motor.0".into(), &25.into()));
     assert_eq!(motor["mailboxes"]["commands"]["max_age_ms"], 300.0);
     assert_eq!(json["missing_programs"][0]["module"], "motor.0");
+    // The opposite of what it says of itself.
+    std::fs::write(place.path("sealed.toml"), full.replace("security = \"none\"", "security = \"keys\"")).unwrap();
+    let json_of_sealed = place.say(&["check", "sealed.toml", "--json"]).json();
+    assert_eq!(json_of_sealed["installation"]["network"]["security"], "keys");
     let json = place.say(&["check", "full.toml", "--json", "--node", "desk"]).json();
     assert_eq!(json["installation"]["nodes"].as_array().unwrap().len(), 1, "one node only");
     // Why a picture may wait is told to people and programs alike.

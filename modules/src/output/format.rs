@@ -121,34 +121,7 @@ mod tests {
     use rohrpost_mailbox::Name;
     use std::path::Path;
 
-    const CONFIG: &str = r#"
-installation = "said"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-motor = { id = 200 }
-laser = { id = 150 }
-output = { id = 32 }
-tool = { id = 16 }
-[network]
-security = "none"
-[time]
-source = "master"
-[nodes.base]
-address = "10.77.0.1"
-tools = [0, 3]
-[nodes.desk]
-address = "10.77.0.2"
-tools = [4, 7]
-[[module]]
-name = "motor.0"
-faces = ["laser.0"]
-node = "base"
-program = "motor"
-optional = true
-"#;
+    const CONFIG: &str = include_str!("../../../config/tests/two_nodes.toml");
 
     fn line(module: Name, text: &str) -> OutputLine {
         OutputLine {
@@ -164,7 +137,7 @@ optional = true
 
     #[test]
     fn a_line_has_its_time_node_level_and_module() {
-        let installation = Installation::parse(CONFIG, Path::new("said.toml")).unwrap();
+        let installation = Installation::parse(CONFIG, Path::new("two_nodes.toml")).unwrap();
         let format = Format::new(&installation);
         let motor = line(Name::new(1, 200, 0, 0), "is on");
         assert_eq!(format.short(&motor), "00:00:05.006 warn  base/motor.0: is on");
@@ -187,7 +160,7 @@ optional = true
 
     #[test]
     fn only_a_line_of_output_begins_a_line() {
-        let installation = Installation::parse(CONFIG, Path::new("said.toml")).unwrap();
+        let installation = Installation::parse(CONFIG, Path::new("two_nodes.toml")).unwrap();
         let format = Format::new(&installation);
         let said = "panicked at a.rs:1:2:\nred \x1b[31m\u{202e}\r\nand\ttab";
         let text = format.short(&line(Name::new(1, 200, 0, 0), said));
@@ -204,7 +177,7 @@ optional = true
         let (head, module) = CONFIG.split_once("[network]").unwrap();
         let (_, module) = module.split_once("[[module]]").unwrap();
         let text = format!("{head}[time]\nsource = \"log\"\n[nodes.base]\n[[module]]{module}");
-        let installation = Installation::parse(&text, Path::new("said.toml")).unwrap();
+        let installation = Installation::parse(&text, Path::new("two_nodes.toml")).unwrap();
         let format = Format::new(&installation);
         let told = OutputLine { lost: 3, suppressed: 12, ..line(Name::new(1, 200, 0, 0), "… \"x\"") };
         let expected = concat!(

@@ -39,8 +39,8 @@ impl Cause {
             Self::OtherPublisher => Some("the subscription follows another module"),
             Self::OtherNumber => Some("the subscription is to other data of that module"),
             Self::EarlierIncarnation => Some(
-                "a later incarnation of it has called before. If this goes on, two programs have that name: end one of them; or its computer's \
-                 clock was set back before its node was launched: set it right, and launch that again",
+                "a later incarnation of it has called before. If this goes on, either two programs have that name: end one of them. Or its \
+                 computer's clock was set back before its node was launched: set the clock right, and launch that node again",
             ),
             Self::EarlierLife => None,
         }

@@ -57,7 +57,7 @@ pub(super) fn installation(installation: &Installation, only: Option<&str>, miss
             "name": name,
             "system": { "id": system.id, "name": system.name },
             "time": time(installation),
-            "network": installation.network.map(network),
+            "network": installation.network.map(|it| network(installation, it)),
             "tdma": installation.tdma.as_ref().map(|tdma| self::tdma(installation, tdma)),
             "digest": installation.digest().to_string(),
             "parameters": installation.parameters,
@@ -125,11 +125,12 @@ fn scheduling(scheduling: Scheduling) -> Value {
     }
 }
 
-fn network(network: Network) -> Value {
+/// `rest_port`: null where there are time slots.
+fn network(installation: &Installation, network: Network) -> Value {
     json!({
-        "security": "none", "port": network.port, "time_port": network.time_port(), "rest_port": network.rest_port(), "mtu": network.mtu,
-        "datagram_bytes_max": network.datagram_bytes_max, "rate_bytes_s": network.rate_bytes_s,
-        "quota_bytes": network.quota_bytes, "bulk_below": network.bulk_below,
+        "security": network.security.as_str(), "port": network.port, "time_port": network.time_port(),
+        "rest_port": installation.rest_port(), "mtu": network.mtu, "datagram_bytes_max": network.datagram_bytes_max,
+        "rate_bytes_s": network.rate_bytes_s, "quota_bytes": network.quota_bytes, "bulk_below": network.bulk_below,
     })
 }
 

@@ -12,7 +12,6 @@ pub(super) fn of(installation: Arc<Installation>, node: String) -> impl Fn(&Modu
         let (Some(network), Some(address)) = (network, address) else { return Vec::new() };
         let others = installation.lan_nodes().iter().filter(|other| other.name != node);
         let peers: Vec<_> = others.filter_map(|other| other.address).collect();
-        let rest = installation.tdma.is_none().then(|| network.rest_port());
-        rohrpost_routers::shell::listen(address, (network.port, rest), &peers)
+        rohrpost_routers::shell::listen(address, (network.port, installation.rest_port()), &peers)
     }
 }

@@ -178,39 +178,12 @@ mod tests {
     use super::*;
     use crate::common::OutputLevel;
 
-    const FILE: &str = r#"
-installation = "said"
-[system]
-name = "robot"
-id = 1
-[classes]
-router = { id = 250 }
-motor = { id = 200 }
-laser = { id = 150 }
-output = { id = 32 }
-tool = { id = 16 }
-[network]
-security = "none"
-[time]
-source = "master"
-[nodes.base]
-address = "10.77.0.1"
-tools = [0, 3]
-[nodes.desk]
-address = "10.77.0.2"
-tools = [4, 7]
-[[module]]
-name = "motor.0"
-faces = ["laser.0"]
-node = "base"
-program = "motor"
-optional = true
-"#;
+    const FILE: &str = include_str!("../../../../config/tests/two_nodes.toml");
     const MOTOR: Name = Name::new(1, 200, 0, 0);
     const NOW: Came = Came { mono_ns: 1000 * SECOND_NS, time_ns: 1_700_000_000 * SECOND_NS };
 
     fn installation() -> Installation {
-        Installation::parse(FILE, "said.toml".as_ref()).unwrap()
+        Installation::parse(FILE, "two_nodes.toml".as_ref()).unwrap()
     }
 
     fn line(module: Name) -> OutputLine {

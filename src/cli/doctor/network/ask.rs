@@ -24,8 +24,7 @@ const ATF_COM: u32 = 0x2;
 pub(in crate::cli::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> Option<Lan> {
     let (network, address) = (installation.network?, node.address?);
     let is_here = UdpSocket::bind((address, 0)).is_ok();
-    let rest = installation.tdma.is_none().then(|| network.rest_port());
-    let ports = [Some(network.port), Some(network.time_port()), rest].into_iter().flatten();
+    let ports = [Some(network.port), Some(network.time_port()), installation.rest_port()].into_iter().flatten();
     let ports = ports
         .map(|number| Port { number, state: if is_here { try_port(address, number) } else { PortState::Unknown } })
         .collect();
