@@ -97,7 +97,7 @@ fn what_a_file_means_can_be_read_by_programs() {
     let place = Place::new();
     // Every key there is; its settings are none that the builtin mapper knows.
     let full = include_str!("../../config/tests/full.toml").replace("builtin = \"mapper\"", "program = \"./mapper\"");
-    std::fs::write(place.path("full.toml"), full).unwrap();
+    std::fs::write(place.path("full.toml"), &full).unwrap();
     let json = place.say(&["check", "full.toml", "--json"]).json();
     assert_eq!((&json["right"], &json["installation"]["name"]), (&true.into(), &"two-computers".into()));
     let base = &json["installation"]["nodes"][0];
