@@ -292,7 +292,7 @@ fn networks_of_unsteady_clocks_keep_their_promises() {
 /// Have shown bugs, of the core or of what judges it, that thousands of such networks seldom show.
 #[test]
 fn slotted_networks_of_unsteady_clocks_that_broke_a_promise_once_keep_it() {
-    for seed in [3804, 4666] {
+    for seed in [3804, 4630, 4666] {
         let outcome = run(Plan::unsteady_slotted(seed), guard, false);
         assert!(outcome.problems.is_empty(), "{}", told("slotted_networks_of_unsteady", seed, &outcome.problems[0]));
     }

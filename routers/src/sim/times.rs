@@ -83,11 +83,10 @@ impl Times {
         Left { record: self.page(now, node), watched: self.pages.get(node).and_then(|page| page.watched) }
     }
 
-    /// How far a node's page is off the time of a term of a configuration, ns; none if nobody began that.
+    /// How far a node's page is off what the master of a term of a configuration says, ns; none if nobody began that.
     pub fn off_ns(&self, now: Now, node: usize, (digest, term): (u64, Term)) -> Option<u64> {
         let (line, record) = (self.lines.get(&(digest, term))?, self.pages[node].record?);
-        let off_ns = i128::from(record.at(now.monotonic_ns).ns) - self.at(line, now.true_ns)?;
-        u64::try_from(off_ns.unsigned_abs()).ok()
+        Some(record.at(now.monotonic_ns).ns.abs_diff(self.of_line_ns(line, now.true_ns)))
     }
 
     /// What time it is by the master of a term of a configuration, ns; none if nobody began that.
