@@ -27,6 +27,14 @@ fn send(robot: &Robot, tool: &mut ToolLink, from: Name, line: &OutputLine) -> bo
     tool.link.send(robot.name("output.0").with_local(LINES), &label, &[&body]).is_ok()
 }
 
+/// The log as soon as it has this: `output` tells a refusal by a line of its own, which comes the way of all lines.
+fn told(place: &Place, words: &str) -> String {
+    wait(words, || {
+        let log = place.say(&["log"]).ok();
+        log.contains(words).then_some(log)
+    })
+}
+
 #[test]
 fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
     let place = Place::new();
@@ -52,13 +60,12 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
     }
     let expected = RefusedLines { foreign_name: 2, other_system: 2, ahead: 1, losses: 1, ..RefusedLines::default() };
     wait("all were judged", || (refused(&robot, &mut tool) == expected).then_some(()));
-    let log = place.say(&["log"]).ok();
+    let log = told(&place, "lines in the name of others were dropped");
     assert!(!log.contains("forged") && !log.contains("by another system"), "{log}");
     assert!(log.contains(": said in its own name"), "{log}");
     assert!(log.contains("(says that it is of 2554-07-21T23:34:33.709551Z) said in the future"), "{log}");
     assert!(log.contains("(says that 4000000000 lines were lost) said after many"), "{log}");
     assert!(!log.contains("… 4000000000"), "{log}");
-    assert!(log.contains("lines in the name of others were dropped"), "it is told: {log}");
     tool.close();
     launch.stop();
 }
@@ -80,11 +87,10 @@ fn who_says_lines_without_end_has_its_share_and_what_others_said_stays() {
         (0..5000).for_each(|_| _ = send(&robot, &mut tool, me, &line));
         (refused(&robot, &mut tool).beyond_share > 0).then_some(())
     });
-    let after = place.say(&["log"]).ok();
+    let after = told(&place, "more than the share of whoever says tool.");
     let noise = after.lines().filter(|line| line.ends_with("noise")).count();
     assert!(noise > RING / 2 && noise < RING, "{noise} of {RING}");
     assert!(of_probe.iter().all(|line| after.contains(line)), "{before}\n{after}");
-    assert!(after.contains("more than the share of whoever says tool."), "{after}");
     tool.close();
     launch.stop();
 }
