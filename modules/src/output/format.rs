@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn json_has_all_there_is() {
         let (head, module) = CONFIG.split_once("[network]").unwrap();
-        let (_, module) = module.split_once("[[module]]").unwrap();
+        let module = module.split("[[module]]").nth(1).unwrap();
         let text = format!("{head}[time]\nsource = \"log\"\n[nodes.base]\n[[module]]{module}");
         let installation = Installation::parse(&text, Path::new("two_nodes.toml")).unwrap();
         let format = Format::new(&installation);
