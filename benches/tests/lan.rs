@@ -14,7 +14,7 @@ const CBWARE: &str = "CBWare, its table";
 const HOP: &[&str] = &["chain", "chain of mailboxes", "udp"];
 
 /// The cases: a size, and who is in it besides ours.
-const CASES: [(&str, u64, &[&str]); 18] = [
+const CASES: [(&str, u64, &[&str]); 19] = [
     ("hop", 64, HOP),
     ("hop", 1024, HOP),
     ("hop", 16_384, HOP),
@@ -31,6 +31,7 @@ const CASES: [(&str, u64, &[&str]); 18] = [
     ("rate", 62_000, &["udp"]),
     ("packing", 64, &["udp"]),
     ("urgent", 64, &["no flood"]),
+    ("urgent-saturated", 64, &["no flood"]),
     ("junk", 64, &["no junk", "udp, junk on unread ports", "udp"]),
     ("junk of a peer", 64, &["no junk", "udp, junk on unread ports", "udp"]),
 ];

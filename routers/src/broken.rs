@@ -99,6 +99,8 @@ mod variants {
         BelievesLives,
         /// Inbound: so is a sequence that is far ahead.
         BelievesJumps,
+        /// Inbound: one refusal parts from a peer that has just said that it hears us.
+        BelievesRefusals,
         /// Inbound: datagrams of lives that are over are taken.
         TakesOldLives,
         /// Inbound: other configurations are not refused.
@@ -275,7 +277,7 @@ mod variants {
         pub const CROWDED: [Self; 1] = [Self::ForgetsBegun];
 
         /// Those that show where somebody sends what a router could have sent.
-        pub const FORGED: [Self; 2] = [Self::BelievesLives, Self::BelievesJumps];
+        pub const FORGED: [Self; 3] = [Self::BelievesLives, Self::BelievesJumps, Self::BelievesRefusals];
 
         /// All mistakes of sessions.
         pub const SESSION: [Self; 31] = [

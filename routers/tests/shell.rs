@@ -16,7 +16,7 @@ use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::link::State;
 use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
-use rohrpost_routers::stats::Stats;
+use rohrpost_routers::stats::{Cause, Stats};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
@@ -358,6 +358,31 @@ fn who_may_not_hurry_is_not_carried_as_if_it_might() {
     let shell = pair.sides[0].shell();
     let packages = [shell.stats(), shell.rest_stats().unwrap()].map(|stats| stats.peer(1).sent.packages.get());
     assert_eq!(packages, [0, 1]);
+}
+
+/// Neither do those of which there is more than can leave: they are lost, and counted, before they take the way of what may.
+#[test]
+fn a_flood_that_may_not_hurry_is_lost_rather_than_carried_as_if_it_might() {
+    let mut pair = Pair::new();
+    for side in &mut pair.sides {
+        side.settings.real_time_from = 128;
+        // So that more than can leave soon is sent in a moment.
+        side.settings.network.rate_bytes_s = 1 << 20;
+        side.start();
+    }
+    let (join, body) = (pair.sides[0].join(), [7; 1000]);
+    let mut sender = join.sender(module(1)).unwrap();
+    let shell = pair.sides[0].shell();
+    let lost = || shell.stats().out.classes().map(|(_, class)| class.lost(Cause::Quota)).sum::<u64>();
+    until("more than is taken was lost", || {
+        // What does not fit into the mailbox is refused there.
+        (0..64).for_each(|id| drop(sender.send(&label(module(0), 255, id), &[&body])));
+        lost() > 1000
+    });
+    let packages = [shell.stats(), shell.rest_stats().unwrap()].map(|stats| stats.peer(1).sent.packages.get());
+    assert_eq!(packages[0], 0, "none went as if it were real time");
+    let classes: Vec<_> = shell.stats().out.classes().map(|(class, _)| class.0).collect();
+    assert_eq!(classes, [100], "each is counted as what it may be");
 }
 
 /// The two threads that carry what is not real time are never in real time, whatever their process is.

@@ -312,13 +312,7 @@ fn slotted_networks_of_unsteady_clocks_keep_their_promises() {
 #[test]
 fn every_mistake_of_unsteady_clocks_is_noticed() {
     let worlds: [fn(u64) -> Plan; 2] = [Plan::unsteady, Plan::unsteady_slotted];
-    let missed: Vec<_> = Broken::UNSTEADY
-        .into_iter()
-        .zip(worlds)
-        .filter(|(broken, plan)| noticed(Mistake::Packages(*broken), *plan).is_none())
-        .map(|(broken, _)| broken)
-        .collect();
-    assert!(missed.is_empty(), "went unnoticed in {MISTAKE_SEEDS} networks: {missed:?}");
+    worlds.into_iter().for_each(|plan| all_are_noticed(&Broken::UNSTEADY.map(Mistake::Packages), plan));
 }
 
 /// Routers that are started from edited files, each field in turn: nodes of several tables on one wire. Half as many networks; sealed ones by turns.
@@ -429,7 +423,8 @@ fn what_a_router_could_have_sent_parts_no_nodes_and_loses_nothing() {
     }
     let seeds = number("ROHRPOST_SIM_SEEDS").unwrap_or(SEEDS) / 4;
     let seen = keep_promises("what_a_router_could_have_sent", seeds, Plan::forged);
-    for lost in ["quota", "stale", "silent", "late", "incomplete", "lost on the wire"] {
+    // To their quotas some of these networks lose packages anyway.
+    for lost in ["stale", "silent", "refused", "late", "incomplete", "lost on the wire"] {
         assert_eq!(seen.get(lost), None, "{lost}");
     }
     saw_enough(&seen, seeds, &[("delivered", 10_000), ("forged", 1_000)]);

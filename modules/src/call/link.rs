@@ -4,7 +4,9 @@ use super::absent::Absent;
 use super::envelope::micros;
 use super::tally::{Ending, Tallies, Tally};
 use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope, VALIDITY_MAX};
-use rohrpost_mailbox::{ALL_SYSTEMS, Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type};
+use rohrpost_mailbox::{
+    ALL_SYSTEMS, Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type, monotonic_ns,
+};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -49,11 +51,23 @@ struct Call {
     /// The whole body of the command, to be sent again; then, when the answer has come, the answer.
     body: Vec<u8>,
     label: Label,
-    began: Instant,
+    /// When it began and when it is to be sent again, ns of time that passed: a caller that slept must not say that its command is young.
+    began_ns: u64,
     timeout: Duration,
-    repeat_at: Instant,
+    repeat_ns: u64,
     repeated: bool,
     answer: Option<Head>,
+}
+
+impl Call {
+    /// When its time is over, ns.
+    fn deadline_ns(&self) -> u64 {
+        self.began_ns.saturating_add(ns(self.timeout))
+    }
+}
+
+fn ns(of: Duration) -> u64 {
+    u64::try_from(of.as_nanos()).unwrap_or(u64::MAX)
 }
 
 /// Whether who answers was called: itself, or that name in all systems, of which the first that answers counts.
@@ -200,11 +214,11 @@ impl Link {
             self.spare.push(body);
             return Err(CallError::BadArguments(error.to_string()));
         }
-        let began = Instant::now();
+        let began_ns = monotonic_ns();
         let kind = Type::command(function);
-        let repeat_at = began + repeat_after(timeout);
+        let repeat_ns = began_ns + ns(repeat_after(timeout));
         let label = self.label(kind, sequence, options);
-        let call = Call { sequence, to, body, label, began, timeout, repeat_at, repeated: false, answer: None };
+        let call = Call { sequence, to, body, label, began_ns, timeout, repeat_ns, repeated: false, answer: None };
         match self.send(to, &label, &[&call.body]) {
             Ok(()) => {
                 self.calls.push(call);
@@ -242,20 +256,20 @@ impl Link {
     ) -> Result<T, CallError> {
         loop {
             self.collect();
-            let now = Instant::now();
+            let now_ns = monotonic_ns();
             let Some(at) = self.calls.iter().position(|call| call.sequence == sequence) else {
                 return Err(CallError::BadReply(self.me, "the call is not under way".into()));
             };
             let call = &self.calls[at];
-            let deadline = call.began + call.timeout;
-            if call.answer.is_some() || now >= deadline {
+            let deadline_ns = call.deadline_ns();
+            if call.answer.is_some() || now_ns >= deadline_ns {
                 return self.finish(at, read);
             }
-            if now >= call.repeat_at {
-                self.repeat(at, now);
+            if now_ns >= call.repeat_ns {
+                self.repeat(at, now_ns);
             }
-            let wake = self.calls[at].repeat_at.min(deadline);
-            rohrpost_mailbox::wait_any(&mut [&mut self.replies], Some(wake), || false);
+            let wake = Duration::from_nanos(self.calls[at].repeat_ns.min(deadline_ns) - now_ns);
+            rohrpost_mailbox::wait_any(&mut [&mut self.replies], Some(Instant::now() + wake), || false);
         }
     }
 
@@ -272,12 +286,12 @@ impl Link {
         read: impl FnOnce(&[u8]) -> Result<T, postcard::Error>,
     ) -> Option<Result<T, CallError>> {
         let at = self.calls.iter().position(|call| call.sequence == sequence)?;
-        let (call, now) = (&self.calls[at], Instant::now());
-        if call.answer.is_some() || now >= call.began + call.timeout {
+        let (call, now_ns) = (&self.calls[at], monotonic_ns());
+        if call.answer.is_some() || now_ns >= call.deadline_ns() {
             return Some(self.finish(at, read));
         }
-        if now >= call.repeat_at {
-            self.repeat(at, now);
+        if now_ns >= call.repeat_ns {
+            self.repeat(at, now_ns);
         }
         None
     }
@@ -345,12 +359,12 @@ impl Link {
         }
     }
 
-    fn repeat(&mut self, at: usize, now: Instant) {
+    fn repeat(&mut self, at: usize, now_ns: u64) {
         let call = &mut self.calls[at];
-        call.repeat_at = now + repeat_after(call.timeout);
+        call.repeat_ns = now_ns + ns(repeat_after(call.timeout));
         call.repeated = true;
         // Age 0 means a first try, so a repeat is at least 1 µs old.
-        let age_us = micros(now - call.began).max(1);
+        let age_us = micros(Duration::from_nanos(now_ns - call.began_ns)).max(1);
         call.body[CallEnvelope::BYTES - 4..CallEnvelope::BYTES].copy_from_slice(&age_us.to_le_bytes());
         let (to, label) = (call.to, call.label);
         let body = std::mem::take(&mut call.body);

@@ -113,3 +113,20 @@ pub(super) fn see(what: Look, node: &Node, installation: &Installation, node_nam
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_look_goes_and_all_others_stay_whole() {
+        let mut looks = Looks::default();
+        let take = |looks: &mut Looks| looks.take(Seen::format(), 1, || Ok(Seen::Mailbox(None))).unwrap();
+        let first = take(&mut looks);
+        let others: Vec<LookPage> = (1..LOOKS_KEPT).map(|_| take(&mut looks)).collect();
+        assert_eq!(looks.page(first.look, 0, 1), Ok(first.clone()), "as many as there is room for");
+        take(&mut looks);
+        assert_eq!(looks.page(first.look, 0, 1), Err(LookError::Gone));
+        others.iter().for_each(|page| assert_eq!(looks.page(page.look, 0, 1), Ok(page.clone())));
+    }
+}

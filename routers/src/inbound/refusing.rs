@@ -3,7 +3,7 @@
 use super::{Inbound, REFUSE_EVERY_NS};
 use crate::broken::broken;
 use crate::frame::{self, FrameHead, Kind, NodeIndex, Reason, Refusal};
-use crate::link::State;
+use crate::link::{SILENT_AFTER_NS, State};
 use crate::report::{Deliver, Event, Mismatch};
 use crate::settings::Settings;
 use std::net::IpAddr;
@@ -83,10 +83,18 @@ impl Inbound {
     pub(super) fn refused_by(&mut self, now_ns: u64, source: IpAddr, refusal: &Refusal, deliver: &mut impl Deliver) {
         let Some(peer) = self.peer_at(source) else { return self.stats.foreign.add(1) };
         let mismatch = Mismatch { reason: refusal.reason, version: refusal.version, digest: Some(refusal.digest) };
-        self.stats.peer(peer).link.refuse(now_ns, mismatch);
+        let stats = self.stats.peer(peer);
         if refusal.reason == Reason::Digest {
-            self.stats.peer(peer).link.refuses_us(now_ns, refusal.digest);
+            // Not doubted: two times on one wire are worse than none for a moment. What is heard of it by our configuration ends it.
+            stats.link.refuses_us(now_ns, refusal.digest);
         }
+        // Who takes nothing from us does not hear us, and says so after a second. Anybody can send a refusal where nothing is sealed, so until
+        // then it is doubted.
+        let heard_ns = stats.link.hears_us_ns.get();
+        if heard_ns > 0 && heard_ns + SILENT_AFTER_NS > now_ns && !broken!(BelievesRefusals) {
+            return stats.received.old.add(1);
+        }
+        stats.link.refuse(now_ns, mismatch);
         if self.peers[usize::from(peer)].is_refused_anew(now_ns, mismatch) {
             deliver.event(Event::Refuses { peer, mismatch });
         }

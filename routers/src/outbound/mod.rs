@@ -212,6 +212,13 @@ impl Outbound {
         if taken { Accepted::Waits } else { Accepted::Lost }
     }
 
+    /// Loses a package instead of taking it: of its sender there is more than is taken.
+    pub fn displace(&self, package: &Package<'_>, report: &mut impl Report) {
+        let head = capped(&package.head);
+        self.stats.out.came(head.priority);
+        lose(&self.stats, self.settings.node_of(head.to), &head, package.body, Cause::Quota, report);
+    }
+
     /// Whether any package waits to leave.
     pub fn waits(&self) -> bool {
         !self.queue.is_empty()

@@ -130,6 +130,8 @@ impl Reckoning {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::broken::{Broken, with};
+    use std::panic::catch_unwind;
 
     /// The server's clock is 5 s ahead and its system time 1000 s; both ways take `there` and `back`.
     fn exchange(asked_ns: u64, there: u64, back: u64) -> (u64, TimeAnswer) {
@@ -170,8 +172,7 @@ mod tests {
         assert!((400_000..402_000).contains(&error_ns), "clocks drift 5 ms in 20 s: {error_ns}");
     }
 
-    #[test]
-    fn what_cannot_all_be_true_is_a_contradiction_and_the_latest_counts() {
+    fn check_contradiction() {
         let mut reckoning = Reckoning::default();
         for asked_ns in [0, 1_000_000_000] {
             let (heard_ns, answer) = exchange(asked_ns, 10_000, 10_000);
@@ -187,6 +188,12 @@ mod tests {
         let system = reckoning.system(heard_ns).unwrap().at(heard_ns);
         assert!(system.ns.abs_diff(heard_ns + 1_000_000_000_000 + slept_ns) <= 400_000, "{system:?}");
         assert_eq!(reckoning.answers(), 3);
+    }
+
+    #[test]
+    fn what_cannot_all_be_true_is_a_contradiction_and_the_latest_counts() {
+        check_contradiction();
+        assert!(with(Broken::TakesSmallest, || catch_unwind(check_contradiction)).is_err(), "the mistake shows");
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! ```text
 //!  transit mailbox ─┬▶ accept ─┬─ at once: head of the frame + body where it lies ─▶ one sendmsg
 //!                   │          └─ queue ─▶ poll ─▶ datagram ─▶ socket of the peer      between any two, the mailbox is looked at
-//!                   └▶ not real time: a batch, as long as there is an empty one; else it stays in the mailbox, and rings nobody
+//!                   └▶ not real time: a batch, as long as there is an empty one; else it stays in the mailbox, and rings nobody. If it says that
+//!                      it is more urgent than it may, it is lost to its quota
 //! ```
 
 use super::handover::Giver;
@@ -70,15 +71,20 @@ impl Departures {
             }
             let Some(waiting) = self.transit.try_receive() else { return false };
             let (head, published_ns, body) = (waiting.head(), waiting.published_ns(), waiting.body());
+            let package = Package { head: *head, published_ns, body };
             if let Some(rest) = &mut self.rest
                 && self.settings.is_rest(head)
-                && rest.takes()
             {
-                rest.give(head, published_ns, body);
+                if rest.takes() {
+                    rest.give(head, published_ns, body);
+                } else {
+                    // It says that it is real time, and so lies above what is. There it cannot stay, and it does not go as if it were.
+                    self.sending.displace(&package);
+                }
                 continue;
             }
             let alone = taken == 0 && !waiting.is_followed();
-            self.sending.accept(&Package { head: *head, published_ns, body }, alone);
+            self.sending.accept(&package, alone);
             if self.sending.outbound.has_plenty() {
                 break;
             }

@@ -46,6 +46,11 @@ impl Sending {
         outbound.pass_over(wire.full().0);
     }
 
+    /// Loses a package: see [`Outbound::displace`].
+    pub(super) fn displace(&mut self, package: &Package<'_>) {
+        self.outbound.displace(package, &mut self.answers);
+    }
+
     /// Sends the next datagram; else when there is one, unless a package comes.
     pub(super) fn step(&mut self, now_ns: u64) -> Option<u64> {
         self.wire.retry(now_ns);

@@ -179,10 +179,11 @@ impl InSocket {
         Received::Datagram { bytes: message.bytes, source, waited_ns, dropped }
     }
 
-    /// Sends a datagram to the router at an address.
+    /// Sends a datagram to the router at an address; never waits, whatever the way there is like.
     pub(super) fn answer(&self, to: IpAddr, datagram: &[u8]) {
+        let at = SocketAddr::new(to, self.port).into();
         // A refusal that does not leave is as good as one that was lost: the next one comes a second later.
-        let _ = self.socket.send_to(datagram, (to, self.port));
+        let _ = SockRef::from(&self.socket).send_to_with_flags(datagram, &at, MsgFlags::MSG_DONTWAIT.bits());
     }
 
     /// Ends the reading, also of a thread that blocks in it; of a socket that is kept, after [`LISTEN`].

@@ -11,7 +11,7 @@ use super::seals::altered;
 use super::station::Arrived;
 use super::world::{Event, World};
 use crate::admission::{PACKET, TUNNEL};
-use crate::frame::{Alive, FrameHead, Kind};
+use crate::frame::{self, Alive, FrameHead, Kind, Reason, Refusal};
 use rohrpost_mailbox::{Head, Name, Priority, Type, local};
 use std::rc::Rc;
 
@@ -218,10 +218,24 @@ impl World<'_> {
         self.post(node, Head { to, from, len, kind, priority, ..Head::default() }, Role::Intruder);
     }
 
-    /// Something that a router could have sent, if it had been started anew, or had sent far more than it has.
+    /// Something that a router could have sent, if it had been started anew, had sent far more than it has, or had another configuration.
     fn forged(&mut self, from: usize, to: usize) -> Rc<[u8]> {
         let life = self.stations[from].router.as_ref().map_or(0, |router| router.life);
         let chance = &mut self.chance;
+        if chance.percent(30) {
+            let head = FrameHead {
+                kind: Kind::Refusal,
+                system: super::plan::SYSTEM,
+                from: from as u8,
+                to: to as u8,
+                digest: chance.bits(),
+                incarnation: chance.bits() | 1,
+                sequence: 0,
+            };
+            let reason = chance.pick(&[Reason::Version, Reason::Stranger, Reason::Sealed, Reason::Key]);
+            let rest = Refusal { version: frame::VERSION, reason, digest: head.digest }.to_bytes();
+            return Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat());
+        }
         let is_of_life = chance.percent(50);
         // Far from all that is sent in these seconds.
         let any = chance.between(1 << 32, SEQUENCE_MAX);

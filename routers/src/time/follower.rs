@@ -92,9 +92,11 @@ impl Follower {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::broken::{Broken, with};
     use crate::time::UNSYNCHRONISED_NS;
     use proptest::prelude::*;
     use rohrpost_mailbox::TimeSource;
+    use std::panic::catch_unwind;
 
     const SECOND_NS: u64 = 1_000_000_000;
     /// System time is so far ahead of the local clock, which is `fast_ppb` fast.
@@ -145,6 +147,11 @@ mod tests {
 
     #[test]
     fn two_times_that_cannot_both_be_true_are_a_contradiction_and_no_choice() {
+        check_contradiction();
+        assert!(with(Broken::TakesSmallest, || catch_unwind(check_contradiction)).is_err(), "the mistake shows");
+    }
+
+    fn check_contradiction() {
         let mut follower = Follower::new(0, 5, None);
         let begin = |follower: &mut Follower, from_ns: u64, ahead_ns: u64, answers: u64| {
             (0..u64::from(HEARD_MIN)).for_each(|n| {

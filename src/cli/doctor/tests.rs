@@ -39,8 +39,7 @@ fn compare(name: &str, said: &str) {
     assert_eq!(said, fs::read_to_string(&golden).unwrap(), "{}", golden.display());
 }
 
-fn lan(ports: [PortState; 2], peers: &[(&str, u32, Reach)]) -> Lan {
-    let [packages, time] = ports;
+fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> Lan {
     let peer = |(host, (name, mtu, reach)): (u8, &(&str, u32, Reach))| Peer {
         name: (*name).into(),
         address: [10, 77, 0, host].into(),
@@ -53,7 +52,7 @@ fn lan(ports: [PortState; 2], peers: &[(&str, u32, Reach)]) -> Lan {
         mtu: 1500,
         is_here: true,
         addresses: vec![("eth0".into(), [10, 77, 0, 1].into())],
-        ports: vec![Port { number: 21117, state: packages }, Port { number: 21118, state: time }],
+        ports: (21117..).zip(ports).map(|(number, state)| Port { number, state }).collect(),
         runs: true,
         stamps: Stamps::Both,
         peers: (2..).zip(peers).map(peer).collect(),
@@ -61,7 +60,10 @@ fn lan(ports: [PortState; 2], peers: &[(&str, u32, Reach)]) -> Lan {
 }
 
 fn lan_that_works() -> Lan {
-    lan([PortState::InUse, PortState::Free], &[("arm", 1500, Reach::NoRouter), ("desk", 9000, Reach::Neighbour)])
+    lan(
+        [PortState::InUse, PortState::Free, PortState::Free],
+        &[("arm", 1500, Reach::NoRouter), ("desk", 9000, Reach::Neighbour)],
+    )
 }
 
 fn lan_of_trouble() -> Lan {
@@ -72,7 +74,7 @@ fn lan_of_trouble() -> Lan {
         addresses: vec![("eth0".into(), [192, 168, 0, 7].into()), ("wlan0".into(), "fd00::7".parse().unwrap())],
         runs: false,
         stamps: Stamps::NoSent,
-        ..lan([PortState::InUse, refused], &[("arm", 1280, Reach::Silent), ("desk", 1500, no_way)])
+        ..lan([PortState::InUse, refused.clone(), refused], &[("arm", 1280, Reach::Silent), ("desk", 1500, no_way)])
     }
 }
 
@@ -138,7 +140,7 @@ fn elsewhere() -> (Asked, Needs) {
     let lan = Lan {
         addresses: Vec::new(),
         stamps: Stamps::None("Protocol not available".into()),
-        ..Lan { is_here: false, ..lan([PortState::Unknown, PortState::Unknown], &[]) }
+        ..Lan { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &[]) }
     };
     let asked = Asked { lan: Some(lan), protection: open(), ..nothing_told() };
     (asked, Needs { from: Some("robot.toml".into()), ..Needs::default() })

@@ -101,7 +101,7 @@ impl Judge<'_> {
             let most = under_way.min(behind_half + u128::from(TRANSIT.slots / 2));
             if let Some((flow, _)) = own().next().filter(|_| most > TRANSIT.slots.into()) {
                 let message = format!(
-                    "[[flow]]s from `{}`: {most} of their packages may wait for its slots at once, and the mailbox of its router holds {};                      declare fewer, with one package for what goes to one module, or let slots of `{}` come oftener",
+                    "[[flow]]s from `{}`: {most} of their packages may wait for its slots at once, and the mailbox of its router holds {}; declare fewer, with one package for what goes to one module, or let slots of `{}` come oftener",
                     node.name, TRANSIT.slots, node.name
                 );
                 self.reader.report(self.installation.flows[flow].line, message);

@@ -25,6 +25,7 @@ pub(crate) const CHECKS: &[fn()] = &[
     lives::check_socket,
     refusals::check_digest,
     refusals::check_damaged,
+    refusals::check_forged_refusals,
     names::check_names,
     names::check_routers,
     names::check_priority,

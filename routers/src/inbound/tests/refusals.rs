@@ -1,5 +1,6 @@
 //! Datagrams that are not taken, and who learns of it.
 
+use super::super::refusing::write_refusal;
 use super::*;
 use crate::frame::{self, Frame, VERSION};
 use crate::harness::address;
@@ -108,9 +109,39 @@ fn who_does_not_know_our_address_takes_nothing_though_it_is_heard() {
     let own = arm.send(START, head(module(50, 0), module(200, 1), 90), b"", true).unwrap().1;
     arm.take_from(START, address(2), &base.send(START, head(module(50, 1), module(200, 0), 90), b"", true).unwrap().1);
     let [(_, refusal)] = &arm.refusals(START)[..] else { panic!() };
-    base.take(START, 1, refusal);
-    base.take(START, 1, &own);
-    assert!(matches!(base.stats.state(1, START), State::Refused(_)), "what it sends says nothing of that");
+    let now_ns = START + S;
+    base.take(now_ns, 1, refusal);
+    base.take(now_ns, 1, &own);
+    assert!(matches!(base.stats.state(1, now_ns), State::Refused(_)), "what it sends says nothing of that");
+}
+
+pub(super) fn check_forged_refusals() {
+    for reason in [Reason::Version, Reason::Digest, Reason::Stranger] {
+        let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
+        let state = |base: &End, now_ns| base.stats.state(1, now_ns);
+        base.meet(START, &mut arm);
+        arm.meet(START, &mut base);
+        base.meet(START, &mut arm);
+        base.log.events.clear();
+        let mut forged = [0; 100];
+        let bytes = write_refusal(&arm.settings, Some(0), reason, &mut forged);
+        let take = |base: &mut End, ms: u64| base.take(START + ms * MS, 1, &forged[..bytes]);
+        for ms in [0, 1, 999] {
+            take(&mut base, ms);
+            assert_eq!(state(&base, START + ms * MS), State::Alive, "{reason:?} after {ms} ms, of who hears us");
+        }
+        assert_eq!((base.stats.peer(1).received.old.get(), &base.log.events[..]), (3, &[][..]));
+        take(&mut base, 1000);
+        assert!(matches!(state(&base, START + S), State::Refused(_)), "{reason:?}: it says no more that it hears us");
+        let mut unheard = End::new(0, |_| {});
+        take(&mut unheard, 0);
+        assert!(matches!(state(&unheard, START), State::Refused(_)), "{reason:?}: nothing speaks against it");
+    }
+}
+
+#[test]
+fn refusals_of_a_peer_that_hears_us_part_nobody() {
+    check_forged_refusals();
 }
 
 pub(super) fn check_damaged() {

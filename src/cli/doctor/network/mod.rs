@@ -198,7 +198,7 @@ fn reach(peer: &Peer, lan: &Lan) -> Finding {
                 "switch it on; look after cables and `ping {}`; a firewall must let UDP {} through (there: \
                  `sudo nft list ruleset`)",
                 peer.address,
-                lan.ports.iter().map(|port| port.number.to_string()).collect::<Vec<_>>().join(" and ")
+                lan.ports.iter().map(|port| port.number.to_string()).collect::<Vec<_>>().join(", ")
             ),
         ),
         Reach::NoWay(error) => Finding::not(
