@@ -59,8 +59,8 @@ pub use rohrpost_modules::call::{CallError, Fault, Pending};
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::macro_support::serde;
 pub use rohrpost_modules::runtime::{
-    ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, describe,
-    find_other_versions, find_running,
+    BadRate, ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, Unreadable,
+    describe, find_other_versions, find_running,
 };
 pub use rohrpost_modules::{
     Module, ModuleError, choice, common, data, description, interface, interfaces, launch, output, parameter,

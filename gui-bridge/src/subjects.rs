@@ -69,7 +69,8 @@ impl Subjects {
             from: show.from,
             module: text(show.from),
             data: show.data.clone(),
-            rate: show.rate.map(Rate::hz),
+            // Configuration has looked at it: 0 to 1000.
+            rate: show.rate.and_then(|rate_hz| Rate::hz(rate_hz).ok()),
             answered: false,
             asking: None,
         };

@@ -287,15 +287,17 @@ impl Module for Probe {
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
         for (which, subscription) in ["each", "newest"].iter().zip(self.hears.iter().flatten()) {
-            if let Some(beat) = data.read(subscription) {
+            if let Some(beat) = data.read(subscription)? {
                 self.note(&format!("{which} {beat}"));
             }
         }
         if let Some((beats, blobs)) = self.mixes {
-            data.read(&beats).iter().for_each(|beat| self.note(&format!("mixed beat {beat}")));
-            data.read(&blobs).iter().for_each(|blob| self.note(&format!("mixed blob {}", blob.len())));
+            data.read(&beats)?.iter().for_each(|beat| self.note(&format!("mixed beat {beat}")));
+            data.read(&blobs)?.iter().for_each(|blob| self.note(&format!("mixed blob {}", blob.len())));
         }
-        if let Some(blob) = self.watches.as_ref().and_then(|watched| data.read(watched)) {
+        if let Some(watched) = &self.watches
+            && let Some(blob) = data.read(watched)?
+        {
             let word = |at: usize| u64::from_le_bytes(blob[at..at + 8].try_into().unwrap());
             let age_us = rohrpost::mailbox::monotonic_ns().saturating_sub(word(8)) / 1000;
             self.note(&format!("blob {} {age_us}", word(0)));

@@ -220,7 +220,7 @@ impl Module for Sink {
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if let Some(due_ns) = data.read(&self.beat) {
+        if let Some(due_ns) = data.read(&self.beat)? {
             self.late_ns.push(monotonic_ns() - due_ns);
             self.lost += u64::from(data.head.sequence.wrapping_sub(self.expected));
             self.expected = data.head.sequence + 1;

@@ -52,35 +52,7 @@ pub(crate) fn ci() -> Result<ExitCode, Failure> {
     cargo::run("clippy for the GUI bridge", &mut bridge_clippy())?;
     let bare = ["clippy", "--package", "rohrpost", "--package", "rohrpost-modules", "--lib"];
     cargo::run("clippy for what the author of a module compiles", cargo(&bare).args(["--", "--deny", "warnings"]))?;
-    compiles_none_of("the author of a module", "rohrpost", &NO_COMMAND_LINE)?;
-    compiles_none_of("a user of the command", "rohrpost-cli", &["iceoryx2 ", "rerun ", "zenoh "])?;
     test()
-}
-
-/// Nothing of the command line, of TLS, of the built-in modules, of the benches or of Rerun.
-const NO_COMMAND_LINE: [&str; 10] = [
-    "clap ",
-    "comfy-table ",
-    "ratatui ",
-    "rustls ",
-    "rcgen ",
-    "serde_json ",
-    "flate2 ",
-    "rand ",
-    "rerun ",
-    "rohrpost-bench ",
-];
-
-/// This package must need none of these crates.
-fn compiles_none_of(who: &str, package: &str, unwanted: &[&str]) -> Result<(), Failure> {
-    let arguments = ["tree", "--package", package, "--edges", "normal,build", "--prefix", "none"];
-    let output = cargo(&arguments).output().map_err(|error| format!("cargo tree: {error}"))?;
-    let tree = String::from_utf8_lossy(&output.stdout);
-    let found: Vec<&str> = tree.lines().filter(|line| unwanted.iter().any(|name| line.starts_with(name))).collect();
-    if !output.status.success() || !tree.starts_with(package) || !found.is_empty() {
-        return Err(format!("{who} would compile {found:?} ({})", output.status));
-    }
-    Ok(())
 }
 
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the compiler of
