@@ -1,12 +1,12 @@
 //! `rohrpost bench local`: how this computer hands packages over, beside what it could do at best.
 
 use super::{Failure, complain, say};
-use rohrpost::mailbox::{Node, base_directory};
 use rohrpost_bench::environment::Environment;
 use rohrpost_bench::harness::Scheduling;
 use rohrpost_bench::report::{self, Report};
 use rohrpost_bench::rounds::Row;
 use rohrpost_bench::{Settings, cases};
+use rohrpost_mailbox::{Node, base_directory};
 use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -5,8 +5,8 @@ use super::target::Target;
 use super::units::{bytes, short};
 use super::watch::{Figures, Pace};
 use super::{Failure, say};
-use rohrpost::mailbox::{FlowInfo, Type};
 use rohrpost::survey::is_hop;
+use rohrpost_mailbox::{FlowInfo, Type};
 use serde_json::json;
 use std::process::ExitCode;
 

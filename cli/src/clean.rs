@@ -2,7 +2,7 @@
 
 use super::demo::remove_abandoned;
 use super::{Failure, say};
-use rohrpost::mailbox::{Node, NodeError, base_directory, remove_base_if_empty};
+use rohrpost_mailbox::{Node, NodeError, base_directory, remove_base_if_empty};
 use std::path::Path;
 use std::process::ExitCode;
 

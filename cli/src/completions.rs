@@ -13,10 +13,10 @@ use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCan
 use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
-use rohrpost::config::Installation;
 use rohrpost::description::Description;
 use rohrpost::output::plain;
 use rohrpost::survey::purpose;
+use rohrpost_config::Installation;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;

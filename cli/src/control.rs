@@ -3,10 +3,10 @@
 use super::target::{Running, Target};
 use super::{Failure, say};
 use rohrpost::launch::{ChildState, ControlError, Phase};
-use rohrpost::mailbox::{ModuleState, Name};
 use rohrpost::output::plain;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, ToolLink};
+use rohrpost_mailbox::{ModuleState, Name};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 

@@ -8,8 +8,8 @@ use super::units::short;
 use super::watch::{Pace, Window};
 use super::{Failure, say};
 use rohrpost::Name;
-use rohrpost::mailbox::{Class, ClassTraffic, FlowInfo, Kind, Latency, MailboxInfo};
 use rohrpost::survey::{Scope, Survey, purpose};
+use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, Kind, Latency, MailboxInfo};
 use serde::Serialize;
 use std::process::ExitCode;
 

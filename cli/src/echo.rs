@@ -4,9 +4,9 @@ use super::target::Target;
 use super::{Failure, say};
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use rohrpost::description::{DataItem, Description};
-use rohrpost::mailbox::{Kind, local};
 use rohrpost::value::decode;
 use rohrpost::{Name, ToolLink};
+use rohrpost_mailbox::{Kind, local};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 

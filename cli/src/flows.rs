@@ -4,9 +4,9 @@ use super::table::table;
 use super::units::fine;
 use super::vocabulary::{Vocabulary, built_in};
 use rohrpost::Name;
-use rohrpost::config::{Contents, Installation};
 use rohrpost::description::Description;
 use rohrpost::interfaces::{FlowState, FlowStates, Links};
+use rohrpost_config::{Contents, Installation};
 
 /// What the columns say that their heads do not.
 pub(super) const LEGEND: &str = "\

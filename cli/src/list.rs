@@ -6,11 +6,11 @@ use super::table::table;
 use super::target::{Running, Target};
 use super::{Failure, say};
 use rohrpost::Name;
-use rohrpost::config::Installation;
 use rohrpost::interfaces::{BeyondHost, BeyondHosts};
-use rohrpost::mailbox::{Loss, MailboxInfo, saturating_sum};
 use rohrpost::output::plain;
 use rohrpost::survey::{Scope, node_of, purpose};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Loss, MailboxInfo, saturating_sum};
 use serde::Serialize;
 use std::process::ExitCode;
 

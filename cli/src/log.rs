@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (settings, mut filter) = Filter::read(arguments, &running)?;
     let settings: Vec<Setting> =
         settings.iter().map(|(name, level)| Setting::read(name, level, &running)).collect::<Result<_, _>>()?;
-    let since = arguments.since.as_deref().map(rohrpost::config::parse_duration).transpose()?;
+    let since = arguments.since.as_deref().map(rohrpost_config::parse_duration).transpose()?;
     if !settings.is_empty() && !arguments.follow && arguments.chooses_lines() {
         return Err(
             "--level NAME=LEVEL sets a level and shows no lines, so there are none to choose; add --follow to \

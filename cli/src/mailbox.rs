@@ -6,12 +6,12 @@ use super::target::{Running, Target};
 use super::units::fine;
 use super::{Failure, say};
 use rohrpost::Name;
-use rohrpost::config::{Installation, nearest};
-use rohrpost::mailbox::{
+use rohrpost::survey::{MailboxLook, Scope, purpose};
+use rohrpost_config::{Installation, nearest};
+use rohrpost_mailbox::{
     ClassTraffic, Full, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, Party, Priority, SlotInfo, WaitingPackage,
     saturating_sum,
 };
-use rohrpost::survey::{MailboxLook, Scope, purpose};
 use serde::Serialize;
 use std::process::ExitCode;
 

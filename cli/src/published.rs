@@ -4,9 +4,9 @@ use super::target::{Running, Target};
 use super::watch::{Figures, Tracks};
 use super::{Failure, complain};
 use rohrpost::Name;
-use rohrpost::mailbox::{FlowInfo, Type};
 use rohrpost::output::plain;
 use rohrpost::survey::{Scope, Survey};
+use rohrpost_mailbox::{FlowInfo, Type};
 use std::time::Duration;
 
 /// Numbers and names of the data that are meant.

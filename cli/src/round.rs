@@ -5,10 +5,10 @@ use super::target::{Running, Target};
 use super::units::{Stop, seconds};
 use rohrpost::Name;
 use rohrpost::common::GET_DATA;
-use rohrpost::config::Installation;
 use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::{CallError, Fault, ToolLink};
+use rohrpost_config::Installation;
 use std::time::Duration;
 
 /// A router that does not answer for so long is silent.

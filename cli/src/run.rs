@@ -2,7 +2,7 @@
 
 use super::Failure;
 use rohrpost::Start;
-use rohrpost::config::BUILTINS;
+use rohrpost_config::BUILTINS;
 use rohrpost_modules::runtime::exit;
 use std::process::ExitCode;
 

@@ -6,10 +6,10 @@ use super::target::{Running, Target};
 use super::units::{Stop, rate, seconds};
 use super::{Failure, complain, say};
 use rohrpost::description::{Description, Function};
-use rohrpost::mailbox::wait_any;
 use rohrpost::output::plain;
 use rohrpost::value::{Value, decode};
 use rohrpost::{CallError, Name, ToolLink};
+use rohrpost_mailbox::wait_any;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 

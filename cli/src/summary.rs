@@ -3,11 +3,11 @@
 use super::table::{table, table_of, time};
 use rohrpost::Class;
 use rohrpost::common::Status;
-use rohrpost::config::Installation;
-use rohrpost::mailbox::sys::Scheduling;
-use rohrpost::mailbox::{ClassTraffic, Loss, saturating_sum};
 use rohrpost::output::plain;
 use rohrpost::survey::{ModuleSurvey, Standing, Survey};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::sys::Scheduling;
+use rohrpost_mailbox::{ClassTraffic, Loss, saturating_sum};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

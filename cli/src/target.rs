@@ -3,12 +3,12 @@
 use super::Failure;
 use super::sight::Sight;
 use clap::Args;
-use rohrpost::config::Installation;
 use rohrpost::launch::{choose_node, launcher_of};
-use rohrpost::mailbox::{Name, Node, NodeError, SendError, local, node_directory};
 use rohrpost::output::plain;
 use rohrpost::survey::node_of;
 use rohrpost::{Fault, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Name, Node, NodeError, SendError, local, node_directory};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;

@@ -3,9 +3,9 @@
 use super::round::{Round, Rounds};
 use super::table::{table, time};
 use super::{Failure, say};
-use rohrpost::config::Reach;
 use rohrpost::interfaces::{BeyondLink, BeyondTime, ClockRole, ClockState, RouterInterface, TcpInterface};
-use rohrpost::mailbox::SystemClock;
+use rohrpost_config::Reach;
+use rohrpost_mailbox::SystemClock;
 use serde::Serialize;
 use std::process::ExitCode;
 use std::time::Duration;

@@ -2,7 +2,7 @@
 
 use super::{Failure, say};
 use rohrpost::common;
-use rohrpost::mailbox::LAYOUT_VERSION;
+use rohrpost_mailbox::LAYOUT_VERSION;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 

@@ -2,9 +2,9 @@
 
 use rohrpost::Name;
 use rohrpost::common as c;
-use rohrpost::config::{Installation, Program};
 use rohrpost::description::Description;
-use rohrpost::mailbox::Kind;
+use rohrpost_config::{Installation, Program};
+use rohrpost_mailbox::Kind;
 use std::collections::BTreeMap;
 
 /// The interfaces that were found out so far. Who does not tell its own is not asked again.

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::units::{Stop, seconds};
-use rohrpost::mailbox::{FlowInfo, FlowSecond};
+use rohrpost_mailbox::{FlowInfo, FlowSecond};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 

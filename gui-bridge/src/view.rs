@@ -2,10 +2,10 @@
 
 use crate::blueprint::Tab;
 use crate::scene::{DrawError, RATE_HZ, Scene};
-use rohrpost::config::Installation;
 use rohrpost::description::{DataItem, Description};
 use rohrpost::value::{Data, Value, decode};
 use rohrpost::{Name, Rate};
+use rohrpost_config::Installation;
 use std::time::Duration;
 
 /// Draws the data of modules that describe themselves in a certain way: those of a class, or those with a certain type.

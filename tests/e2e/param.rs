@@ -6,7 +6,7 @@ use crate::process::Running;
 use crate::tuned::{shown, tuned};
 use nix::sys::signal::Signal;
 use rohrpost::common::{self, SetParameters};
-use rohrpost::mailbox::monotonic_ns;
+use rohrpost_mailbox::monotonic_ns;
 use std::path::PathBuf;
 
 /// The same node as the harness's, with a file for saved parameters.

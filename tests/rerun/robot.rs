@@ -5,12 +5,12 @@
 use super::load::on_one_processor;
 use super::programs::bridge;
 use rohrpost::common::GET_DATA;
-use rohrpost::config::Installation;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{MailboxInfo, ModuleState, Node, monotonic_ns, node_directory};
 use rohrpost::serde::{Deserialize, de::DeserializeOwned};
 use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use rohrpost::{Context, Module, ModuleError, Name, Rate, Received, Subscription, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{MailboxInfo, ModuleState, Node, monotonic_ns, node_directory};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -354,7 +354,7 @@ impl Robot {
     pub(crate) fn assert_well(&mut self) {
         for name in self.node.mailboxes().unwrap() {
             let Some(mailbox) = self.node.look_at(name) else { continue };
-            let lost: u64 = mailbox.classes.iter().map(rohrpost::mailbox::ClassTraffic::lost_in_all).sum();
+            let lost: u64 = mailbox.classes.iter().map(rohrpost_mailbox::ClassTraffic::lost_in_all).sum();
             let name = self.installation.classes.format(name);
             assert_eq!(lost, 0, "{name} has lost packages: {:?}\n{}", mailbox.classes, self.said());
         }

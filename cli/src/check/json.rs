@@ -1,7 +1,7 @@
 //! What `check` says, for programs. Durations are in milliseconds, sizes in bytes.
 
 use rohrpost::Name;
-use rohrpost::config::{
+use rohrpost_config::{
     Bound, Errors, FlowBound, Installation, MailboxSpec, MissingProgram, Module, Network, Program, Reach,
     RestartPolicy, Scheduling, Start, Tdma, TimeSource, bounds,
 };

@@ -4,7 +4,7 @@ mod json;
 
 use super::{Failure, daemons, say};
 use rohrpost::Name;
-use rohrpost::config::{Errors, Flow, Installation, MissingProgram, TimeSource, explain};
+use rohrpost_config::{Errors, Flow, Installation, MissingProgram, TimeSource, explain};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -3,8 +3,8 @@
 use crate::summary::class_name;
 use crate::table::{table, time};
 use rohrpost::Class;
-use rohrpost::config::Installation;
 use rohrpost::interfaces::{Carried, ClassCarried, Links, PeerLink};
+use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;

@@ -4,10 +4,10 @@ use crate::Failure;
 use crate::summary::class_name;
 use crate::table::{table, time};
 use rohrpost::common::GET_DATA;
-use rohrpost::config::Installation;
 use rohrpost::interfaces::{BeyondLink, BeyondState, ClassPassed, TcpInterface};
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::{CallError, Class, ToolLink};
+use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 
 /// What the clients of all nodes say; nobody without a TCP router.

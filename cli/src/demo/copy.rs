@@ -4,7 +4,7 @@
 use super::{Arguments, GUI, Joined};
 use crate::keys::certificates::{self, Which};
 use crate::{Failure, check};
-use rohrpost::config::{Installation, Keys, Program};
+use rohrpost_config::{Installation, Keys, Program};
 use rohrpost_routers::security::random;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike, value};
@@ -52,7 +52,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
         Keys::first(random()?).create(&Keys::file(&temporary.join(KEYS)))?;
     }
     std::fs::write(&copy, rewritten(&text, &shown, folder.as_deref(), arguments)?)?;
-    let named = |error: rohrpost::config::Errors| {
+    let named = |error: rohrpost_config::Errors| {
         error.to_string().replace(&copy.display().to_string(), &shown.display().to_string())
     };
     let mut installation = check::load(&copy).map_err(named)?;

@@ -2,7 +2,7 @@
 
 use crate::Failure;
 use crate::router::keys;
-use rohrpost::config::Installation;
+use rohrpost_config::Installation;
 use rohrpost_routers::frame::FrameHead;
 use rohrpost_routers::security::{Acquaintances, Opening, Port, TAG_BYTES, Who};
 use rohrpost_routers::settings::Settings;

@@ -4,8 +4,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost::Name;
 use rohrpost::common::State;
-use rohrpost::config::Installation;
-use rohrpost::mailbox::{Node, NodeError, monotonic_ns, node_directory};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Node, NodeError, monotonic_ns, node_directory};
 use std::sync::Arc;
 
 /// A router that died.
@@ -40,7 +40,7 @@ pub(super) struct Lives {
 impl Lives {
     /// Of nodes that run; which router of each.
     pub(super) fn of(installation: &Installation, router: impl Fn(&str) -> Option<Name>) -> Result<Self, NodeError> {
-        let watched = |(index, config): (usize, &rohrpost::config::Node)| {
+        let watched = |(index, config): (usize, &rohrpost_config::Node)| {
             let router = router(&config.name)?;
             let node = Node::open(&node_directory(&installation.name, &config.name));
             Some(node.map(|node| Watched { index, node, router, pid: None }))

@@ -3,10 +3,10 @@
 use crate::table::table;
 use crate::vocabulary::{Vocabulary, built_in};
 use rohrpost::common::Exchange;
-use rohrpost::config::{Flow, Installation};
 use rohrpost::description::Description;
-use rohrpost::mailbox::Kind;
 use rohrpost::{Name, ToolLink};
+use rohrpost_config::{Flow, Installation};
+use rohrpost_mailbox::Kind;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 

@@ -12,13 +12,13 @@ use crate::vocabulary::Vocabulary;
 use crate::{Failure, say};
 use crate::{flows, slots};
 use rohrpost::common::{GET_DATA, State};
-use rohrpost::config::Installation;
 use rohrpost::interface::{DataPort, Interface};
 use rohrpost::interfaces::{CartographerInterface, FlowStates, Links, MapCounts, RouterInterface, SlotState};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
 use rohrpost::survey::Survey;
 use rohrpost::{CallError, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
 use serde::de::DeserializeOwned;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -91,14 +91,14 @@ fn watch(
 
 /// All there is to say at the end, and whether all is well.
 fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, bool), Failure> {
-    let open = |node: &rohrpost::config::Node| Node::open(&node_directory(&installation.name, &node.name));
+    let open = |node: &rohrpost_config::Node| Node::open(&node_directory(&installation.name, &node.name));
     let nodes = installation.nodes.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let (first, name) = (&nodes[0], &installation.nodes[0].name);
     let mut tool = ToolLink::join(installation, first, name, PATIENCE)?;
     let map = map(installation, &mut tool);
     let errors = in_error(installation, &mut tool);
     let (clocks, clocks_hold) = clocks(installation, &nodes);
-    let survey = |(node, config): (&Arc<Node>, &rohrpost::config::Node)| Survey::new(node, installation, &config.name);
+    let survey = |(node, config): (&Arc<Node>, &rohrpost_config::Node)| Survey::new(node, installation, &config.name);
     let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
     let died = seen.died();
     let links = settled(installation, &mut tool, &died)?;
@@ -171,7 +171,7 @@ fn map(installation: &Installation, tool: &mut ToolLink) -> String {
 
 /// Modules that are in error, or do not answer.
 fn in_error(installation: &Installation, tool: &mut ToolLink) -> Vec<String> {
-    let told = |module: &rohrpost::config::Module| {
+    let told = |module: &rohrpost_config::Module| {
         let name = installation.classes.format(module.name);
         match tool.status(module.name) {
             Ok(status) if status.state == State::Error => Some(format!("{name} is in error: {}", status.error)),

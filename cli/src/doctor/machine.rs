@@ -2,9 +2,9 @@
 
 use super::network::Lan;
 use super::security::Protection;
-use rohrpost::config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
-use rohrpost::mailbox::sys::{self, Room};
-use rohrpost::mailbox::{Node, NodeError, base_directory};
+use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
+use rohrpost_mailbox::sys::{self, Room};
+use rohrpost_mailbox::{Node, NodeError, base_directory};
 use std::path::{Path, PathBuf};
 
 const BRIDGE: &str = "rohrpost-gui-bridge";

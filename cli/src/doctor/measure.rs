@@ -2,7 +2,7 @@
 
 use super::{Finding, State};
 use crate::table::time;
-use rohrpost::mailbox::sys::{self, Scheduling};
+use rohrpost_mailbox::sys::{self, Scheduling};
 use std::time::{Duration, Instant};
 
 const PERIOD: Duration = Duration::from_millis(1);

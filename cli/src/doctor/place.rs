@@ -2,7 +2,7 @@
 
 use super::machine::{Bridge, Machine, Needs, Seen};
 use super::{Finding, State};
-use rohrpost::config::size_text;
+use rohrpost_config::size_text;
 use std::path::Path;
 
 /// Room for tools, and for mailboxes that modules make themselves, bytes.
@@ -221,7 +221,7 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
                 what,
                 format!(
                     "{path}: made by another version (layout {version}, this program {})",
-                    rohrpost::mailbox::LAYOUT_VERSION
+                    rohrpost_mailbox::LAYOUT_VERSION
                 ),
                 why,
                 format!("stop what runs there (with the program that launched it), then rm -r {path}"),

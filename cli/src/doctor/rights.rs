@@ -2,7 +2,7 @@
 
 use super::machine::{Limit, Machine, Needs};
 use super::{Finding, State};
-use rohrpost::config::FIFO_MAX;
+use rohrpost_config::FIFO_MAX;
 
 /// Bit of CAP_SYS_NICE.
 const SYS_NICE: u32 = 23;

@@ -3,7 +3,7 @@
 use super::machine::{Machine, Needs};
 use super::{Finding, State};
 use crate::keys::certificates;
-use rohrpost::config::{Installation, Keys, Security};
+use rohrpost_config::{Installation, Keys, Security};
 use std::path::PathBuf;
 
 /// What a configuration says of security, and what is here of it.

@@ -4,7 +4,7 @@ use super::machine::{Asked, Bridge, NodeFound, Seen};
 use super::network::{Lan, Peer, Port, PortState, Reach, Stamps};
 use super::security::{Lan as OfLan, Tcp as OfTcp};
 use super::*;
-use rohrpost::mailbox::{LAYOUT_VERSION, sys::Room};
+use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;

@@ -7,8 +7,8 @@ use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose,
     date_time_ymd,
 };
-use rohrpost::config::{Installation, KeysError, check_secret};
-use rohrpost::mailbox::realtime_ns;
+use rohrpost_config::{Installation, KeysError, check_secret};
+use rohrpost_mailbox::realtime_ns;
 use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
 pub(crate) use shown::lacking;
 pub(super) use shown::show;

@@ -6,7 +6,7 @@ use super::check::load;
 use super::{Failure, say};
 use certificates::Which;
 use clap::{Args, Subcommand};
-use rohrpost::config::{Installation, Key, Keys};
+use rohrpost_config::{Installation, Key, Keys};
 use rohrpost_routers::security::{self, InstallationKey, KeyId};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

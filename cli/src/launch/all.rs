@@ -13,8 +13,8 @@ use super::Failure;
 use crate::speech::Speech;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::{Pid, getppid};
-use rohrpost::config::{Installation, Reach};
 use rohrpost::launch::{Event, events};
+use rohrpost_config::{Installation, Reach};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
 use std::io::{BufRead, BufReader, Read};
@@ -101,8 +101,8 @@ pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
     }
     // One that is alone on its LAN may have no address there: then it is reached where the TCP router is.
     let server = installation.tcp.as_ref().and_then(|tcp| Some((tcp.server.as_deref()?, tcp.address.ip())));
-    let address = |node: &rohrpost::config::Node| node.address.or_else(|| server.map(|(_, address)| address));
-    let spec = |node: &rohrpost::config::Node| Some(NodeSpec { name: node.name.clone(), address: address(node)? });
+    let address = |node: &rohrpost_config::Node| node.address.or_else(|| server.map(|(_, address)| address));
+    let spec = |node: &rohrpost_config::Node| Some(NodeSpec { name: node.name.clone(), address: address(node)? });
     let specs: Vec<NodeSpec> = installation.lan_nodes().iter().filter_map(spec).collect();
     rohrpost_routers::lab::become_able()?;
     let mut lab = Lab::new(&specs, installation.network.map_or(MTU, |network| network.mtu))?;

@@ -1,6 +1,6 @@
 //! The sockets of a node's router are launch's: what peers send while a router that died is started again waits in the kernel for the next one.
 
-use rohrpost::config::{Installation, Module};
+use rohrpost_config::{Installation, Module};
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
 

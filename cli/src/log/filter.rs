@@ -5,8 +5,8 @@ use super::super::{Failure, call};
 use super::Arguments;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
-use rohrpost::mailbox::Class;
 use rohrpost::output::OutputLine;
+use rohrpost_mailbox::Class;
 
 pub(super) struct Filter {
     level: OutputLevel,

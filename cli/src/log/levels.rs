@@ -5,8 +5,8 @@ use super::super::target::Running;
 use super::super::{Failure, call, complain, say};
 use super::{Arguments, filter};
 use rohrpost::common::OutputLevel;
-use rohrpost::config::Module;
 use rohrpost::{Name, ToolLink};
+use rohrpost_config::Module;
 use serde::Serialize;
 use std::process::ExitCode;
 

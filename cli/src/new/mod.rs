@@ -102,7 +102,7 @@ mod tests {
             let text = fill(template, &name, "/opt/rohrpost");
             assert!(!text.contains("{{"), "{file}: {text}");
             if file == "robot.toml" {
-                let installation = rohrpost::config::Installation::parse(&text, Path::new(file)).unwrap();
+                let installation = rohrpost_config::Installation::parse(&text, Path::new(file)).unwrap();
                 assert_eq!(installation.modules.len(), 2);
             }
         }

@@ -1,6 +1,6 @@
 //! Names that a module's project can have: it is a class, a crate and a program at once.
 
-use rohrpost::config::is_class_name;
+use rohrpost_config::is_class_name;
 use std::str::FromStr;
 
 /// Words of Rust's own; a crate of such a name could not be spoken of.

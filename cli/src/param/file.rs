@@ -1,9 +1,9 @@
 //! The file that `param save` writes: TOML that people read, and that loads again.
 
 use super::Failure;
-use rohrpost::config::{Installation, Saved};
 use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, toml_text};
+use rohrpost_config::{Installation, Saved};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -3,9 +3,9 @@
 use super::set::{set, told};
 use super::{Failure, Session, complain, find, say};
 use rohrpost::Name;
-use rohrpost::config::Saved;
 use rohrpost::parameter::from_file;
 use rohrpost::value::Value;
+use rohrpost_config::Saved;
 use std::path::Path;
 use std::process::ExitCode;
 

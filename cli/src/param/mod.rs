@@ -163,7 +163,7 @@ impl Session {
     /// A refusal or failed call, with the module as people write it, and what to try.
     fn refused(&self, module: Name, error: CallError<Refusal>) -> Failure {
         match error {
-            CallError::NotSent(error @ rohrpost::mailbox::SendError::TooLarge { .. }) => {
+            CallError::NotSent(error @ rohrpost_mailbox::SendError::TooLarge { .. }) => {
                 let told = self.running.told(module, &error);
                 format!("{told}; raise `size` in [module.mailbox.commands] of the module, or set fewer at a time")
                     .into()
@@ -180,7 +180,7 @@ fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) -> Result<&'p
             return no_parameters(module).into();
         }
         let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-        let nearest = rohrpost::config::nearest(name, names.iter().copied());
+        let nearest = rohrpost_config::nearest(name, names.iter().copied());
         let nearest = nearest.map_or(String::new(), |nearest| format!("did you mean `{nearest}`? "));
         plain::line(&format!("{module} has no parameter `{name}`; {nearest}it has: {}", names.join(", "))).into()
     };

@@ -1,7 +1,7 @@
 //! How it stands with system time, as a router publishes it.
 
 use rohrpost::interfaces::{ClockRole, ClockState};
-use rohrpost::mailbox::monotonic_ns;
+use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::shell::Shell;
 use rohrpost_routers::shell::clock::ClockState as Shown;
 use rohrpost_routers::time::Role;

@@ -1,7 +1,7 @@
 //! What a router answers to commands that it cannot deliver: the faults of the modules' crate, which routers do not know.
 
 use rohrpost::Fault;
-use rohrpost::config::Installation;
+use rohrpost_config::Installation;
 use rohrpost_modules::call::CallEnvelope;
 use rohrpost_routers::report::BEGINNING_BYTES;
 use rohrpost_routers::shell::{Faults, Undelivered, difference};

@@ -1,8 +1,8 @@
 //! How late packages of declared flows were, as a router publishes it.
 
-use rohrpost::config::ClassTable;
 use rohrpost::interfaces::{CarriedLoss, FlowState, FlowStates};
-use rohrpost::mailbox::Name;
+use rohrpost_config::ClassTable;
+use rohrpost_mailbox::Name;
 use rohrpost_routers::flows::{Flow, FlowCounts};
 use rohrpost_routers::shell::Shell;
 use rohrpost_routers::stats::Cause;

@@ -1,7 +1,7 @@
 //! What a router seals with, and who it says that it is then.
 
-use rohrpost::config::{Installation, Key, Keys, KeysError};
-use rohrpost::mailbox::realtime_ns;
+use rohrpost_config::{Installation, Key, Keys, KeysError};
+use rohrpost_mailbox::realtime_ns;
 use rohrpost_routers::security::{InstallationKey, KeyId, KeyRing, NoRandom, random};
 
 /// The keys of an installation; none if nothing is sealed there.

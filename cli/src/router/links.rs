@@ -3,7 +3,7 @@
 use rohrpost::interfaces::{
     Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink, Rejected, SocketFailure,
 };
-use rohrpost::mailbox::{Class, Latency, Priority, monotonic_ns};
+use rohrpost_mailbox::{Class, Latency, Priority, monotonic_ns};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::link::State;
 use rohrpost_routers::security::{Port, Rejection};

@@ -2,10 +2,10 @@
 
 use super::{NoSettings, PERIOD, called, certificates, classes, configured, levels};
 use crate::router::{faults::Encoded, impairment};
-use rohrpost::config::Reach;
 use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
-use rohrpost::mailbox::{ERROR_UNKNOWN_NS, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError};
+use rohrpost_config::Reach;
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, monotonic_ns, realtime_ns};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::impair;
 use rohrpost_routers::session::client::ClientSettings;

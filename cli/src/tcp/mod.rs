@@ -5,10 +5,10 @@ mod server;
 
 use super::Failure;
 use super::router::NoSettings;
-use rohrpost::config::{Installation, Tcp};
 use rohrpost::interfaces::{CarriedLoss, ClassPassed};
-use rohrpost::mailbox::Priority;
 use rohrpost::{ModuleError, Start};
+use rohrpost_config::{Installation, Tcp};
+use rohrpost_mailbox::Priority;
 use rohrpost_modules::runtime::{exit, run_started};
 use rohrpost_routers::tcp::Class;
 use std::path::PathBuf;

@@ -2,10 +2,10 @@
 
 use super::{NoSettings, PERIOD, called, certificates, classes, configured, levels, short};
 use crate::router::faults::Encoded;
-use rohrpost::config::Node;
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, Tcp, TcpInterface};
-use rohrpost::mailbox::{monotonic_ns, realtime_ns};
 use rohrpost::{Context, Module, ModuleError, Name};
+use rohrpost_config::Node;
+use rohrpost_mailbox::{monotonic_ns, realtime_ns};
 use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::session::server::{Names, OwnNode, OwnNodes, ServerSettings};
 use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
@@ -162,6 +162,6 @@ mod tests {
         };
         let mut body = Vec::new();
         append(&mut body, &all).unwrap();
-        assert!(body.len() < rohrpost::mailbox::BODY_BYTES_MAX, "{}", body.len());
+        assert!(body.len() < rohrpost_mailbox::BODY_BYTES_MAX, "{}", body.len());
     }
 }

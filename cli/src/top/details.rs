@@ -7,12 +7,12 @@ use super::super::table::{table, time};
 use super::columns::{memory, short};
 use super::model::{Model, Peer, Row, Sample};
 use rohrpost::Name;
-use rohrpost::config::{Installation, Program};
 use rohrpost::description::Description;
-use rohrpost::mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use rohrpost::output::plain;
 use rohrpost::survey::sum;
 use rohrpost::value::{describe_result, describe_type};
+use rohrpost_config::{Installation, Program};
+use rohrpost_mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use std::time::Duration;
 
 /// The page as lines; those that begin without a blank are headings. `describe` knows what modules say of themselves.

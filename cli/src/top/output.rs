@@ -3,10 +3,10 @@
 use super::app::LineFilter;
 use super::draw::OutputText;
 use rohrpost::Name;
-use rohrpost::config::Installation;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::output::{Format, OutputLine};
+use rohrpost_config::Installation;
 use std::collections::VecDeque;
 
 /// Lines that were said before, and that are kept.

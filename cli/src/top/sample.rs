@@ -6,8 +6,8 @@ use super::super::summary::module_lines;
 use super::super::target::Running;
 use super::model::{Sample, TimeNow};
 use rohrpost::Name;
-use rohrpost::mailbox::SystemClock;
 use rohrpost::survey::{Scope, Standing, Survey};
+use rohrpost_mailbox::SystemClock;
 use std::collections::HashMap;
 
 /// Why modules are in error, as they said when they were asked.

@@ -7,8 +7,8 @@ use nix::net::if_::InterfaceFlags;
 use nix::sys::socket::{
     ControlMessageOwned, MsgFlags, SockaddrStorage, TimestampingFlag, getsockopt, recvmsg, setsockopt, sockopt,
 };
-use rohrpost::config::{Installation, Node as NodeConfig};
-use rohrpost::mailbox::{Node, node_directory};
+use rohrpost_config::{Installation, Node as NodeConfig};
+use rohrpost_mailbox::{Node, node_directory};
 use std::io::{ErrorKind, IoSliceMut};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::os::fd::AsRawFd;

@@ -2,8 +2,8 @@
 
 use super::{AUTHORITY, DAY, State, files, folder, holders, is_pair, state};
 use rcgen::date_time_ymd;
-use rohrpost::config::Installation;
-use rohrpost::mailbox::realtime_ns;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::realtime_ns;
 use rohrpost_routers::tcp::{Authority, Holder, holds_until_s};
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -10,15 +10,15 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
-use rohrpost::config::Installation;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::MotorInterface;
-use rohrpost::mailbox::sys::Scheduling;
-use rohrpost::mailbox::{
-    Class, ClassTraffic, FlowInfo, Full, Latency, Loss, MailboxInfo, ModuleState, ParticipantInfo, Shape, Type, local,
-};
 use rohrpost::output::OutputLine;
 use rohrpost::survey::{ModuleSurvey, Survey, Usage, sum};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::sys::Scheduling;
+use rohrpost_mailbox::{
+    Class, ClassTraffic, FlowInfo, Full, Latency, Loss, MailboxInfo, ModuleState, ParticipantInfo, Shape, Type, local,
+};
 use std::path::Path;
 use std::time::Duration;
 
