@@ -37,7 +37,7 @@ impl Module for WheelCompass {
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        let odometry = data.read(&self.wheels);
+        let odometry = data.read(&self.wheels)?;
         self.turned_deg = odometry.map_or(self.turned_deg, |odometry| -odometry.pose.heading_rad.to_degrees());
         Ok(())
     }

@@ -51,24 +51,28 @@
 
 #![forbid(unsafe_code)]
 
-pub use rohrpost_config as config;
-pub use rohrpost_mailbox as mailbox;
-pub use rohrpost_mailbox::{Class, Interest, Name, Priority, Ready, SystemTime, Watch};
+pub use rohrpost_config::Installation;
+pub use rohrpost_mailbox::{
+    Class, CreateError, Full, Interest, ModuleState, Name, Node, ParticipantInfo, Priority, Ready, Shape, SystemTime,
+    Watch,
+};
 pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::macro_support::serde;
 pub use rohrpost_modules::runtime::{
-    ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, describe,
-    find_other_versions, find_running,
+    BadRate, ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, Unreadable,
+    describe, find_other_versions, find_running,
 };
 pub use rohrpost_modules::{
     Module, ModuleError, choice, common, data, description, interface, interfaces, launch, output, parameter,
     parameters, run, survey, types, value,
 };
 
-/// The tools of the field that our interfaces and types speak: spans and events become output lines.
-pub use tracing;
+/// What a module says: events become lines of output.
+pub mod tracing {
+    pub use ::tracing::{Level, debug, enabled, error, event, info, trace, warn};
+}
 
 // The book's code is compiled with the tests.
 #[cfg(doctest)]

@@ -45,7 +45,7 @@ fn the_book_has_all_its_pages() {
 /// All Rust of the repository, below these folders.
 fn sources() -> String {
     let mut folders: Vec<_> =
-        ["benches", "config", "gui-bridge", "mailbox", "modules", "routers", "src", "tests", "xtask"]
+        ["benches", "cli", "config", "gui-bridge", "mailbox", "modules", "routers", "src", "tests", "xtask"]
             .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
             .into();
     let mut all = String::new();

@@ -94,10 +94,10 @@ fn standing(is_up: bool) -> Standing {
 mod tests {
     use super::*;
     use crate::testing::Drawing;
-    use rohrpost::config::Installation;
     use rohrpost::interface::Interface;
     use rohrpost::interfaces::{BeyondOutage, TcpInterface};
     use rohrpost::macro_support::append;
+    use rohrpost_config::Installation;
     use std::path::Path;
 
     const S: u64 = 1_000_000_000;

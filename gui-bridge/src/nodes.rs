@@ -1,10 +1,10 @@
 //! What runs on all nodes: the own one is looked at, the others are shown by their launches. Nobody is waited for.
 
-use rohrpost::config::Installation;
 use rohrpost::launch::{Look, launcher_of};
-use rohrpost::mailbox::{Latency, Node, NodeError, local};
 use rohrpost::survey::{Distant, Scope, Seen, Survey};
 use rohrpost::{Class, Context, Name};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Latency, Node, NodeError, local};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -67,7 +67,7 @@ impl Looks {
 impl Nodes {
     /// Those of this installation, seen from this one.
     pub(crate) fn new(node: Arc<Node>, name: &str, installation: &Installation) -> Self {
-        let other = |config: &rohrpost::config::Node| {
+        let other = |config: &rohrpost_config::Node| {
             let launcher = launcher_of(installation, &config.name)?;
             Some(Other { looks: Looks::of(&config.name), launcher, look: None, silent: true })
         };

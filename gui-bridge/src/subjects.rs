@@ -4,13 +4,13 @@ use crate::asking::Asking;
 use crate::blueprint::{Layout, Tab};
 use crate::view::{Datum, View};
 use crate::{Scene, views};
-use rohrpost::config::Show;
 use rohrpost::description::{DataItem, Description};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
-use rohrpost::mailbox::{Node, local};
 use rohrpost::survey::node_of;
 use rohrpost::{Context, ContextError, Name, Rate, Received, Subscription};
+use rohrpost_config::Show;
+use rohrpost_mailbox::{Node, local};
 use std::time::{Duration, Instant};
 
 /// The mailbox for what tells how things are now: while the bridge stands still, a newer package takes an older one's place. Its
@@ -69,7 +69,8 @@ impl Subjects {
             from: show.from,
             module: text(show.from),
             data: show.data.clone(),
-            rate: show.rate.map(Rate::hz),
+            // Configuration has looked at it: 0 to 1000.
+            rate: show.rate.and_then(|rate_hz| Rate::hz(rate_hz).ok()),
             answered: false,
             asking: None,
         };

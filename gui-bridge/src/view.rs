@@ -2,10 +2,11 @@
 
 use crate::blueprint::Tab;
 use crate::scene::{DrawError, RATE_HZ, Scene};
-use rohrpost::config::Installation;
 use rohrpost::description::{DataItem, Description};
 use rohrpost::value::{Data, Value, decode};
 use rohrpost::{Name, Rate};
+use rohrpost_config::Installation;
+use std::time::Duration;
 
 /// Draws the data of modules that describe themselves in a certain way: those of a class, or those with a certain type.
 ///
@@ -48,7 +49,7 @@ impl Wish {
     /// The newest, [`RATE_HZ`] times a second: for all that tells how things are now, such as a pose, a scan, a number. A bridge
     /// that stood still for a while goes on with what is true then.
     pub fn newest() -> Self {
-        Self { rate: Rate::hz(RATE_HZ), each: false }
+        Self { rate: Rate::Every(Duration::from_secs_f64(1.0 / RATE_HZ)), each: false }
     }
 
     /// Each, in order: for what is a part of something larger, such as the patches of a map, and for what happens, such as lines

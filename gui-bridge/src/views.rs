@@ -138,7 +138,7 @@ impl View for Output {
 }
 
 /// A line of output at its own time.
-pub(crate) fn draw_line(scene: &mut Scene, installation: &rohrpost::config::Installation, line: &OutputLine) {
+pub(crate) fn draw_line(scene: &mut Scene, installation: &rohrpost_config::Installation, line: &OutputLine) {
     scene.set_time(line.time_ns);
     let module = installation.classes.format(line.module());
     scene.output_line(&module, Level::from(line.level), &line.text);

@@ -43,7 +43,7 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
 
 /// What the TCP router says to a program of a node's system that asks for these ranges one after the other.
 fn objections(systems: &Systems, node: &str, own: &str, ranges: &[&str]) -> Vec<String> {
-    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/python/hijack.py");
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/e2e/python/hijack.py");
     let digests = systems.robot(node).installation.digest().to_string();
     let arguments = [&[page, NODES[0].1, "21119", &digests, own], ranges].concat();
     systems.python(&arguments).said().ok().lines().map(str::to_owned).collect()

@@ -251,7 +251,7 @@ fn systemd_understands_the_unit_that_ships() {
         return skipped("whether systemd understands the unit (no systemd-analyze here)");
     }
     let place = Place::new();
-    let unit = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/rohrpost@.service");
+    let unit = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/rohrpost@.service");
     let text = std::fs::read_to_string(unit).unwrap();
     let text =
         text.replace("/usr/local/bin/rohrpost", env!("CARGO_BIN_EXE_rohrpost")).replace("User=robot", "User=root");

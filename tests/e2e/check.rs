@@ -121,7 +121,7 @@ fn what_a_file_means_can_be_read_by_programs() {
     let json = place.say(&["check", "full.toml", "--json", "--node", "desk"]).json();
     assert_eq!(json["installation"]["nodes"].as_array().unwrap().len(), 1, "one node only");
     // Why a picture may wait is told to people and programs alike.
-    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo.toml");
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo.toml");
     let json = place.say(&["check", demo, "--json"]).json();
     let modules = json["installation"]["nodes"][0]["modules"].as_array().unwrap();
     let gui = modules.iter().find(|module| module["name"] == "gui.0").unwrap();
@@ -147,7 +147,7 @@ fn a_call_to_a_less_important_module_needs_a_reason() {
 #[test]
 fn time_slots_are_drawn_and_the_worst_of_each_flow_is_said() {
     let place = Place::new();
-    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo-tdma.toml");
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo-tdma.toml");
     let page = place.say(&["check", demo]).ok();
     let drawn: Vec<&str> = page.lines().filter(|line| line.contains('█')).collect();
     assert!(drawn.iter().all(|line| line.chars().count() <= 80), "{drawn:#?}");
@@ -165,7 +165,7 @@ fn time_slots_are_drawn_and_the_worst_of_each_flow_is_said() {
         let carries = flow["carries"].as_str().unwrap();
         assert!(page.contains(&format!("  {from} → {to} {carries} ")), "{page}");
     }
-    let nodes = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo-nodes.toml");
+    let nodes = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo-nodes.toml");
     let json = place.say(&["check", nodes, "--json"]).json();
     assert!(json["installation"]["tdma"].is_null(), "it sends as packages come");
 }
@@ -174,7 +174,7 @@ fn time_slots_are_drawn_and_the_worst_of_each_flow_is_said() {
 fn a_deadline_that_slots_cannot_keep_is_refused_with_what_would() {
     let place = Place::new();
     let demo = |length: &str| include_str!("../../config/demo-tdma.toml").replacen("\"1.2 ms\"", length, 1);
-    std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/config/building.map"), place.path("building.map")).unwrap();
+    std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map"), place.path("building.map")).unwrap();
     std::fs::write(place.path("short.toml"), demo("\"450 us\"")).unwrap();
     let told = place.say(&["check", "short.toml"]).fails();
     // Each flow asks for what it needs; the last one waits for all the others.

@@ -9,7 +9,7 @@ use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 
-const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modules/tests/data/small.log");
+const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/small.log");
 
 /// The number before these words.
 fn number(text: &str, words: &str) -> u64 {

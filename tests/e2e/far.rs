@@ -5,7 +5,7 @@ use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, signal, wait};
 use crate::process::{Running, Said};
 use crate::systems::CLASSES;
 use nix::sys::signal::Signal;
-use rohrpost::mailbox::{SystemClock, monotonic_ns};
+use rohrpost_mailbox::{SystemClock, monotonic_ns};
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::path::PathBuf;
 

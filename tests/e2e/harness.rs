@@ -4,11 +4,11 @@ use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost::config::Installation;
 use rohrpost::macro_support::append;
-use rohrpost::mailbox::{Node, ParticipantInfo, local, node_directory};
 use rohrpost::serde::Serialize;
 use rohrpost::{Name, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Node, ParticipantInfo, local, node_directory};
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -280,7 +280,7 @@ impl Robot {
     }
 
     pub(crate) fn state(&self, module: &str) -> &'static str {
-        self.process(module).and_then(|p| p.state).map_or("none", rohrpost::mailbox::ModuleState::name)
+        self.process(module).and_then(|p| p.state).map_or("none", rohrpost_mailbox::ModuleState::name)
     }
 
     pub(crate) fn pid(&self, module: &str) -> u32 {
@@ -296,7 +296,7 @@ impl Robot {
     pub(crate) fn wait_on(&self, launch: &mut Running) {
         let mut on = 0;
         for module in self.installation.modules_on(&self.node_name) {
-            let is_on = module.start == rohrpost::config::Start::On;
+            let is_on = module.start == rohrpost_config::Start::On;
             on += u64::from(is_on);
             let (name, state) = (self.installation.classes.format(module.name), if is_on { "on" } else { "off" });
             wait(format!("{name} is not {state}"), || {
@@ -328,7 +328,7 @@ impl Robot {
     /// Waits until the module runs in another process than this one, and works.
     pub(crate) fn wait_restarted(&self, module: &str, old_pid: u32) -> ParticipantInfo {
         wait(format!("{module} is not on again"), || {
-            self.process(module).filter(|p| p.pid != old_pid && p.state == Some(rohrpost::mailbox::ModuleState::On))
+            self.process(module).filter(|p| p.pid != old_pid && p.state == Some(rohrpost_mailbox::ModuleState::On))
         })
     }
 }

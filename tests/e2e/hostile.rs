@@ -2,7 +2,7 @@
 //! attempt is counted by cause, and no process takes more memory.
 //!
 //! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the whole minute:
-//! `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost --test e2e hostile`.
+//! `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
 
 use crate::harness::{PATIENCE, Place, Robot, skipped};
 use crate::process::{Running, Said};
@@ -81,7 +81,7 @@ impl Field {
     }
 
     fn python(&self, node: &str, program: &str, arguments: &[&str]) -> Running {
-        let page = format!("{}/tests/e2e/python/{program}", env!("CARGO_MANIFEST_DIR"));
+        let page = format!("{}/../tests/e2e/python/{program}", env!("CARGO_MANIFEST_DIR"));
         let mut command = Command::new("python3");
         command.arg("-B").arg(page).args(arguments).current_dir(self.place.path(""));
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -5,10 +5,10 @@ use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait}
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost::config::Installation;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{Head, monotonic_ns};
 use rohrpost::{CallError, Fault};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Head, monotonic_ns};
 use rohrpost_routers::frame::{FrameHead, Kind};
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::collections::BTreeSet;
@@ -229,7 +229,7 @@ fn a_node_with_another_configuration_is_refused_by_both_digests() {
     lan.nodes.push(started);
     let theirs = std::mem::replace(&mut lan.config, ours);
     let digests = [&lan.config, &theirs]
-        .map(|file| format!("{:016x}", rohrpost::config::Installation::load(file).unwrap().digest().lan()));
+        .map(|file| format!("{:016x}", rohrpost_config::Installation::load(file).unwrap().digest().lan()));
     let fault = wait("refused", || lan.fault().filter(|fault| matches!(fault, Fault::NodeRefuses { .. })));
     let told = fault.to_string();
     assert!(
@@ -244,7 +244,7 @@ fn a_node_with_another_configuration_is_refused_by_both_digests() {
 fn an_address_in_use_is_told_plainly() {
     let place = Place::new();
     let config = configured(&place, "test", &addresses(), "");
-    let installation = rohrpost::config::Installation::load(&config).unwrap();
+    let installation = rohrpost_config::Installation::load(&config).unwrap();
     let (address, port) = (installation.nodes[0].address.unwrap(), installation.network.unwrap().port);
     let _taken = std::net::UdpSocket::bind((address, port)).unwrap();
     let told = place.say(&["router", "--config", config.to_str().unwrap(), "--name", "router.0"]).fails();

@@ -4,7 +4,7 @@ use crate::harness::{NETWORK, OUTPUT, Place, Robot, halt, probe, signal, wait};
 use crate::lan::addresses;
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
-use rohrpost::mailbox::FlowInfo;
+use rohrpost_mailbox::FlowInfo;
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use serde_json::Value;
 use std::time::{Duration, Instant};

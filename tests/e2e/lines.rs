@@ -4,9 +4,9 @@ use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, wait};
 use rohrpost::common::{DataHead, OutputLevel};
 use rohrpost::interfaces::{CollectorInterface, RefusedLines};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{Label, Name, Options, Type};
 use rohrpost::output::{LINES, OutputLine};
 use rohrpost::{Class, ToolLink};
+use rohrpost_mailbox::{Label, Name, Options, Type};
 
 /// Number of `refused` in the collector's interface.
 const REFUSED: u16 = 17;

@@ -5,8 +5,8 @@ use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
 use rohrpost::launch::{LauncherInterface, Look, LookError, LookPage};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{FlowInfo, Name};
 use rohrpost::survey::{LookFailure, MailboxLook, Scope, Seen, Survey, look_at_all};
+use rohrpost_mailbox::{FlowInfo, Name};
 use std::time::{Duration, Instant};
 
 const LOOK: u16 = 20;

@@ -5,7 +5,7 @@ use crate::process::Running;
 use crate::versions::write_version;
 use nix::sys::signal::Signal;
 use rohrpost::Name;
-use rohrpost::mailbox::{LAYOUT_VERSION, Label, Node, Participant, Priority, SendError, Type};
+use rohrpost_mailbox::{LAYOUT_VERSION, Label, Node, Participant, Priority, SendError, Type};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

@@ -4,8 +4,8 @@ use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::{ABORT, COUNT};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
-use rohrpost::mailbox::Loss;
 use rohrpost::serde::Serialize;
+use rohrpost_mailbox::Loss;
 
 /// Sends a command once and waits for no answer.
 fn throw(robot: &Robot, tool: &mut ToolLink, module: &str, function: u16, arguments: &impl Serialize) {

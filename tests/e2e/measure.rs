@@ -5,7 +5,7 @@ use crate::probe::ProbingInterface;
 use crate::process::Running;
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe};
 use rohrpost::macro_support::append;
-use rohrpost::mailbox::{Receiver, local, monotonic_ns};
+use rohrpost_mailbox::{Receiver, local, monotonic_ns};
 use serde_json::Value;
 use std::time::Duration;
 

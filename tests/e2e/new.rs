@@ -4,7 +4,7 @@ use crate::harness::{Place, wait};
 use std::path::Path;
 use std::process::Command;
 
-const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 /// Cargo in the new project, without the network. It builds into the folder and by the profile of this workspace, so that
 /// what was built for these tests is not built again.

@@ -6,9 +6,9 @@ use crate::probe::{COUNT, COUNT_AGAIN, ProbingInterface};
 use nix::sys::signal::Signal;
 use rohrpost::common;
 use rohrpost::launch::{ControlError, LauncherInterface};
-use rohrpost::mailbox::{Full, Label, Name, Options, Participant, Receiver, Sender, Shape, Type, local};
 use rohrpost::serde::{Serialize, de::DeserializeOwned};
 use rohrpost::{CallError, Class, Fault};
+use rohrpost_mailbox::{Full, Label, Name, Options, Participant, Receiver, Sender, Shape, Type, local};
 use rohrpost_modules::call::{CallEnvelope, Link, ReplyEnvelope};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -254,7 +254,7 @@ fn replies_that_find_no_room_are_asked_for_again_and_nothing_runs_twice() {
         .unwrap()
         .classes
         .iter()
-        .map(|class| class.lost(rohrpost::mailbox::Loss::Refused))
+        .map(|class| class.lost(rohrpost_mailbox::Loss::Refused))
         .sum();
     assert!(refused > 0, "no reply was lost, so nothing was tested");
     link.close();

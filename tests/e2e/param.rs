@@ -6,7 +6,7 @@ use crate::process::Running;
 use crate::tuned::{shown, tuned};
 use nix::sys::signal::Signal;
 use rohrpost::common::{self, SetParameters};
-use rohrpost::mailbox::monotonic_ns;
+use rohrpost_mailbox::monotonic_ns;
 use std::path::PathBuf;
 
 /// The same node as the harness's, with a file for saved parameters.
@@ -280,7 +280,7 @@ fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
 #[test]
 fn saved_values_of_built_in_modules_are_checked_before_anything_runs() {
     let place = Place::new();
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/config");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../config");
     std::fs::copy(format!("{folder}/building.map"), place.path("building.map")).unwrap();
     let demo = std::fs::read_to_string(format!("{folder}/demo.toml")).unwrap();
     std::fs::write(place.path("demo.toml"), format!("parameters = \"tuned.toml\"\n{demo}")).unwrap();

@@ -4,9 +4,9 @@
 //! are, and no program for tests alone is ever installed.
 
 use nix::sys::signal::{SigHandler, Signal, raise, signal};
-use rohrpost::mailbox::{Full, Shape};
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError, Rate, Received, Subscription};
+use rohrpost_mailbox::{Full, Shape};
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -190,7 +190,7 @@ fn write_line(record: &Path, line: &str) {
 impl Probe {
     /// Publishes, and writes down when (between two moments of the monotonic clock) and how many bytes.
     fn publish_blob(&self, context: &mut Context) -> Result<(), ModuleError> {
-        let before = rohrpost::mailbox::monotonic_ns();
+        let before = rohrpost_mailbox::monotonic_ns();
         let blob = match self.settings.blob_bytes {
             0 => vec![0; 10 + self.beats as usize % 7 * 15],
             bytes => {
@@ -200,7 +200,7 @@ impl Probe {
             }
         };
         context.publish_now(ProbingInterface::BLOB, &blob)?;
-        let after = rohrpost::mailbox::monotonic_ns();
+        let after = rohrpost_mailbox::monotonic_ns();
         // As postcard: the length in one byte, and the bytes.
         write_line(&context.path("published"), &format!("{before} {after} {}", blob.len() + 1));
         Ok(())
@@ -287,17 +287,19 @@ impl Module for Probe {
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
         for (which, subscription) in ["each", "newest"].iter().zip(self.hears.iter().flatten()) {
-            if let Some(beat) = data.read(subscription) {
+            if let Some(beat) = data.read(subscription)? {
                 self.note(&format!("{which} {beat}"));
             }
         }
         if let Some((beats, blobs)) = self.mixes {
-            data.read(&beats).iter().for_each(|beat| self.note(&format!("mixed beat {beat}")));
-            data.read(&blobs).iter().for_each(|blob| self.note(&format!("mixed blob {}", blob.len())));
+            data.read(&beats)?.iter().for_each(|beat| self.note(&format!("mixed beat {beat}")));
+            data.read(&blobs)?.iter().for_each(|blob| self.note(&format!("mixed blob {}", blob.len())));
         }
-        if let Some(blob) = self.watches.as_ref().and_then(|watched| data.read(watched)) {
+        if let Some(watched) = &self.watches
+            && let Some(blob) = data.read(watched)?
+        {
             let word = |at: usize| u64::from_le_bytes(blob[at..at + 8].try_into().unwrap());
-            let age_us = rohrpost::mailbox::monotonic_ns().saturating_sub(word(8)) / 1000;
+            let age_us = rohrpost_mailbox::monotonic_ns().saturating_sub(word(8)) / 1000;
             self.note(&format!("blob {} {age_us}", word(0)));
         }
         Ok(())

@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// README's code blocks of this language.
 fn blocks(fence: &str) -> Vec<String> {
-    let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
+    let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md")).unwrap();
     let open = format!("\n```{fence}\n");
     readme.split(&open).skip(1).map(|part| part.split("\n```").next().unwrap().to_owned()).collect()
 }
@@ -21,7 +21,7 @@ fn the_module_of_the_readme_is_launched_by_five_lines_and_known_to_all_tools() {
     // The example was built beside this test: target/debug/{deps/e2e-…, examples/compass}.
     let built = std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().join("examples/compass");
     let module = module.replace("../target/debug/examples/compass", built.to_str().unwrap());
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("config");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config");
     let demo = fs::read_to_string(folder.join("demo.toml")).unwrap();
     let demo = demo.replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
     let config = place.path("demo.toml");

@@ -119,7 +119,7 @@ fn a_broken_configuration_starts_nothing() {
 fn check_explains_good_files_and_places_the_mistakes_of_bad_ones() {
     let place = Place::new();
     for file in ["demo.toml", "demo-log.toml"] {
-        let path = format!("{}/config/{file}", env!("CARGO_MANIFEST_DIR"));
+        let path = format!("{}/../config/{file}", env!("CARGO_MANIFEST_DIR"));
         let said = place.say(&["check", &path]).ok();
         assert!(said.contains("mapper.0") && said.contains("laser.0"), "{said}");
     }

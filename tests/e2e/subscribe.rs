@@ -6,7 +6,7 @@ use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
 use rohrpost::common::{DataHead, GET_DATA, Refused, SUBSCRIBE, Subscribe};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
+use rohrpost_mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
 use rohrpost_modules::call::CallEnvelope;
 
 /// The newest beat that has been published: whoever subscribed to each of them has been sent it.

@@ -134,7 +134,7 @@ impl Systems {
             // Of a system that no file describes.
             digest.system = 1;
         }
-        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/e2e/python/foreign.py");
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/e2e/python/foreign.py");
         let arguments = [page, NODES[0].1, "21119", &digest.to_string(), name, order, "1.96.0.0"];
         self.python(&[&arguments, certificates].concat())
     }

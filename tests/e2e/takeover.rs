@@ -12,7 +12,7 @@ use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::path::Path;
 use std::time::Duration;
 
-const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo-tdma.toml");
+const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo-tdma.toml");
 const NODES: [&str; 3] = ["base", "brain", "desk"];
 /// Modules here answer within this time.
 const SOON: Duration = Duration::from_secs(2);

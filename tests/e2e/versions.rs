@@ -2,7 +2,7 @@
 
 use crate::harness::{OUTPUT, Place, Robot, probe};
 use crate::tools::{at_a_node, commands};
-use rohrpost::mailbox::LAYOUT_VERSION;
+use rohrpost_mailbox::LAYOUT_VERSION;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;

@@ -29,7 +29,7 @@ fn a_picture_is_made_of_a_drawing_without_a_screen() {
         .arg(drawing(folder.path()))
         .arg(&picture)
         .args(["--size", "640x400", "--wait", "2"])
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .output()
         .unwrap();
     if String::from_utf8_lossy(&output.stderr).contains("the viewer needs a Vulkan driver") {

@@ -5,12 +5,12 @@
 use super::load::on_one_processor;
 use super::programs::bridge;
 use rohrpost::common::GET_DATA;
-use rohrpost::config::Installation;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::mailbox::{MailboxInfo, ModuleState, Node, monotonic_ns, node_directory};
 use rohrpost::serde::{Deserialize, de::DeserializeOwned};
 use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use rohrpost::{Context, Module, ModuleError, Name, Rate, Received, Subscription, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{MailboxInfo, ModuleState, Node, monotonic_ns, node_directory};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -220,7 +220,7 @@ impl Module for Sink {
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if let Some(due_ns) = data.read(&self.beat) {
+        if let Some(due_ns) = data.read(&self.beat)? {
             self.late_ns.push(monotonic_ns() - due_ns);
             self.lost += u64::from(data.head.sequence.wrapping_sub(self.expected));
             self.expected = data.head.sequence + 1;
@@ -354,7 +354,7 @@ impl Robot {
     pub(crate) fn assert_well(&mut self) {
         for name in self.node.mailboxes().unwrap() {
             let Some(mailbox) = self.node.look_at(name) else { continue };
-            let lost: u64 = mailbox.classes.iter().map(rohrpost::mailbox::ClassTraffic::lost_in_all).sum();
+            let lost: u64 = mailbox.classes.iter().map(rohrpost_mailbox::ClassTraffic::lost_in_all).sum();
             let name = self.installation.classes.format(name);
             assert_eq!(lost, 0, "{name} has lost packages: {:?}\n{}", mailbox.classes, self.said());
         }

@@ -4,7 +4,7 @@ use super::programs::{printed, rows, times_ns};
 use super::robot::{Robot, wait};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost::mailbox::{ClassTraffic, Full, Loss, local};
+use rohrpost_mailbox::{ClassTraffic, Full, Loss, local};
 use rohrpost_routers::lab::stalls::{Watched, judged};
 
 const SCAN: &str = "/world/scan/source.0";

@@ -1,7 +1,7 @@
 //! `cargo xtask test` and `cargo xtask ci`.
 //!
 //! Rerun's tests are in two builds: the bridge's own ones run in its profile, so that Rerun is compiled once only, and
-//! those that look at whole drawings with Rerun's command line belong to the root package's feature `rerun-tests`. They
+//! those that look at whole drawings with Rerun's command line belong to the feature `rerun-tests`. They
 //! find that command line by the environment variable `ROHRPOST_RERUN`, and have to fail without it, saying
 //! `run them by "cargo xtask test", which installs Rerun's command line`.
 
@@ -29,7 +29,7 @@ pub(crate) fn test() -> Result<ExitCode, Failure> {
         cargo(&[
             "test",
             "--package",
-            "rohrpost",
+            "rohrpost-cli",
             "--features",
             "rerun-tests",
             "--test",
@@ -50,27 +50,9 @@ pub(crate) fn ci() -> Result<ExitCode, Failure> {
     let deny = ["--all-targets", "--", "--deny", "warnings"];
     cargo::run("clippy for all but the GUI bridge", cargo(&["clippy", "--workspace", "--exclude", BRIDGE]).args(deny))?;
     cargo::run("clippy for the GUI bridge", &mut bridge_clippy())?;
-    let bare = ["clippy", "--package", "rohrpost", "--package", "rohrpost-modules", "--no-default-features", "--lib"];
+    let bare = ["clippy", "--package", "rohrpost", "--package", "rohrpost-modules", "--lib"];
     cargo::run("clippy for what the author of a module compiles", cargo(&bare).args(["--", "--deny", "warnings"]))?;
-    compiles_none_of("the author of a module", &["--no-default-features"], &NO_COMMAND_LINE)?;
-    compiles_none_of("a user of the command", &[], &["iceoryx2 ", "rerun ", "zenoh "])?;
     test()
-}
-
-/// Without default features nothing of the command line, of the built-in modules, of the benches or of Rerun may be compiled.
-const NO_COMMAND_LINE: [&str; 7] =
-    ["clap ", "comfy-table ", "serde_json ", "flate2 ", "rand ", "rerun ", "rohrpost-bench "];
-
-/// The root package with these features must need none of these crates.
-fn compiles_none_of(who: &str, features: &[&str], unwanted: &[&str]) -> Result<(), Failure> {
-    let arguments = ["tree", "--package", "rohrpost", "--edges", "normal,build", "--prefix", "none"];
-    let output = cargo(&arguments).args(features).output().map_err(|error| format!("cargo tree: {error}"))?;
-    let tree = String::from_utf8_lossy(&output.stdout);
-    let found: Vec<&str> = tree.lines().filter(|line| unwanted.iter().any(|name| line.starts_with(name))).collect();
-    if !output.status.success() || !tree.starts_with("rohrpost ") || !found.is_empty() {
-        return Err(format!("{who} would compile {found:?} ({})", output.status));
-    }
-    Ok(())
 }
 
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the compiler of

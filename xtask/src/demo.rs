@@ -10,7 +10,7 @@ pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     let gui = !args.iter().any(|arg| arg == "--no-gui");
     cargo::run(
         "building rohrpost: the launcher and the modules (a minute the first time)",
-        &mut cargo::cargo(&["build", "--package", "rohrpost", "--bin", "rohrpost"]),
+        &mut cargo::cargo(&["build", "--package", "rohrpost-cli", "--bin", "rohrpost"]),
     )?;
     if gui {
         cargo::run(

@@ -83,14 +83,14 @@ impl Module for MapModule {
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if let Some(odometry) = data.read(&self.odometry) {
+        if let Some(odometry) = data.read(&self.odometry)? {
             self.counts.odometries += 1;
             if self.track.push(data.head.stamp_ns, odometry.pose).is_err() {
                 // Time went back: a new epoch, or the base was restarted. Old poses are of no use then.
                 self.track.clear();
                 let _ = self.track.push(data.head.stamp_ns, odometry.pose);
             }
-        } else if let Some(scan) = data.read(&self.laser) {
+        } else if let Some(scan) = data.read(&self.laser)? {
             self.counts.scans += 1;
             self.waiting.push_back((data.head.stamp_ns, scan));
         }

@@ -74,7 +74,7 @@ impl Module for PilotModule {
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        let Some(scan) = data.read(&self.laser) else { return Ok(()) };
+        let Some(scan) = data.read(&self.laser)? else { return Ok(()) };
         let twist = self.pilot.drive(&scan);
         let trouble = self.motor.drive(twist.speed_m_s, twist.turn_rate_rad_s).err().map(|error| error.to_string());
         if trouble != self.trouble {

@@ -26,10 +26,25 @@ pub enum Rate {
     Every(Duration),
 }
 
+/// No rate at which data can be sent.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{0} is no rate; say how many values a second, or 0 for each")]
+pub struct BadRate(f64);
+
 impl Rate {
     /// At most so often a second; each value for 0.
-    pub fn hz(hz: f64) -> Self {
-        if hz > 0.0 { Self::Every(Duration::try_from_secs_f64(1.0 / hz).unwrap_or(Duration::MAX)) } else { Self::Each }
+    ///
+    /// # Errors
+    /// It is below 0, infinite, or no number.
+    pub fn hz(hz: f64) -> Result<Self, BadRate> {
+        match hz {
+            0.0 => Ok(Self::Each),
+            // A period that is too long for a `Duration` is as long as that can be.
+            _ if hz.is_finite() && hz > 0.0 => {
+                Ok(Self::Every(Duration::try_from_secs_f64(1.0 / hz).unwrap_or(Duration::MAX)))
+            }
+            _ => Err(BadRate(hz)),
+        }
     }
 }
 
@@ -249,6 +264,18 @@ mod tests {
     const LASER: Name = Name::new(1, 150, 0, 0);
     const WHEELS: Name = Name::new(1, 160, 0, 0);
     const LIFE: u32 = 1_234_567_890;
+
+    #[test]
+    fn a_rate_is_a_number_from_0_up() {
+        assert_eq!(Rate::hz(0.0), Ok(Rate::Each));
+        assert_eq!(Rate::hz(4.0), Ok(Rate::Every(Duration::from_millis(250))));
+        assert_eq!(Rate::hz(f64::MIN_POSITIVE), Ok(Rate::Every(Duration::MAX)));
+        for bad in [-1.0, -f64::MIN_POSITIVE, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(Rate::hz(bad), Err(BadRate(bad)));
+        }
+        let told = Rate::hz(f64::NAN).unwrap_err().to_string();
+        assert_eq!(told, "NaN is no rate; say how many values a second, or 0 for each");
+    }
 
     #[test]
     fn only_what_was_asked_for_in_this_life_is_taken() {

@@ -22,9 +22,9 @@ pub(crate) mod server;
 mod start;
 
 pub use context::{Context, ContextError};
-pub use follow::{Rate, Subscription};
+pub use follow::{BadRate, Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};
-pub use received::Received;
+pub use received::{Received, Unreadable};
 pub use runner::{exit, run, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;

@@ -5,6 +5,15 @@ use crate::common::DataHead;
 use crate::value::Data;
 use rohrpost_mailbox::Name;
 
+/// Data that came are not of the type that their publisher's interface says.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("data {number} of {from} cannot be read: {error}; its publisher does not write what its interface says")]
+pub struct Unreadable {
+    from: Name,
+    number: u16,
+    error: postcard::Error,
+}
+
 /// Data that a subscription brought.
 pub struct Received<'a> {
     /// The module that published it.
@@ -22,28 +31,49 @@ pub struct Received<'a> {
 }
 
 impl Received<'_> {
-    /// The value, if it belongs to this subscription and can be read. What cannot be read is told as a warning.
-    pub fn read<T: Data>(&self, subscription: &Subscription<T>) -> Option<T> {
-        if self.is_of(subscription) { self.decode() } else { None }
+    /// The value, if it belongs to this subscription; none of what belongs to another.
+    ///
+    /// # Errors
+    /// It belongs to it, and cannot be read.
+    pub fn read<T: Data>(&self, subscription: &Subscription<T>) -> Result<Option<T>, Unreadable> {
+        self.is_of(subscription).then(|| self.decode()).transpose()
     }
 
-    /// The value, if it came to this mailbox, which takes data from all ([`super::Context::open_mailbox_to_all`]), and can be read.
-    pub fn read_from<T: Data>(&self, mailbox: u8) -> Option<T> {
-        if self.mailbox == mailbox { self.decode() } else { None }
+    /// The value, if it came to this mailbox, which takes data from all ([`super::Context::open_mailbox_to_all`]).
+    ///
+    /// # Errors
+    /// It came there, and cannot be read.
+    pub fn read_from<T: Data>(&self, mailbox: u8) -> Result<Option<T>, Unreadable> {
+        (self.mailbox == mailbox).then(|| self.decode()).transpose()
     }
 
-    fn decode<T: Data>(&self) -> Option<T> {
-        match postcard::from_bytes(self.value) {
-            Ok(value) => Some(value),
-            Err(error) => {
-                tracing::warn!("data {} of {} cannot be read: {error}", self.number, self.from);
-                None
-            }
-        }
+    fn decode<T: Data>(&self) -> Result<T, Unreadable> {
+        postcard::from_bytes(self.value).map_err(|error| Unreadable { from: self.from, number: self.number, error })
     }
 
     /// Whether it belongs to this subscription.
     pub fn is_of<T>(&self, subscription: &Subscription<T>) -> bool {
         (self.mailbox, self.id) == (subscription.mailbox, subscription.id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: DataHead = DataHead { stamp_ns: 0, sequence: 0, missed: 0, incarnation: 0 };
+
+    #[test]
+    fn what_is_of_another_is_told_from_what_cannot_be_read() {
+        let from = Name::new(1, 150, 0, 0);
+        let read = |id: u16, mailbox: u8, value: &[u8]| {
+            let received = Received { from, number: 3, mailbox, id, head: HEAD, value };
+            received.read(&Subscription::<u16>::new(7, 2))
+        };
+        assert_eq!(read(7, 2, &[5]), Ok(Some(5)));
+        assert_eq!(read(8, 2, &[0xff]), Ok(None));
+        assert_eq!(read(7, 3, &[0xff]), Ok(None));
+        let told = read(7, 2, &[0xff]).unwrap_err().to_string();
+        assert!(told.starts_with("data 3 of 1.150.0.0 cannot be read: "), "{told}");
     }
 }

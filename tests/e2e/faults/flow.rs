@@ -3,8 +3,8 @@
 use super::{Field, mailbox_on, router_of};
 use crate::harness::{Robot, wait};
 use rohrpost::interfaces::{ClassCarried, Links};
-use rohrpost::mailbox::{Label, Loss, Participant, Receiver, SendError, Sender, Shape, Type, local};
 use rohrpost::{Class, Priority};
+use rohrpost_mailbox::{Label, Loss, Participant, Receiver, SendError, Sender, Shape, Type, local};
 use std::time::Duration;
 
 /// Classes that only flows have, so that their accounts are theirs alone. None is above that of probes, between which they pass.
@@ -74,7 +74,7 @@ impl Sink {
     }
 }
 
-fn read(package: &rohrpost::mailbox::Package<'_>) -> (u8, u64) {
+fn read(package: &rohrpost_mailbox::Package<'_>) -> (u8, u64) {
     (package.head().priority.0, u64::from_le_bytes(package.body()[..8].try_into().unwrap()))
 }
 

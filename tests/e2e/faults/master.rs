@@ -4,7 +4,7 @@ use super::{Field, router_of};
 use crate::harness::{halt, runs, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, RouterInterface};
-use rohrpost::mailbox::{SystemClock, SystemTime, monotonic_ns};
+use rohrpost_mailbox::{SystemClock, SystemTime, monotonic_ns};
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -5,7 +5,7 @@ use super::{Field, mailbox_on};
 use crate::harness::wait;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
-use rohrpost::mailbox::{Head, Type};
+use rohrpost_mailbox::{Head, Type};
 use rohrpost_routers::frame::{FrameHead, Kind};
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::net::UdpSocket;

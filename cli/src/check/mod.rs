@@ -1,0 +1,133 @@
+//! `rohrpost check`, and the reading of a configuration with all that can be known of it before anything runs.
+
+mod json;
+
+use super::{Failure, daemons, say};
+use rohrpost::Name;
+use rohrpost_config::{Errors, Flow, Installation, MissingProgram, TimeSource, explain};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost check config/demo.toml
+  rohrpost check robot.toml --json         mistakes with file and line, or what the file means, for programs")]
+pub(super) struct Arguments {
+    /// The configuration.
+    file: PathBuf,
+    /// Explain this node only.
+    #[arg(long, value_name = "NAME")]
+    node: Option<String>,
+    /// Print mistakes, or what the file means, as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads a configuration, and asks the built-in modules whether they could work with it.
+///
+/// # Errors
+/// Everything that is wrong, by line.
+pub(super) fn load(file: &Path) -> Result<Installation, Errors> {
+    judge(Installation::load(file)?)
+}
+
+/// Asks the built-in modules of an installation whether they could work with it.
+///
+/// # Errors
+/// Everything that they would refuse, by line.
+pub(super) fn judge(installation: Installation) -> Result<Installation, Errors> {
+    let problems = rohrpost_modules::builtin::check(&installation);
+    if !problems.is_empty() {
+        return Err(Errors::new(&installation.path, problems));
+    }
+    let problems = rohrpost_modules::builtin::check_saved(&installation);
+    match &installation.saved {
+        Some(saved) if !problems.is_empty() => Err(Errors::new(&saved.path, problems)),
+        _ => Ok(installation),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let installation = match load(&arguments.file) {
+        Err(errors) if arguments.json => {
+            say(json::errors(&errors));
+            return Ok(ExitCode::FAILURE);
+        }
+        loaded => loaded?,
+    };
+    let only = arguments.node.as_deref();
+    if only.is_some() {
+        rohrpost::launch::choose_node(&installation, only)?;
+    }
+    let missing = missing_programs(&installation, only)?;
+    if arguments.json {
+        say(json::installation(&installation, only, &missing));
+        return Ok(ExitCode::SUCCESS);
+    }
+    say(explain(&installation, only).trim_end());
+    for program in missing {
+        say(format_args!("note: {program}"));
+    }
+    for note in told_apart_by_size(&installation) {
+        say(format_args!("note: {note}"));
+    }
+    if let TimeSource::Master { .. } = installation.time {
+        for daemon in daemons::running(Path::new("/proc")) {
+            say(format_args!(
+                "note: {} runs on this computer; if that is a node, end it: {}; {}",
+                daemon.name,
+                daemon.ends,
+                daemons::WHY
+            ));
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Flows between the same modules of two nodes of which the file does not say what they carry: routers go by the size of each package.
+fn told_apart_by_size(installation: &Installation) -> Vec<String> {
+    let name = |name| installation.classes.format(name);
+    let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
+    let unsaid: Vec<&Flow> = installation.flows.iter().filter(|flow| flow.carries.is_none()).filter(crosses).collect();
+    let mut lines: BTreeMap<(Name, Name), Vec<String>> = BTreeMap::new();
+    for flow in unsaid {
+        lines.entry((flow.from, flow.to)).or_default().push(flow.line.to_string());
+    }
+    let notes = lines.into_iter().filter(|(_, lines)| lines.len() > 1).map(|((from, to), lines)| {
+        format!(
+            "the [[flow]]s from {} to {} in lines {} are told apart by the size of packages alone; say what each carries, such as \
+             `carries = \"data 1\"`",
+            name(from),
+            name(to),
+            lines.join(", ")
+        )
+    });
+    notes.collect()
+}
+
+/// On which computer this runs is not said; a missing program is an error only where its node will be launched.
+fn missing_programs(installation: &Installation, only: Option<&str>) -> Result<Vec<MissingProgram>, Failure> {
+    let beside = std::env::current_exe()?.parent().map(PathBuf::from).unwrap_or_default();
+    let nodes = installation.nodes.iter().filter(|node| only.is_none_or(|name| name == node.name));
+    Ok(nodes.flat_map(|node| installation.missing_programs(&node.name, &beside)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flows_that_size_alone_tells_apart_are_noted() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tdma.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        let notes = |text: &str| told_apart_by_size(&Installation::parse(text, &file).unwrap());
+        assert_eq!(notes(&text), [""; 0], "each says what it carries");
+        let line = |from: &str| 1 + text[..text.find(from).unwrap()].matches('\n').count();
+        let lines = [line("[[flow]] # 181 beams"), line("[[flow]] # and answered")];
+        let unsaid = text.replace("carries = \"data 1\"", "").replace("carries = \"reply 5\"", "");
+        let notes = notes(&unsaid);
+        let note = format!("the [[flow]]s from laser.0 to pilot.0 in lines {}, {} ", lines[0], lines[1]);
+        assert!(notes.len() == 3 && notes.iter().any(|said| said.starts_with(&note)), "{notes:#?}");
+    }
+}

@@ -1,0 +1,209 @@
+//! `rohrpost completions`, and the answers to the shells that it was set up in.
+//!
+//! A shell runs this command anew at each press of the key, with the words so far. Names of modules and nodes come from the
+//! configuration that launch has noted, functions and data from what modules have noted of themselves beside their mailboxes.
+//! Only a module whose parameters are to be completed is asked for them.
+
+use super::call::COMMON;
+use super::target::{Running, Target};
+use super::{Failure, say};
+use clap::builder::StyledStr;
+use clap::{Arg, Command, CommandFactory, ValueEnum};
+use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCandidate, PathCompleter};
+use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
+use rohrpost::Name;
+use rohrpost::common::OutputLevel;
+use rohrpost::description::Description;
+use rohrpost::output::plain;
+use rohrpost::survey::purpose;
+use rohrpost_config::Installation;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// By this variable a shell tells that it asks, and which it is.
+const VARIABLE: &str = "ROHRPOST_COMPLETE";
+/// Nobody waits longer for a list that they did not call for.
+const PATIENCE: Duration = Duration::from_millis(300);
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  source <(rohrpost completions bash)        in ~/.bashrc
+  source <(rohrpost completions zsh)         in ~/.zshrc, after compinit
+  rohrpost completions fish | source         in ~/.config/fish/config.fish
+Names of modules, functions and data are those of the node that runs.")]
+pub(super) struct Arguments {
+    /// The shell.
+    shell: Shell,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Shell {
+    Bash,
+    Zsh,
+    Fish,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let shell: &dyn EnvCompleter = match arguments.shell {
+        Shell::Bash => &Bash,
+        Shell::Zsh => &Zsh,
+        Shell::Fish => &Fish,
+    };
+    // Found on PATH, it is found there after an update too; else it is this very file.
+    let called = std::env::args_os().next().unwrap_or_default().to_string_lossy().into_owned();
+    let completer = if called.contains('/') { std::env::current_exe()?.display().to_string() } else { called };
+    let mut script = Vec::new();
+    shell.write_registration(VARIABLE, "rohrpost", "rohrpost", &completer, &mut script)?;
+    say(String::from_utf8_lossy(&script).trim_end());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Answers and ends, if a shell asks. To be called before anything else.
+pub(super) fn answer() {
+    CompleteEnv::with_factory(command).var(VARIABLE).complete();
+}
+
+/// The command line, with what each argument can be. Arguments mean the same wherever they have the same name.
+fn command() -> Command {
+    with_candidates(super::Arguments::command())
+}
+
+fn with_candidates(command: Command) -> Command {
+    let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
+    let named = command.get_name().to_owned();
+    let command = command.mut_args(|arg| completed(&named, arg));
+    names.iter().fold(command, |command, name| command.mut_subcommand(name, with_candidates))
+}
+
+fn completed(command: &str, arg: Arg) -> Arg {
+    match (command, arg.get_id().as_str()) {
+        // A name that there is not yet.
+        ("new", _) => arg,
+        ("mailbox", "name") => from(arg, mailboxes),
+        (_, "name" | "names" | "module" | "modules") => from(arg, modules),
+        (_, "node") => from(arg, nodes),
+        ("send", "function") => from(arg, own_functions),
+        (_, "function") => from(arg, functions),
+        (_, "data") => from(arg, data),
+        (_, "level") => from(arg, levels),
+        (_, "parameter") => from(arg, parameters),
+        ("call", "arguments") => from(arg, call_arguments),
+        ("check" | "launch" | "load", "file") | (_, "config") => {
+            let toml =
+                PathCompleter::any().filter(|path| path.is_dir() || path.extension().is_some_and(|end| end == "toml"));
+            arg.add(ArgValueCompleter::new(toml))
+        }
+        _ => arg,
+    }
+}
+
+fn from(arg: Arg, candidates: fn() -> Vec<CompletionCandidate>) -> Arg {
+    arg.add(ArgValueCandidates::new(candidates))
+}
+
+/// The words so far, without this command's own name. A file's name need not be text; names that are asked for are.
+fn words() -> Vec<String> {
+    let words = std::env::args_os().skip_while(|word| word != "--").skip(2);
+    words.map(|word| word.to_string_lossy().into_owned()).collect()
+}
+
+/// The value of an option, if the words have it.
+fn option(words: &[String], name: &str) -> Option<String> {
+    let at = words.iter().position(|word| word == name)?;
+    words.get(at + 1).cloned()
+}
+
+fn target() -> Target {
+    let words = words();
+    Target::new(option(&words, "--config").map(PathBuf::from), option(&words, "--node"))
+}
+
+/// The configuration that is meant: the one named, or that of what runs.
+fn installation() -> Option<Installation> {
+    if let Ok(running) = target().find() {
+        return Some(running.installation);
+    }
+    let words = words();
+    let named = ["--config", "check", "launch"].iter().find_map(|before| option(&words, before))?;
+    Installation::load(named.as_ref()).ok()
+}
+
+/// The shell puts it on the command line and into its list: what a terminal would obey is written out.
+fn candidate(name: impl AsRef<str>, help: &str) -> CompletionCandidate {
+    let help = Some(StyledStr::from(plain::line(help).into_owned())).filter(|_| !help.is_empty());
+    CompletionCandidate::new(plain::line(name.as_ref()).into_owned()).help(help)
+}
+
+fn modules() -> Vec<CompletionCandidate> {
+    let Some(installation) = installation() else { return Vec::new() };
+    let name = |name| {
+        let text = installation.classes.text(Name::class(name)).unwrap_or_default();
+        candidate(installation.classes.format(name), text)
+    };
+    installation.modules.iter().flat_map(|module| module.names()).map(name).collect()
+}
+
+fn mailboxes() -> Vec<CompletionCandidate> {
+    let Ok(running) = target().find() else { return Vec::new() };
+    let all = running.node.mailboxes().unwrap_or_default();
+    all.into_iter().map(|name| candidate(running.text(name), purpose(name.local()))).collect()
+}
+
+fn nodes() -> Vec<CompletionCandidate> {
+    let Some(installation) = installation() else { return Vec::new() };
+    installation.nodes.iter().map(|node| candidate(&node.name, "")).collect()
+}
+
+fn levels() -> Vec<CompletionCandidate> {
+    use OutputLevel::{Debug, Error, Info, Trace, Warn};
+    [Error, Warn, Info, Debug, Trace].iter().map(|level| candidate(level.name(), "")).collect()
+}
+
+fn own_functions() -> Vec<CompletionCandidate> {
+    let own = described().map(|description| description.functions).unwrap_or_default();
+    own.iter().map(|function| candidate(&function.name, &function.text)).collect()
+}
+
+fn functions() -> Vec<CompletionCandidate> {
+    own_functions().into_iter().chain(COMMON.iter().map(|(name, text)| candidate(*name, text))).collect()
+}
+
+fn data() -> Vec<CompletionCandidate> {
+    let data = described().map(|description| description.data).unwrap_or_default();
+    data.iter().map(|item| candidate(&item.name, &item.text)).collect()
+}
+
+fn parameters() -> Vec<CompletionCandidate> {
+    let found = target().find().ok().and_then(|running| {
+        let name = named(&running)?;
+        let mut tool = running.join(PATIENCE).ok()?;
+        let answer = tool.parameters(name).ok();
+        tool.close();
+        answer
+    });
+    found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.name, &parameter.text)).collect()
+}
+
+/// Arguments of functions that every module has; those of its own are numbers and words.
+fn call_arguments() -> Vec<CompletionCandidate> {
+    let words = words();
+    let is = |function| words.iter().any(|word| word == function);
+    match () {
+        () if is("get") => data(),
+        () if is("output-level") => levels(),
+        () => Vec::new(),
+    }
+}
+
+/// What the module says of itself that the words name.
+fn described() -> Option<Description> {
+    let running = target().find().ok()?;
+    running.describe(named(&running)?).ok()
+}
+
+/// The module that the words name.
+fn named(running: &Running) -> Option<Name> {
+    let classes = &running.installation.classes;
+    words().iter().find_map(|word| classes.parse_module(word).ok())
+}

@@ -1,0 +1,274 @@
+//! What went between the nodes of the demo, and whether nothing was forgotten.
+
+use crate::summary::class_name;
+use crate::table::{table, time};
+use rohrpost::Class;
+use rohrpost::interfaces::{Carried, ClassCarried, Links, PeerLink};
+use rohrpost_config::Installation;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::time::Duration;
+
+/// Whether all that routers were given is accounted for, once nothing is on its way any more.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct Balance {
+    taken: u64,
+    delivered: u64,
+    /// Lost in routers, for any cause.
+    lost: u64,
+    /// Sent by one router and not come to the other.
+    on_wire: u64,
+    /// Datagrams that went missing with them.
+    datagrams: u64,
+    /// Nodes whose routers died: what those had counted is gone with them.
+    died: Vec<String>,
+    /// What does not add up.
+    wrong: Vec<String>,
+}
+
+impl Balance {
+    /// The snapshots are of different moments: what goes on meanwhile, calls of tools (class `tool`), is compared within each node only.
+    /// Routers of the nodes that have `died` count from their last start, so that between nodes only the others are compared, and as a whole.
+    pub(super) fn of(links: &[Links], tool: u8, died: &[&str]) -> Self {
+        let mut balance = Self { died: died.iter().map(ToString::to_string).collect(), ..Self::default() };
+        links.iter().for_each(|node| balance.within(node));
+        let survived = |node: &str| !died.contains(&node);
+        let to_survivors = links.iter().filter(|links| survived(&links.node));
+        let ways = to_survivors.flat_map(|to| to.peers.iter().filter(|from| survived(&from.node)));
+        balance.datagrams = ways.map(gone).sum();
+        if died.is_empty() {
+            balance.by_class(links, tool)
+        } else {
+            balance.by_way(links)
+        }
+        balance
+    }
+
+    /// What a router has got must be what it knows of.
+    fn within(&mut self, node: &Links) {
+        let waiting: u64 = node.waiting.iter().map(|level| level.packages).sum();
+        let (mut into, mut out) = (0, waiting);
+        for class in &node.classes {
+            let lost = lost_of(class);
+            into += class.taken + class.came;
+            out += class.sent + class.delivered + lost;
+            self.lost += lost;
+            self.taken += class.taken;
+            self.delivered += class.delivered;
+        }
+        if into != out {
+            self.wrong.push(format!("the router of {} had {into} packages and knows of {out}", node.node));
+        }
+    }
+
+    /// What was sent must have come, class by class.
+    fn by_class(&mut self, links: &[Links], tool: u8) {
+        let mut ways: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
+        for class in links.iter().flat_map(|node| &node.classes) {
+            let way = ways.entry(class.class).or_default();
+            *way = [way[0] + class.sent, way[1] + class.came];
+        }
+        for (class, sent_and_came) in ways.into_iter().filter(|(class, _)| *class != tool) {
+            self.compare(&format!("of class {class}"), sent_and_came);
+        }
+    }
+
+    /// The same from each node to each other, as far as the routers of both have lived throughout.
+    fn by_way(&mut self, links: &[Links]) {
+        let survivors: Vec<&Links> = links.iter().filter(|links| !self.died.contains(&links.node)).collect();
+        let towards = |of: &Links, to: &Links| of.peers.iter().position(|peer| peer.node == to.node);
+        for (from, to) in survivors.iter().flat_map(|from| survivors.iter().map(move |to| (*from, *to))) {
+            if let (Some(there), Some(back)) = (towards(from, to), towards(to, from)) {
+                let sent_and_came = [from.peers[there].sent.packages, to.peers[back].received.packages];
+                self.compare(&format!("from {} to {}", from.node, to.node), sent_and_came);
+            }
+        }
+    }
+
+    fn compare(&mut self, what: &str, [sent, came]: [u64; 2]) {
+        self.on_wire += sent.saturating_sub(came);
+        if came > sent {
+            self.wrong.push(format!("{what}, {sent} packages were sent and {came} came"));
+        } else if came < sent && self.datagrams == 0 {
+            let missing = sent - came;
+            self.wrong.push(format!("{what}, packages that did not come: {missing}; no datagram was lost"));
+        }
+    }
+
+    pub(super) fn holds(&self) -> bool {
+        self.wrong.is_empty()
+    }
+}
+
+impl fmt::Display for Balance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { taken, delivered, lost, on_wire, datagrams, died, wrong } = self;
+        writeln!(
+            f,
+            "packages to other nodes: {taken}; delivered: {delivered}; lost in routers, for the causes above: {lost}\n\
+             lost on the wire: {on_wire}; datagrams that did not come whole: {datagrams}"
+        )?;
+        if !died.is_empty() {
+            writeln!(
+                f,
+                "what the router of {} had counted before it died is gone with it: between nodes, packages are compared of the others alone",
+                died.join(", of ")
+            )?;
+        }
+        if wrong.is_empty() {
+            return writeln!(f, "the accounts balance");
+        }
+        wrong.iter().try_for_each(|what| writeln!(f, "the accounts do not balance: {what}"))
+    }
+}
+
+fn lost_of(class: &ClassCarried) -> u64 {
+    class.lost.iter().map(|lost| lost.packages).sum()
+}
+
+/// Datagrams from a peer that did not come whole.
+fn gone(peer: &PeerLink) -> u64 {
+    peer.lost + peer.damaged
+}
+
+/// A row for each class and node.
+pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
+    let mut rows: Vec<(u8, [String; 10])> = Vec::new();
+    for node in links {
+        for class in &node.classes {
+            let ages = class.age.map_or(["-".into(), "-".into(), "-".into()], |age| {
+                [age.p50_ns, age.p99_ns, age.max_ns].map(|ns| time(Duration::from_nanos(ns)))
+            });
+            let [p50, p99, max] = ages;
+            let lost = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause));
+            let lost: Vec<String> = lost.collect();
+            let counts = [class.taken, class.sent, class.came, class.delivered].map(|count| count.to_string());
+            let [taken, sent, came, delivered] = counts;
+            let name = class_name(installation, Some(Class(class.class)));
+            let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
+            rows.push((class.class, [name, node.node.clone(), taken, sent, came, delivered, lost, p50, p99, max]));
+        }
+    }
+    rows.sort_by_key(|(class, _)| std::cmp::Reverse(*class));
+    table(
+        ["class", "node", ">taken", ">sent", ">came", ">delivered", "lost", ">age p50", ">p99", ">max"],
+        rows.into_iter().map(|(_, row)| row),
+    )
+}
+
+/// A row for each pair of nodes and direction, as the one that receives sees it.
+pub(super) fn by_link(links: &[Links]) -> String {
+    let pairs = links.iter().flat_map(|to| to.peers.iter().map(move |from| (from, to)));
+    let rows = pairs.map(|(from, to)| {
+        let Carried { packages, datagrams, bytes, parts } = from.received;
+        [
+            format!("{} → {}", from.node, to.node),
+            packages.to_string(),
+            datagrams.to_string(),
+            format!("{} KiB", bytes.div_ceil(1 << 10)),
+            parts.to_string(),
+            from.lost.to_string(),
+            from.damaged.to_string(),
+            from.copies.to_string(),
+            from.overtaken.to_string(),
+        ]
+    });
+    table(["link", ">packages", ">datagrams", ">bytes", ">parts", ">lost", ">damaged", ">copies", ">overtaken"], rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rohrpost::interfaces::{CarriedLoss, LinkState};
+
+    const TOOL: u8 = 16;
+
+    fn class(class: u8, [taken, sent, came, delivered]: [u64; 4], lost: u64) -> ClassCarried {
+        let lost = if lost > 0 { vec![CarriedLoss { cause: "quota".into(), packages: lost }] } else { Vec::new() };
+        ClassCarried { class, taken, sent, came, delivered, lost, age: None }
+    }
+
+    fn peer(name: &str, [sent, received]: [u64; 2], lost: u64) -> PeerLink {
+        let carried = |packages| Carried { packages, ..Carried::default() };
+        PeerLink {
+            node: name.into(),
+            address: "10.77.0.9".into(),
+            state: LinkState::Alive,
+            why: String::new(),
+            heard_ms: Some(1),
+            sent: carried(sent),
+            received: carried(received),
+            unsent: 0,
+            lost,
+            missed: 0,
+            copies: 0,
+            damaged: 0,
+            overtaken: 0,
+            refused: 0,
+            restarts: 0,
+        }
+    }
+
+    fn node(name: &str, classes: Vec<ClassCarried>, lost: u64) -> Links {
+        with_peers(name, classes, vec![peer("other", [0, 0], lost)])
+    }
+
+    fn with_peers(name: &str, classes: Vec<ClassCarried>, peers: Vec<PeerLink>) -> Links {
+        Links {
+            node: name.into(),
+            digest: 1,
+            uptime_ms: 1,
+            peers,
+            waiting: Vec::new(),
+            waiting_bytes: 0,
+            classes,
+            foreign: 0,
+            failures: Vec::new(),
+            rejections: Vec::new(),
+        }
+    }
+
+    fn wrong(base: ClassCarried, desk: ClassCarried, lost: u64) -> Vec<String> {
+        Balance::of(&[node("base", vec![base], 0), node("desk", vec![desk], lost)], TOOL, &[]).wrong
+    }
+
+    #[test]
+    fn accounts_balance_if_every_package_is_known_of() {
+        let sent = || class(150, [10, 9, 0, 0], 1);
+        assert_eq!(wrong(sent(), class(150, [0, 0, 9, 7], 2), 0), [""; 0]);
+        assert_eq!(wrong(sent(), class(150, [0, 0, 8, 8], 0), 1), [""; 0], "one was in a datagram that is missing");
+        assert_eq!(
+            wrong(sent(), class(150, [0, 0, 8, 8], 0), 0),
+            ["of class 150, packages that did not come: 1; no datagram was lost"]
+        );
+        assert_eq!(wrong(sent(), class(150, [0, 0, 10, 10], 0), 0), ["of class 150, 9 packages were sent and 10 came"]);
+        assert_eq!(
+            wrong(class(150, [10, 9, 0, 0], 0), class(150, [0, 0, 9, 9], 0), 0),
+            ["the router of base had 10 packages and knows of 9"]
+        );
+    }
+
+    #[test]
+    fn after_a_death_the_others_are_compared_and_each_life_for_itself() {
+        let survivors = |came: u64| {
+            let base = with_peers("base", vec![class(150, [3, 3, 0, 0], 0)], vec![peer("brain", [3, 9], 5)]);
+            let brain = with_peers(
+                "brain",
+                vec![class(150, [20, 20, 0, 0], 0)],
+                vec![peer("base", [20, 8], 0), peer("desk", [4, 2], 0)],
+            );
+            let desk = with_peers("desk", Vec::new(), vec![peer("brain", [2, came], 0)]);
+            Balance::of(&[base, brain, desk], TOOL, &["base"])
+        };
+        let balance = survivors(4);
+        assert!(balance.holds() && balance.to_string().contains("the router of base had counted"), "{balance}");
+        assert_eq!(survivors(3).wrong, ["from brain to desk, packages that did not come: 1; no datagram was lost"]);
+        assert_eq!(survivors(5).wrong, ["from brain to desk, 4 packages were sent and 5 came"]);
+    }
+
+    #[test]
+    fn calls_of_tools_go_on_between_two_snapshots() {
+        assert_eq!(wrong(class(TOOL, [10, 10, 0, 0], 0), class(TOOL, [0, 0, 9, 9], 0), 0), [""; 0]);
+        assert_eq!(wrong(class(TOOL, [10, 9, 0, 0], 0), class(TOOL, [0, 0, 9, 9], 0), 0).len(), 1, "not within a node");
+    }
+}

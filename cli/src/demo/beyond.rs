@@ -1,0 +1,143 @@
+//! What went through the TCP router in the demo, as its clients have counted; and what it cost that it died.
+
+use crate::Failure;
+use crate::summary::class_name;
+use crate::table::{table, time};
+use rohrpost::common::GET_DATA;
+use rohrpost::interfaces::{BeyondLink, BeyondState, ClassPassed, TcpInterface};
+use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::{CallError, Class, ToolLink};
+use rohrpost_config::Installation;
+use std::collections::BTreeMap;
+
+/// What the clients of all nodes say; nobody without a TCP router.
+pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<BeyondLink>, Failure> {
+    let mut links = Vec::new();
+    for node in &installation.nodes {
+        let Some(client) = installation.tcp_client_of(&node.name) else { continue };
+        let port = TcpInterface::LINK;
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let told = tool.call(client, GET_DATA, (port.hash)(), write, |bytes| from_bytes::<(u64, BeyondLink)>(bytes));
+        let named = |error: CallError| format!("client of the TCP router on {}: {error}", node.name);
+        links.push(told.map(|(_, link)| link).map_err(named)?);
+    }
+    Ok(links)
+}
+
+/// What a class did, at all ends together.
+#[derive(Default)]
+struct Sum {
+    /// Meant to go to the TCP router.
+    meant: u64,
+    left: u64,
+    /// By newer ones, at the clients' ends.
+    replaced: u64,
+    came: u64,
+    delivered: u64,
+    /// By cause.
+    lost: BTreeMap<String, u64>,
+}
+
+impl Sum {
+    /// Handed to a connection, and never come out of another.
+    fn on_way(&self) -> u64 {
+        self.left.saturating_sub(self.came)
+    }
+
+    fn lose(&mut self, class: &ClassPassed) {
+        for lost in &class.lost {
+            *self.lost.entry(lost.cause.clone()).or_default() += lost.packages;
+        }
+    }
+}
+
+fn sums(links: &[BeyondLink]) -> BTreeMap<u8, Sum> {
+    let mut sums: BTreeMap<u8, Sum> = BTreeMap::new();
+    for link in links {
+        for class in &link.sent {
+            let sum = sums.entry(class.class).or_default();
+            (sum.meant, sum.left) = (sum.meant + class.packages, sum.left + class.passed);
+            sum.replaced += class.replaced;
+            sum.lose(class);
+        }
+        for class in &link.received {
+            let sum = sums.entry(class.class).or_default();
+            (sum.came, sum.delivered) = (sum.came + class.packages, sum.delivered + class.passed);
+            sum.lose(class);
+        }
+    }
+    sums
+}
+
+/// Tables of classes and of clients; empty where there are none.
+pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: bool) -> String {
+    if links.is_empty() {
+        return String::new();
+    }
+    let all = sums(links);
+    let is_any_on_way = all.values().any(|sum| sum.on_way() > 0);
+    let rows = all.into_iter().rev().map(|(class, sum)| {
+        let lost: Vec<String> = sum.lost.iter().map(|(cause, packages)| format!("{packages} {cause}")).collect();
+        [
+            class_name(installation, Some(Class(class))),
+            sum.meant.to_string(),
+            sum.left.to_string(),
+            sum.replaced.to_string(),
+            sum.came.to_string(),
+            sum.delivered.to_string(),
+            sum.on_way().to_string(),
+            if lost.is_empty() { "none".into() } else { lost.join(", ") },
+        ]
+    });
+    let heads =
+        ["class", ">meant to", ">left", ">replaced", ">came", ">delivered", ">lost on the way", "lost at the ends"];
+    let mut text = String::from("\nThrough the TCP router, by class, as the clients of all nodes have counted:\n\n");
+    text += &table(heads, rows);
+    if has_died {
+        text += "(lost on the way: with connections that broke, or waiting in a TCP router that died, less its own answers to what it could not hand on)\n";
+    }
+    if is_any_on_way {
+        text += "(what newer ones replaced at the TCP router itself counts as lost on the way here; `rohrpost net` tells it apart)\n";
+    }
+    let rows = links.iter().map(|link| {
+        let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {
+            Some(ended_ns) => time(outage.duration(ended_ns)),
+            None => "it is not over".into(),
+        });
+        [link.node.clone(), link.reconnects.to_string(), link.outages.to_string(), outage]
+    });
+    text + "\n" + &table(["node", ">connected anew", ">outages", ">the last took"], rows)
+}
+
+/// Whether all take part in the end.
+pub(super) fn is_well(links: &[BeyondLink]) -> bool {
+    links.iter().all(|link| link.state == BeyondState::Up)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_never_took_part_is_not_well() {
+        let link = |state| BeyondLink {
+            node: "desk".into(),
+            server: "192.168.7.1:7400".into(),
+            state,
+            why: String::new(),
+            reconnects: 0,
+            round_trip_ns: None,
+            time_error_ns: None,
+            time: None,
+            outages: 0,
+            outage: None,
+            waiting_bytes: 0,
+            sent: Vec::new(),
+            received: Vec::new(),
+        };
+        assert!(is_well(&[link(BeyondState::Up), link(BeyondState::Up)]));
+        for state in [BeyondState::Away, BeyondState::Joining] {
+            assert!(!is_well(&[link(BeyondState::Up), link(state)]), "{state:?}");
+        }
+    }
+}

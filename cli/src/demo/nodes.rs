@@ -1,0 +1,255 @@
+//! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
+
+use super::account::{self, Balance};
+use super::beyond;
+use super::losses::Losses;
+use super::takeover::{Seen, Victim, Watch};
+use super::{Arguments, FIRST_FUNCTION, Joined, copy, drawn};
+use crate::launch::{Nodes, lab};
+use crate::speech::Speech;
+use crate::summary::print_classes;
+use crate::vocabulary::Vocabulary;
+use crate::{Failure, say};
+use crate::{flows, slots};
+use rohrpost::common::{GET_DATA, State};
+use rohrpost::interface::{DataPort, Interface};
+use rohrpost::interfaces::{CartographerInterface, FlowStates, Links, MapCounts, RouterInterface, SlotState};
+use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::survey::Survey;
+use rohrpost::{CallError, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
+use serde::de::DeserializeOwned;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+
+/// Modules answer within this time.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Routers tell what they count twice a second; when all that was on its way has come, it stays as it is.
+const SETTLE: Duration = Duration::from_secs(8);
+const LOOK: Duration = Duration::from_millis(600);
+
+pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> Result<ExitCode, Failure> {
+    let folder = super::folder::Folder::new()?;
+    let installation = Arc::new(copy::installation(arguments, folder.path())?);
+    let nodes = installation.nodes.len();
+    if nodes != usize::from(count) {
+        return Err(format!("{} has {nodes} nodes; say --nodes {nodes}", installation.shown.display()).into());
+    }
+    let (drawing, begun) = (super::drawing(&installation), SystemTime::now());
+    // Before the first thread, of which the speech has two.
+    let lab = lab(&installation)?;
+    let speech = Speech::begin()?;
+    installation.security_texts().iter().for_each(|security| speech.say(security));
+    let mut nodes = Nodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
+    let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == Joined::Tcp)];
+    let victims = victims.into_iter().filter(|(_, is_one)| *is_one).map(|(victim, _)| victim).collect();
+    let summary = watch(&mut nodes, &installation, long, victims).map(|seen| summary(&installation, &seen?));
+    let code = nodes.stop();
+    speech.settle();
+    let Some(summary) = summary else { return Ok(ExitCode::FAILURE) };
+    let (text, well) = summary?;
+    say(text.trim_end());
+    drawn(drawing, begun);
+    Ok(if well { code } else { ExitCode::FAILURE })
+}
+
+/// Until the time is over, which begins when all modules are on, or it is told to stop; what was seen of routers, or none if not all ran.
+fn watch(
+    nodes: &mut Nodes<'_>,
+    installation: &Arc<Installation>,
+    long: Option<Duration>,
+    victims: Vec<Victim>,
+) -> Option<Result<Seen, Failure>> {
+    while !nodes.all_run() {
+        if !nodes.watch(Duration::MAX) {
+            return None;
+        }
+    }
+    let watch = nodes.capture().and_then(|capture| Watch::begin(installation, capture));
+    let watch = match watch {
+        Ok(watch) => watch,
+        Err(error) => return Some(Err(error)),
+    };
+    let after = |time: Option<Duration>| time.map(|time| Instant::now() + time);
+    let (deadline, mut kill_at) = (after(long), after(long.map(|long| long / 2).filter(|_| !victims.is_empty())));
+    let is_over = |at: Option<Instant>| at.is_some_and(|at| Instant::now() >= at);
+    while !is_over(deadline) {
+        let next = kill_at.or(deadline);
+        let left = next.map_or(Duration::MAX, |next| next.saturating_duration_since(Instant::now()));
+        if !nodes.watch(left) {
+            break;
+        }
+        if is_over(kill_at) {
+            kill_at = None;
+            victims.iter().for_each(|victim| watch.kill(*victim));
+        }
+    }
+    Some(watch.end())
+}
+
+/// All there is to say at the end, and whether all is well.
+fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, bool), Failure> {
+    let open = |node: &rohrpost_config::Node| Node::open(&node_directory(&installation.name, &node.name));
+    let nodes = installation.nodes.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let (first, name) = (&nodes[0], &installation.nodes[0].name);
+    let mut tool = ToolLink::join(installation, first, name, PATIENCE)?;
+    let map = map(installation, &mut tool);
+    let errors = in_error(installation, &mut tool);
+    let (clocks, clocks_hold) = clocks(installation, &nodes);
+    let survey = |(node, config): (&Arc<Node>, &rohrpost_config::Node)| Survey::new(node, installation, &config.name);
+    let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
+    let died = seen.died();
+    let links = settled(installation, &mut tool, &died)?;
+    let losses = Losses::ask(installation, &mut tool);
+    let kept = in_slots(installation, &mut tool)?;
+    let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
+    let beyond = beyond::ask(installation, &mut tool)?;
+    let mut vocabulary = Vocabulary::default();
+    let late = flows::measured(installation, &late, &links.iter().collect::<Vec<_>>(), &mut vocabulary, |module| {
+        tool.describe(module).ok()
+    });
+    let losses = losses.table(installation, &mut vocabulary, |module| tool.describe(module).ok());
+    tool.close();
+    let balance = Balance::of(&links, installation.classes.tool().0, &died);
+    let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
+    text += &print_classes(installation, &classes(&surveys));
+    text += "(data and replies carry the class of the module that asked for them)\n";
+    text += "\nOver the network, by class and node; age: from the stamp of data to the mailbox on the other node:\n\n";
+    text += &account::by_class(installation, &links);
+    text += "\nOn the wire:\n\n";
+    text += &account::by_link(&links);
+    text += &beyond::text(installation, &beyond, seen.tcp_router_died());
+    if !kept.is_empty() {
+        text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
+        text += &slots::kept(&kept);
+    }
+    if !late.is_empty() {
+        text +=
+            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
+    }
+    if !installation.flows.is_empty() {
+        text += "\nDeclared flows from end to end, as the modules themselves have counted; too late: answered, but after the caller's time:\n\n";
+        text += &losses;
+    }
+    text += &format!("\n{balance}\n{clocks}");
+    let deaths = seen.text();
+    if !deaths.is_empty() {
+        text += &format!("\n{deaths}\n");
+    }
+    text += &map;
+    for error in &errors {
+        text += &format!("{error}\n");
+    }
+    Ok((text, errors.is_empty() && clocks_hold && balance.holds() && seen.is_well() && beyond::is_well(&beyond)))
+}
+
+/// What the mailboxes of all nodes did.
+fn classes(surveys: &[Survey]) -> Vec<ClassTraffic> {
+    let mut classes: Vec<ClassTraffic> = Vec::new();
+    for traffic in surveys.iter().flat_map(|survey| &survey.classes) {
+        match classes.iter_mut().find(|known| known.class == traffic.class) {
+            Some(known) => known.add(traffic),
+            None => classes.push(traffic.clone()),
+        }
+    }
+    classes.sort_by_key(|traffic| std::cmp::Reverse(traffic.class));
+    classes
+}
+
+fn map(installation: &Installation, tool: &mut ToolLink) -> String {
+    let read = |bytes: &[u8]| from_bytes::<MapCounts>(bytes);
+    let mapper = super::running(installation, CartographerInterface::CLASS);
+    let counts = mapper.map(|name| tool.call(name, FIRST_FUNCTION, CartographerInterface::hash(), |_| Ok(()), read));
+    match counts {
+        Some(Ok(counts)) => super::map_line(&counts),
+        Some(Err(error)) => format!("map: {error}\n"),
+        None => String::new(),
+    }
+}
+
+/// Modules that are in error, or do not answer.
+fn in_error(installation: &Installation, tool: &mut ToolLink) -> Vec<String> {
+    let told = |module: &rohrpost_config::Module| {
+        let name = installation.classes.format(module.name);
+        match tool.status(module.name) {
+            Ok(status) if status.state == State::Error => Some(format!("{name} is in error: {}", status.error)),
+            Err(error) if !module.optional => Some(format!("{name} does not say how it is: {error}")),
+            _ => None,
+        }
+    };
+    installation.modules.iter().filter_map(told).collect()
+}
+
+/// How far apart the clocks of the nodes are. All of them run on one computer here, so that it is known exactly: their pages are read at
+/// one moment of the one monotonic clock. False if one says that it is better than it is.
+fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
+    let clocks: Vec<SystemClock> = nodes.iter().map(|node| SystemClock::open(node)).collect();
+    let moment = monotonic_ns();
+    let times: Vec<_> = clocks.iter().map(|clock| clock.at(moment)).collect();
+    // Who is master is sure of its time, since it is that of all.
+    let master = (0..times.len()).min_by_key(|index| times[*index].error).unwrap_or(0);
+    let (mut text, mut holds) = (String::new(), true);
+    for (index, node) in installation.nodes.iter().enumerate() {
+        let by_master = clocks[index].record().is_some_and(|record| record.source == TimeSource::Master);
+        let off_ns = i128::from(times[index].ns) - i128::from(times[master].ns);
+        let stated_ns = (times[index].error + times[master].error).as_nanos();
+        let name = &node.name;
+        text += &match (by_master, index == master) {
+            (false, _) => format!("clock of {name}: its own, no master was heard\n"),
+            (true, true) => format!("clock of {name}: the master's\n"),
+            (true, false) => {
+                holds &= off_ns.unsigned_abs() <= stated_ns;
+                let (off_us, stated_us) = (off_ns as f64 / 1e3, stated_ns as f64 / 1e3);
+                format!("clock of {name}: {off_us:+.2} µs off the master's, at most {stated_us:.1} µs as it says\n")
+            }
+        };
+    }
+    if !holds {
+        text += "a clock is further off than it says\n";
+    }
+    (text, holds)
+}
+
+/// What routers counted when all that was on its way had come: the modules that send are switched off first.
+fn settled(installation: &Installation, tool: &mut ToolLink, died: &[&str]) -> Result<Vec<Links>, Failure> {
+    for module in installation.modules.iter().filter(|module| module.is_in_file()) {
+        // One that does not answer was told of above.
+        let _ = tool.switch(module.name, false);
+    }
+    let deadline = Instant::now() + SETTLE;
+    loop {
+        let links: Vec<Links> = of_routers(installation, tool, RouterInterface::LINKS)?;
+        if Balance::of(&links, installation.classes.tool().0, died).holds() || Instant::now() >= deadline {
+            return Ok(links);
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// How each node kept its time slots; empty where there are none.
+fn in_slots(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<SlotState>, Failure> {
+    if installation.tdma.is_none() {
+        return Ok(Vec::new());
+    }
+    of_routers(installation, tool, RouterInterface::SLOTS)
+}
+
+/// What the routers of all nodes publish.
+fn of_routers<T: DeserializeOwned>(
+    installation: &Installation,
+    tool: &mut ToolLink,
+    data: DataPort<T>,
+) -> Result<Vec<T>, Failure> {
+    let mut all = Vec::new();
+    for node in installation.lan_nodes() {
+        let router = installation.router_of(&node.name).ok_or("no router")?;
+        let write = |body: &mut Vec<u8>| append(body, &(data.number,));
+        let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
+        let answer = tool.call(router, GET_DATA, RouterInterface::hash(), write, read);
+        let told = |error: CallError| format!("router of {}: {error}", node.name);
+        all.push(answer.map(|(_, told)| told).map_err(told)?);
+    }
+    Ok(all)
+}

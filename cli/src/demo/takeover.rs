@@ -1,0 +1,202 @@
+//! What the demo tells when a router dies: who stood in for a master, who is one now, and when the router was there again.
+//!
+//! A thread looks at the bridge and at the nodes' tables. It asks nobody, so that nothing crosses the network for it.
+
+use super::ears::Ears;
+use super::lives::{Death, Lives};
+use super::reigns::{Reign, Reigns};
+use crate::Failure;
+use crate::table::time;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::monotonic_ns;
+use rohrpost_routers::lab::Capture;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Deaths are found so soon.
+const LOOK: Duration = Duration::from_millis(5);
+/// And at the latest, on a busy computer: who told the time less than this before was the master when it died.
+const FOUND_NS: u64 = 500_000_000;
+/// What crossed the bridge is read so often, in looks; it waits in the kernel with its time.
+const READ_LOOKS: u32 = 10;
+
+/// The thread that watches.
+pub(super) struct Watch {
+    /// Who is to be killed; without this end, the thread ends.
+    kill: Sender<Victim>,
+    thread: JoinHandle<Seen>,
+    installation: Arc<Installation>,
+}
+
+/// Whom to kill.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Victim {
+    /// The router of the present master of time.
+    Master,
+    /// The TCP router.
+    TcpRouter,
+}
+
+/// What it has seen.
+pub(super) struct Seen {
+    installation: Arc<Installation>,
+    began_ns: u64,
+    lives: Lives,
+    /// Of the TCP router.
+    beyond: Lives,
+    reigns: Reigns,
+    /// Processes that were killed on purpose.
+    on_purpose: Vec<u32>,
+    /// Kills that were wanted when nobody was master.
+    in_vain: u32,
+}
+
+impl Watch {
+    /// Of nodes that all run.
+    pub(super) fn begin(installation: &Arc<Installation>, capture: Capture) -> Result<Self, Failure> {
+        let (kill, words) = channel();
+        let seen = Seen {
+            installation: installation.clone(),
+            began_ns: monotonic_ns(),
+            lives: Lives::of(installation, |node| installation.router_of(node))?,
+            beyond: Lives::of(installation, |node| {
+                installation.tcp_router().filter(|router| installation.node_of(*router) == Some(node))
+            })?,
+            reigns: Reigns::heard_with(Ears::of(installation)?),
+            on_purpose: Vec::new(),
+            in_vain: 0,
+        };
+        let thread = std::thread::Builder::new().name("watch".into()).spawn(move || seen.watch(capture, &words))?;
+        Ok(Self { kill, thread, installation: installation.clone() })
+    }
+
+    /// Kills a router.
+    pub(super) fn kill(&self, victim: Victim) {
+        // It ends only when told to.
+        let _ = self.kill.send(victim);
+    }
+
+    /// Ends it.
+    pub(super) fn end(self) -> Result<Seen, Failure> {
+        drop(self.kill);
+        let name = &self.installation.name;
+        self.thread.join().map_err(|_| format!("the thread that watches {name} has panicked").into())
+    }
+}
+
+impl Seen {
+    fn watch(mut self, mut capture: Capture, words: &Receiver<Victim>) -> Self {
+        let mut looks = 0;
+        loop {
+            let word = words.recv_timeout(LOOK);
+            self.lives.look();
+            self.beyond.look();
+            looks += 1;
+            if looks % READ_LOOKS == 0 || word != Err(RecvTimeoutError::Timeout) {
+                capture.drain(|crossing| self.reigns.note(&crossing));
+            }
+            match word {
+                Ok(victim) => self.kill(victim),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return self,
+            }
+        }
+    }
+
+    fn kill(&mut self, victim: Victim) {
+        let killed = match victim {
+            Victim::Master => {
+                let master = self.reigns.master_at(monotonic_ns()).map(|reign| usize::from(reign.node));
+                master.and_then(|node| self.lives.kill(node))
+            }
+            Victim::TcpRouter => (0..self.installation.nodes.len()).find_map(|node| self.beyond.kill(node)),
+        };
+        match killed {
+            Some(pid) => self.on_purpose.push(pid),
+            None => self.in_vain += 1,
+        }
+    }
+
+    /// Nodes whose routers had more than one life.
+    pub(super) fn died(&self) -> Vec<&str> {
+        let name = |death: &Death| self.installation.nodes[death.node].name.as_str();
+        let mut names: Vec<&str> = self.lives.deaths.iter().map(name).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// Whether each that died came back, and was killed if it was to be.
+    pub(super) fn is_well(&self) -> bool {
+        self.in_vain == 0 && self.lives.deaths.iter().chain(&self.beyond.deaths).all(|death| death.again.is_some())
+    }
+
+    /// Whether the TCP router had more than one life.
+    pub(super) fn tcp_router_died(&self) -> bool {
+        !self.beyond.deaths.is_empty()
+    }
+
+    /// All of it in words; empty when no router died.
+    pub(super) fn text(&self) -> String {
+        let mut text: String = self.lives.deaths.iter().map(|death| self.event(death)).collect();
+        for death in &self.beyond.deaths {
+            text += &format!("The TCP router {}.\n", self.life(death));
+        }
+        if self.in_vain > 0 {
+            text += "no router was killed, as there was none: no master, if [time] of the configuration is without `source = \"master\"`, or no \
+                     TCP router\n";
+        }
+        if !self.lives.deaths.is_empty() {
+            let master = self.reigns.master_at(u64::MAX).map(|reign| self.name(reign));
+            text += &format!("Master at the end: {}.\n", master.unwrap_or("none was heard"));
+        }
+        text
+    }
+
+    fn name(&self, reign: &Reign) -> &str {
+        self.installation.nodes.get(usize::from(reign.node)).map_or("?", |node| &node.name)
+    }
+
+    fn event(&self, death: &Death) -> String {
+        let what = format!("The router of {} {}.\n", self.installation.nodes[death.node].name, self.life(death));
+        what + &self.takeover(death).unwrap_or_else(|| "  It was not the master.\n".into())
+    }
+
+    /// When it died, and when it was there again.
+    fn life(&self, death: &Death) -> String {
+        let after = |from_ns: u64, to_ns: u64| time(Duration::from_nanos(to_ns.saturating_sub(from_ns)));
+        let why = if self.on_purpose.contains(&death.pid) { "killed on purpose" } else { "not by this command" };
+        let again = match death.again {
+            Some((pid, at_ns)) => format!("there again {} later (process {pid})", after(death.at_ns, at_ns)),
+            None => "not there again".into(),
+        };
+        let at = after(self.began_ns, death.at_ns);
+        format!("died {at} after the beginning (process {}, {why}); {again}", death.pid)
+    }
+
+    /// What became of its time, if it was the master.
+    fn takeover(&self, death: &Death) -> Option<String> {
+        let is_its = |last: &&Reign| death.at_ns < last.last_ns + FOUND_NS || self.on_purpose.contains(&death.pid);
+        let last = self.reigns.last_of(death.node, death.at_ns).filter(is_its)?;
+        let after = |reign: &Reign| {
+            let cycles = reign.first_cycle.saturating_sub(last.last_cycle);
+            let took = time(Duration::from_nanos(reign.first_ns.saturating_sub(last.last_ns)));
+            format!("{cycles} {} ({took}) after its last", if cycles == 1 { "cycle" } else { "cycles" })
+        };
+        let mut next = self.reigns.since(last.last_ns).peekable();
+        let mut text = String::from("  It was the master.");
+        while let Some(reign) = next.next_if(|reign| reign.replacement) {
+            let (who, many) = (self.name(reign), reign.cycles());
+            let syncs = if many == 1 { "synchronisation" } else { "synchronisations" };
+            text += &format!(" {who} stood in with {many} {syncs}, the first {}.", after(reign));
+        }
+        text += &match next.peek() {
+            None => " No other took over.\n".into(),
+            Some(reign) if reign.node == last.node => format!(" It told the time again {}.\n", after(reign)),
+            Some(reign) => format!(" {} was master from the sync on that came {}.\n", self.name(reign), after(reign)),
+        };
+        Some(text)
+    }
+}

@@ -1,0 +1,186 @@
+//! The kernel and the processor: what may keep a thread waiting.
+
+use super::machine::Machine;
+use super::{Finding, State};
+use crate::daemons::{self, Daemon};
+
+/// Open-file-description locks came with it.
+const KERNEL_LEAST: (u32, u32) = (3, 15);
+/// A core that has to be woken out of a state for longer than this is late by as much, µs.
+const IDLE_LATENCY_US: u64 = 50;
+const CPUS: &str = "/sys/devices/system/cpu";
+
+pub(super) fn findings(machine: &Machine) -> Vec<Finding> {
+    let found =
+        [version(machine), preemption(machine), throttling(machine), fair_server(machine), clock_source(machine)];
+    let found = found.into_iter().flatten();
+    let found = found.chain([governor(machine), idle(machine), cores(machine), isolated(machine)]);
+    found.chain(time_daemons(machine)).collect()
+}
+
+/// Where nodes have a common time, nobody else may slew their clocks.
+fn time_daemons(machine: &Machine) -> Vec<Finding> {
+    let finding = |daemon: Daemon| {
+        let (what, is) = ("time daemon", format!("{} runs", daemon.name));
+        match machine.asked.lan {
+            Some(_) => Finding::not(State::Warn, what, is, daemons::WHY, daemon.ends),
+            None => Finding::ok(what, is, "it is in nobody's way, unless nodes have the time of a master"),
+        }
+    };
+    let running = daemons::running(&machine.folder("/proc"));
+    if running.is_empty() {
+        return vec![Finding::ok("time daemon", "none runs", daemons::WHY)];
+    }
+    running.into_iter().map(finding).collect()
+}
+
+fn version(machine: &Machine) -> Option<Finding> {
+    let why = "a death is told by open-file-description locks, which came with Linux 3.15";
+    let text = machine.read("/proc/sys/kernel/osrelease")?;
+    let mut parts = text.split(|c: char| !c.is_ascii_digit()).map(|part| part.parse().unwrap_or(0));
+    let version = (parts.next()?, parts.next().unwrap_or(0));
+    Some(if version >= KERNEL_LEAST {
+        Finding::ok("kernel", text, why)
+    } else {
+        Finding::not(State::Bad, "kernel", text, why, "install a newer kernel")
+    })
+}
+
+fn preemption(machine: &Machine) -> Option<Finding> {
+    let why = "bounds how long the kernel itself keeps an urgent thread waiting";
+    let built = machine.read("/proc/version")?;
+    if machine.number("/sys/kernel/realtime") == Some(1) || built.contains("PREEMPT_RT") {
+        return Some(Finding::ok("preemption", "PREEMPT_RT", why));
+    }
+    // `none voluntary (full) lazy`: the one in brackets. Mostly only root may read it.
+    let chosen = machine.read("/sys/kernel/debug/sched/preempt");
+    let chosen = chosen.as_deref().and_then(|text| text.split(['(', ')']).nth(1));
+    let model = match chosen {
+        Some(model) => format!("dynamic, now `{model}`"),
+        None if built.contains("PREEMPT_DYNAMIC") => "dynamic (which is in use only root may read)".into(),
+        None if built.contains("PREEMPT") => "full".into(),
+        None => "none or voluntary".into(),
+    };
+    Some(Finding::not(
+        State::Warn,
+        "preemption",
+        format!("{model}; not PREEMPT_RT"),
+        why,
+        "boot a kernel with PREEMPT_RT (Debian: `apt install linux-image-rt-amd64`), or at least with `preempt=full`",
+    ))
+}
+
+fn throttling(machine: &Machine) -> Option<Finding> {
+    let why = "a SCHED_FIFO thread that never sleeps must leave something to others, and all must get some time";
+    let (path, what) = ("/proc/sys/kernel/sched_rt_runtime_us", "real-time share");
+    let runtime: i64 = machine.read(path)?.parse().ok()?;
+    let period = machine.number("/proc/sys/kernel/sched_rt_period_us").unwrap_or(1_000_000).max(1);
+    let mend = "sudo sysctl -w kernel.sched_rt_runtime_us=950000";
+    Some(match runtime {
+        0 => Finding::not(State::Bad, what, "0 µs: SCHED_FIFO threads never run", why, mend),
+        ..0 => Finding::not(State::Warn, what, "no limit: a runaway takes the computer with it", why, mend),
+        _ => Finding::ok(what, format!("{runtime} of {period} µs"), why),
+    })
+}
+
+/// Since 6.12 the kernel serves ordinary threads in time of their own; the share above counts no more then.
+fn fair_server(machine: &Machine) -> Option<Finding> {
+    let runtime = machine.number("/sys/kernel/debug/sched/fair_server/cpu0/runtime")?;
+    let period = machine.number("/sys/kernel/debug/sched/fair_server/cpu0/period")?;
+    let is = format!("{} of {} ms go to ordinary threads if they starve", runtime / 1_000_000, period / 1_000_000);
+    let why = "so long may a real-time thread be kept waiting when others starve";
+    Some(Finding::ok("fair server", is, why))
+}
+
+fn clock_source(machine: &Machine) -> Option<Finding> {
+    let folder = "/sys/devices/system/clocksource/clocksource0";
+    let (what, why) = ("clock source", "every package and deadline reads the clock; some take a system call for it");
+    let source = machine.read(&format!("{folder}/current_clocksource"))?;
+    let slow = ["hpet", "acpi_pm", "jiffies", "refined-jiffies", "pit"];
+    if !slow.contains(&source.as_str()) {
+        return Some(Finding::ok(what, source, why));
+    }
+    let available = machine.read(&format!("{folder}/available_clocksource")).unwrap_or_default();
+    let better = available.split_whitespace().find(|source| !slow.contains(source));
+    let mend = match better {
+        Some(better) => format!("echo {better} | sudo tee {folder}/current_clocksource"),
+        None => "look why the kernel gave up the better one: `dmesg | grep -i clocksource`".into(),
+    };
+    Some(Finding::not(State::Warn, what, format!("{source} (slow)"), why, mend))
+}
+
+fn governor(machine: &Machine) -> Finding {
+    let (what, why) = ("CPU governor", "a core that has to speed up first is late by tens of microseconds");
+    let cpus = machine.numbered(CPUS, "cpu").into_iter();
+    let mut governors: Vec<String> =
+        cpus.filter_map(|cpu| machine.read(&format!("{CPUS}/{cpu}/cpufreq/scaling_governor"))).collect();
+    governors.sort();
+    governors.dedup();
+    match &governors[..] {
+        [] => Finding::ok(what, "none: firmware or the host sets the clock rate", why),
+        [only] if only == "performance" => Finding::ok(what, "performance", why),
+        several => {
+            let mend = "sudo cpupower frequency-set -g performance";
+            Finding::not(State::Warn, what, several.join(", "), why, mend)
+        }
+    }
+}
+
+fn idle(machine: &Machine) -> Finding {
+    let (what, why) = ("idle states", "a core that sleeps deeply takes that long to wake up");
+    let folder = format!("{CPUS}/cpu0/cpuidle");
+    let states = machine.numbered(&folder, "state").into_iter().filter_map(|state| {
+        let of = |file| machine.read(&format!("{folder}/{state}/{file}"));
+        let used = of("disable").is_none_or(|disabled| disabled == "0");
+        Some((of("latency")?.parse::<u64>().ok()?, of("name")?)).filter(|_| used)
+    });
+    match states.max() {
+        None => Finding::ok(what, "none, or the host's business", why),
+        Some((latency, name)) if latency <= IDLE_LATENCY_US => {
+            Finding::ok(what, format!("deepest is {name}, {latency} µs"), why)
+        }
+        Some((latency, name)) => {
+            let mend = format!("sudo cpupower idle-set -D {IDLE_LATENCY_US}");
+            Finding::not(State::Warn, what, format!("deepest is {name}, {latency} µs"), why, mend)
+        }
+    }
+}
+
+fn cores(machine: &Machine) -> Finding {
+    let (what, why) = ("cores", "with one, whoever computes keeps all less urgent modules waiting");
+    let allowed = machine.field("/proc/self/status", "Cpus_allowed_list");
+    let count = allowed.as_deref().map_or(0, count_of_list);
+    let is = match (count, allowed) {
+        (0, _) => "not told".into(),
+        (1, Some(list)) => format!("1 (number {list})"),
+        (count, list) => format!("{count} (numbers {})", list.unwrap_or_default()),
+    };
+    if count == 1 {
+        let mend = "give it more cores, or lift the restriction (`taskset -pc $$`, cpuset of the container)";
+        return Finding::not(State::Warn, what, is, why, mend);
+    }
+    Finding::ok(what, is, why)
+}
+
+/// `0-3,8`: five.
+fn count_of_list(list: &str) -> u32 {
+    let range = |part: &str| {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        Some(last.parse::<u32>().ok()?.saturating_sub(first.parse().ok()?) + 1)
+    };
+    list.split(',').filter_map(range).sum()
+}
+
+fn isolated(machine: &Machine) -> Finding {
+    let list = machine.read(&format!("{CPUS}/isolated")).unwrap_or_default();
+    let is = if list.is_empty() {
+        "none".into()
+    } else {
+        format!("numbers {list}; start there with `taskset -c {list} rohrpost launch …`")
+    };
+    Finding::ok(
+        "isolated cores",
+        is,
+        "the kernel puts nobody there by itself (boot with `isolcpus=`); worth it for the last microseconds only",
+    )
+}

@@ -1,0 +1,235 @@
+//! What is read of a computer: files below a root, and the few things that no file tells.
+
+use super::network::Lan;
+use super::security::Protection;
+use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
+use rohrpost_mailbox::sys::{self, Room};
+use rohrpost_mailbox::{Node, NodeError, base_directory};
+use std::path::{Path, PathBuf};
+
+const BRIDGE: &str = "rohrpost-gui-bridge";
+
+/// What a configuration needs; without one, what any may need.
+pub(super) struct Needs {
+    /// Highest priority of SCHED_FIFO that is asked for.
+    pub(super) priority: u8,
+    /// Bytes of mailboxes.
+    pub(super) memory: u64,
+    /// Whether something is to be shown.
+    pub(super) gui: bool,
+    /// The bridge, where the configuration has it.
+    pub(super) bridge: Option<PathBuf>,
+    /// Processes that are started.
+    pub(super) processes: usize,
+    /// The configuration's file.
+    pub(super) from: Option<PathBuf>,
+}
+
+impl Default for Needs {
+    fn default() -> Self {
+        Self { priority: FIFO_MAX, memory: 0, gui: false, bridge: None, processes: 1, from: None }
+    }
+}
+
+impl Needs {
+    pub(super) fn of(installation: &Installation, node: &NodeConfig) -> Self {
+        let modules = || installation.modules_on(&node.name);
+        let priority = |module: &Module| match installation.scheduling(module.name.class()) {
+            Scheduling::Fifo { priority } => priority,
+            Scheduling::Normal { .. } => 0,
+        };
+        Self {
+            priority: modules().map(priority).max().unwrap_or(0),
+            memory: modules().map(|module| module.memory()).sum(),
+            gui: !installation.gui.show.is_empty(),
+            bridge: modules().find_map(|module| bridge_of(installation, module)),
+            processes: modules().count(),
+            from: Some(installation.path.clone()),
+        }
+    }
+}
+
+/// Where the program of a module is, if that is the bridge.
+fn bridge_of(installation: &Installation, module: &Module) -> Option<PathBuf> {
+    let Program::Command(words) = &module.program else { return None };
+    let program = words.first().filter(|program| is_bridge(Path::new(program)))?;
+    find_program(program, &installation.folder, &beside())
+}
+
+/// The folder of this program.
+fn beside() -> PathBuf {
+    std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned())).unwrap_or_default()
+}
+
+/// A computer.
+pub(super) struct Machine {
+    root: PathBuf,
+    pub(super) asked: Asked,
+}
+
+/// What no file tells.
+pub(super) struct Asked {
+    /// Whether a thread was given the scheduling that is needed, or why not.
+    pub(super) fifo: Result<(), String>,
+    /// Where nodes lie.
+    pub(super) base: PathBuf,
+    /// Room of the file system there.
+    pub(super) room: Option<Room>,
+    pub(super) nodes: Vec<NodeFound>,
+    pub(super) bridge: Option<Bridge>,
+    pub(super) viewer: Option<PathBuf>,
+    /// The network of a configuration of several nodes.
+    pub(super) lan: Option<Lan>,
+    pub(super) protection: Protection,
+}
+
+/// The program that draws.
+pub(super) struct Bridge {
+    pub(super) path: PathBuf,
+    /// Its process, if one of this user's nodes has it.
+    pub(super) pid: Option<u32>,
+}
+
+/// A node's directory.
+pub(super) struct NodeFound {
+    pub(super) path: PathBuf,
+    pub(super) seen: Seen,
+}
+
+/// What is in a node's directory.
+pub(super) enum Seen {
+    /// A launch of this process id watches over it.
+    Launched(u32),
+    /// Processes run in it without a launch.
+    InUse,
+    /// Nothing lives there.
+    Dead,
+    /// It was made by a program of another layout version.
+    OtherVersion(u32),
+    /// It cannot be read.
+    Unreadable(String),
+}
+
+impl Machine {
+    /// This computer.
+    pub(super) fn this(needs: &Needs, lan: Option<Lan>, protection: Protection) -> Self {
+        let base = base_directory();
+        let program = |name| find_program(name, Path::new("."), &beside());
+        // The directory is made by the first launch; before that, what counts is where it will be.
+        let there = base.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
+        let asked = Asked {
+            fifo: try_fifo(needs.priority),
+            room: sys::room(there).ok(),
+            nodes: nodes(&base),
+            bridge: bridge(&base, needs.bridge.clone().or_else(|| program(BRIDGE))),
+            viewer: program("rerun"),
+            lan,
+            protection,
+            base,
+        };
+        Self { root: "/".into(), asked }
+    }
+
+    /// A computer that was written down.
+    #[cfg(test)]
+    pub(super) fn at(root: &Path, asked: Asked) -> Self {
+        Self { root: root.into(), asked }
+    }
+
+    /// What a file holds, without white space around it.
+    pub(super) fn read(&self, path: &str) -> Option<String> {
+        let text = std::fs::read_to_string(self.root.join(path.trim_start_matches('/'))).ok()?;
+        Some(text.trim().to_owned())
+    }
+
+    /// Where a folder of it is.
+    pub(super) fn folder(&self, path: &str) -> PathBuf {
+        self.root.join(path.trim_start_matches('/'))
+    }
+
+    pub(super) fn number(&self, path: &str) -> Option<u64> {
+        self.read(path)?.parse().ok()
+    }
+
+    pub(super) fn exists(&self, path: &str) -> bool {
+        self.root.join(path.trim_start_matches('/')).exists()
+    }
+
+    /// Names in a folder that begin so and go on with a number, in its order.
+    pub(super) fn numbered(&self, folder: &str, begin: &str) -> Vec<String> {
+        let entries = std::fs::read_dir(self.root.join(folder.trim_start_matches('/'))).into_iter().flatten();
+        let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        let number = |name: &String| name.strip_prefix(begin).and_then(|rest| rest.parse::<u32>().ok());
+        let mut names: Vec<String> = names.filter(|name| number(name).is_some()).collect();
+        names.sort_by_key(number);
+        names
+    }
+
+    /// A line of a file of lines `key: value`.
+    pub(super) fn field(&self, path: &str, key: &str) -> Option<String> {
+        let text = self.read(path)?;
+        text.lines().find_map(|line| Some(line.strip_prefix(key)?.strip_prefix(':')?.trim().to_owned()))
+    }
+
+    /// A soft limit of this process; none where it is unlimited.
+    pub(super) fn limit(&self, name: &str) -> Option<Limit> {
+        let text = self.read("/proc/self/limits")?;
+        let soft =
+            text.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().next().map(str::to_owned))?;
+        Some(soft.parse().map_or(Limit::None, Limit::Of))
+    }
+}
+
+/// A limit of the kernel's.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Limit {
+    None,
+    Of(u64),
+}
+
+/// Tries for a moment, in a thread of its own: only the kernel knows what limits, capabilities and control groups come to.
+fn try_fifo(priority: u8) -> Result<(), String> {
+    if priority == 0 {
+        return Ok(());
+    }
+    let tried = std::thread::spawn(move || sys::schedule(sys::Scheduling::Fifo(priority))).join();
+    tried.map_err(|_| String::from("the thread that tried has panicked"))?.map_err(|error| error.to_string())
+}
+
+fn nodes(base: &Path) -> Vec<NodeFound> {
+    directories(base).into_iter().map(|path| NodeFound { seen: seen(&path), path }).collect()
+}
+
+fn directories(base: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(base).into_iter().flatten();
+    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.sort();
+    paths
+}
+
+/// The bridge that runs; else the one that would.
+fn bridge(base: &Path, found: Option<PathBuf>) -> Option<Bridge> {
+    let pids = directories(base).into_iter().filter_map(|path| Node::open(&path).ok());
+    let pids = pids.flat_map(|node| node.participants()).map(|participant| participant.pid).filter(|pid| *pid != 0);
+    let running = pids.filter_map(|pid| Some((std::fs::read_link(format!("/proc/{pid}/exe")).ok()?, pid)));
+    // Whoever launched it may have another PATH than this program.
+    let running = running.map(|(path, pid)| Bridge { path, pid: Some(pid) }).find(|bridge| is_bridge(&bridge.path));
+    running.or_else(|| found.map(|path| Bridge { path, pid: None }))
+}
+
+fn is_bridge(program: &Path) -> bool {
+    // A program that was built anew since is marked by the kernel.
+    program.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.trim_end_matches(" (deleted)") == BRIDGE)
+}
+
+fn seen(path: &Path) -> Seen {
+    match Node::open(path) {
+        Ok(node) => match node.launcher() {
+            Some(pid) => Seen::Launched(pid),
+            None if node.participants().is_empty() => Seen::Dead,
+            None => Seen::InUse,
+        },
+        Err(NodeError::Version(_, version)) => Seen::OtherVersion(version),
+        Err(error) => Seen::Unreadable(error.to_string()),
+    }
+}

@@ -1,0 +1,262 @@
+//! Where a node would lie, what surrounds it, and what is there already.
+
+use super::machine::{Bridge, Machine, Needs, Seen};
+use super::{Finding, State};
+use rohrpost_config::size_text;
+use std::path::Path;
+
+/// Room for tools, and for mailboxes that modules make themselves, bytes.
+const SPARE: u64 = 16 << 20;
+/// What the smallest node takes: its own pages, an output module, and a tool that looks.
+const LEAST: u64 = 2 << 20;
+/// Threads that a process of a node has, at most of our making.
+const THREADS: u64 = 4;
+
+pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
+    let found = [file_system(machine), room(machine, needs), container(machine)];
+    let mut found: Vec<Finding> = found.into_iter().flatten().collect();
+    found.extend(groups_of_control(machine, needs));
+    found.extend(nodes(machine));
+    found.extend(gui(machine, needs));
+    found.push(systemd(machine));
+    found
+}
+
+/// A size in its largest unit, with at most one place after the point.
+pub(super) fn size(bytes: u64) -> String {
+    let (unit, one) = [("GiB", 1u64 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)]
+        .into_iter()
+        .find(|(_, one)| bytes >= *one)
+        .unwrap_or(("B", 1));
+    if bytes.is_multiple_of(one) { size_text(bytes) } else { format!("{:.1} {unit}", bytes as f64 / one as f64) }
+}
+
+/// Where a file system is mounted, and of what kind it is.
+struct Mount {
+    point: String,
+    kind: String,
+}
+
+/// The one that nodes lie on; none where the kernel does not tell.
+fn mount(machine: &Machine) -> Option<Mount> {
+    let mounts = machine.read("/proc/mounts")?;
+    let mounts = mounts.lines().filter_map(|line| {
+        let mut words = line.split(' ').skip(1);
+        // White space in a path is written in octal.
+        let point = words.next()?.replace("\\040", " ").replace("\\011", "\t").replace("\\134", "\\");
+        Some(Mount { point, kind: words.next()?.to_owned() })
+    });
+    // The last of the longest: a later mount hides an earlier one.
+    mounts.filter(|mount| machine.asked.base.starts_with(&mount.point)).max_by_key(|mount| mount.point.len())
+}
+
+impl Mount {
+    fn is_memory(&self) -> bool {
+        matches!(self.kind.as_str(), "tmpfs" | "ramfs")
+    }
+
+    /// For a command line.
+    fn quoted(&self) -> String {
+        if self.point.contains(char::is_whitespace) { format!("'{}'", self.point) } else { self.point.clone() }
+    }
+}
+
+fn file_system(machine: &Machine) -> Option<Finding> {
+    let (what, why) =
+        ("node directory", "mailboxes are files there; on any other file system the kernel writes them to a disk");
+    let mount = mount(machine)?;
+    let is = format!("{} ({})", machine.asked.base.display(), mount.kind);
+    if mount.is_memory() {
+        return Some(Finding::ok(what, is, why));
+    }
+    Some(Finding::not(State::Warn, what, is, why, "unset ROHRPOST_DIR, or set it to a folder below /dev/shm"))
+}
+
+fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
+    let (what, why) = ("shared memory", "a mailbox takes its memory when it is made; then it must be there");
+    let mount = mount(machine);
+    let Some(room) = machine.asked.room else {
+        let mend = match &mount {
+            Some(mount) if mount.is_memory() => format!("df {}", mount.quoted()),
+            _ => "mount -t tmpfs tmpfs /dev/shm".to_owned(),
+        };
+        return Some(Finding::not(State::Warn, what, "its size is not told", why, mend));
+    };
+    let needed = match &needs.from {
+        Some(file) => format!("; {} needs {} for its mailboxes", file.display(), size(needs.memory)),
+        None => String::new(),
+    };
+    let is = format!("{} free of {}{needed}", size(room.free), size(room.bytes));
+    let mend = || {
+        let wanted = (needs.memory + 2 * SPARE + room.bytes - room.free).next_power_of_two() >> 20;
+        format!("rohrpost clean; {}", more_room(mount.as_ref(), wanted))
+    };
+    Some(match room.free {
+        free if free < needs.memory.max(LEAST) => Finding::not(State::Bad, what, is, why, mend()),
+        free if free < needs.memory + SPARE => Finding::not(State::Warn, what, is, why, mend()),
+        _ => Finding::ok(what, is, why),
+    })
+}
+
+/// What makes a file system so large.
+fn more_room(mount: Option<&Mount>, mib: u64) -> String {
+    let Some(mount) = mount else { return format!("give the node directory a tmpfs of {mib} MiB") };
+    if !mount.is_memory() {
+        return format!("free some of the disk at {}, or better move to /dev/shm, with {mib} MiB", mount.quoted());
+    }
+    let remount = format!("sudo mount -o remount,size={mib}M {}", mount.quoted());
+    if mount.point == "/dev/shm" { format!("{remount}; in a container: `--shm-size={mib}m`") } else { remount }
+}
+
+fn container(machine: &Machine) -> Option<Finding> {
+    let why = "in a container its host decides on rights, shared memory and cores";
+    let marks = [
+        ("/.dockerenv", "Docker"),
+        ("/run/.containerenv", "Podman"),
+        ("/run/systemd/container", "systemd-nspawn or LXC"),
+    ];
+    let kind = marks.iter().find(|(mark, _)| machine.exists(mark)).map(|(_, kind)| *kind);
+    Some(Finding::ok("container", kind.unwrap_or("none that is known"), why))
+}
+
+/// Limits of the control group that this process is in, and of those around it.
+fn groups_of_control(machine: &Machine, needs: &Needs) -> Vec<Finding> {
+    let mut found: Vec<Finding> = share_of_time(machine).into_iter().chain(share_of_real_time(machine)).collect();
+    // Of version 2, and of version 1.
+    found.extend(["memory.max", "memory.limit_in_bytes"].iter().filter_map(|file| memory_limit(machine, needs, file)));
+    found.extend(process_limit(machine, needs));
+    found
+}
+
+fn share_of_time(machine: &Machine) -> Option<Finding> {
+    let why = "a control group that has used up its share stands still, however urgent its threads are";
+    let (value, path) = tightest(machine, "cpu", "cpu.max", |text| {
+        let (quota, period) = text.split_once(' ')?;
+        Some(quota.parse::<f64>().ok()? / period.parse::<f64>().ok()?)
+    })?;
+    let mend = format!("echo max | sudo tee {path}, or start the container without `--cpus`");
+    Some(Finding::not(State::Warn, "CPU quota", format!("{value} cores ({path})"), why, mend))
+}
+
+/// Version 1 of control groups gives real-time threads nothing unless told.
+fn share_of_real_time(machine: &Machine) -> Option<Finding> {
+    let least = tightest(machine, "cpu", "cpu.rt_runtime_us", |text| text.parse::<f64>().ok());
+    let (_, path) = least.filter(|(value, _)| *value <= 0.0)?;
+    let mend = format!("echo 950000 | sudo tee {path}, in the groups around it first");
+    let why = "SCHED_FIFO is refused in such a group";
+    Some(Finding::not(State::Warn, "real-time quota", format!("0 µs ({path})"), why, mend))
+}
+
+fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding> {
+    let (what, why) = ("memory limit", "who goes beyond is killed; shared memory counts");
+    let (limit, path) = tightest(machine, "memory", file, whole)?;
+    let (limit, is) = (limit as u64, format!("{} ({path})", size(limit as u64)));
+    if limit >= needs.memory + SPARE {
+        return Some(Finding::ok(what, is, why));
+    }
+    let mend = "start the container with more `--memory`, or MemoryMax= in the unit";
+    Some(Finding::not(State::Bad, what, is, why, mend))
+}
+
+fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
+    let (what, why) = ("processes", "each module is a process of a few threads");
+    let (limit, path) = tightest(machine, "pids", "pids.max", whole)?;
+    let (limit, wanted) = (limit as u64, needs.processes as u64 * THREADS);
+    let used = machine.number(&path.replace("pids.max", "pids.current")).unwrap_or(0);
+    let is = format!("{limit}, {used} in use ({path})");
+    if limit >= used + wanted {
+        return Some(Finding::ok(what, is, why));
+    }
+    let more = used + 10 * wanted;
+    let mend = format!("echo {more} | sudo tee {path}, or `--pids-limit` of the container, TasksMax= of the unit");
+    Some(Finding::not(State::Bad, what, is, why, mend))
+}
+
+/// A limit in bytes or processes. What is as good as none (version 1 writes it as the largest number of pages) is none.
+fn whole(text: &str) -> Option<f64> {
+    text.parse::<u64>().ok().filter(|limit| *limit < 1 << 60).map(|limit| limit as f64)
+}
+
+/// The least value of a file of the control group of this process and those around it, and the file. `max` is no value.
+fn tightest(
+    machine: &Machine,
+    controller: &str,
+    file: &str,
+    read: impl Fn(&str) -> Option<f64>,
+) -> Option<(f64, String)> {
+    let groups = machine.read("/proc/self/cgroup")?;
+    // `0::/path` is version 2, `4:memory:/path` version 1.
+    let folders = groups.lines().filter_map(|line| {
+        let mut words = line.splitn(3, ':').skip(1);
+        match (words.next()?, words.next()?) {
+            ("", path) => Some((String::from("/sys/fs/cgroup"), path)),
+            (controllers, path) if controllers.split(',').any(|name| name == controller) => {
+                Some((format!("/sys/fs/cgroup/{controllers}"), path))
+            }
+            _ => None,
+        }
+    });
+    let files = folders.flat_map(|(root, path)| {
+        Path::new(path)
+            .ancestors()
+            .map(|path| format!("{root}{}/{file}", path.display().to_string().trim_end_matches('/')))
+            .collect::<Vec<_>>()
+    });
+    let values = files.filter_map(|path| Some((read(&machine.read(&path)?)?, path)));
+    values.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn nodes(machine: &Machine) -> Vec<Finding> {
+    let why = "a node of this user, launched by this computer or left by a crash";
+    let finding = |node: &super::machine::NodeFound| {
+        let (what, path) = ("node", node.path.display());
+        match &node.seen {
+            Seen::Launched(pid) => Finding::ok(what, format!("{path}: launched by process {pid}"), why),
+            Seen::InUse => Finding::ok(what, format!("{path}: in use, without a launch"), why),
+            Seen::Dead => {
+                Finding::not(State::Warn, what, format!("{path}: nothing lives there"), why, "rohrpost clean")
+            }
+            Seen::OtherVersion(version) => Finding::not(
+                State::Warn,
+                what,
+                format!(
+                    "{path}: made by another version (layout {version}, this program {})",
+                    rohrpost_mailbox::LAYOUT_VERSION
+                ),
+                why,
+                format!("stop what runs there (with the program that launched it), then rm -r {path}"),
+            ),
+            Seen::Unreadable(error) => {
+                Finding::not(State::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
+            }
+        }
+    };
+    machine.asked.nodes.iter().map(finding).collect()
+}
+
+fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
+    // Who wants to see nothing misses nothing.
+    let missing = |what, why, mend: &str| match &needs.from {
+        Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} shows nothing", file.display()), why),
+        _ => Finding::not(State::Warn, what, "not found", why, mend),
+    };
+    let (what, why) = ("GUI bridge", "draws what modules publish; the module `gui.0` of the demo is it");
+    let bridge = match &machine.asked.bridge {
+        Some(Bridge { path, pid: Some(pid) }) => Finding::ok(what, format!("{}, process {pid}", path.display()), why),
+        Some(Bridge { path, pid: None }) => Finding::ok(what, path.display().to_string(), why),
+        None => {
+            missing(what, why, "cargo build -p rohrpost-gui-bridge --profile bridge, then PATH=target/bridge:$PATH")
+        }
+    };
+    let (what, why) = ("viewer", "shows live what the bridge draws, and opens drawings");
+    let viewer = match &machine.asked.viewer {
+        Some(path) => Finding::ok(what, path.display().to_string(), why),
+        None => missing(what, why, "pip install rerun-sdk==0.36.3"),
+    };
+    vec![bridge, viewer]
+}
+
+fn systemd(machine: &Machine) -> Finding {
+    let is = if machine.exists("/run/systemd/system") { "runs" } else { "does not run here" };
+    Finding::ok("systemd", is, "can start a node at boot, and again when it ended")
+}

@@ -1,0 +1,121 @@
+//! What protects packages that leave this computer: what the configuration says, and whether what that takes is here.
+
+use super::machine::{Machine, Needs};
+use super::{Finding, State};
+use crate::keys::certificates;
+use rohrpost_config::{Installation, Keys, Security};
+use std::path::PathBuf;
+
+/// What a configuration says of security, and what is here of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Protection {
+    /// Between the nodes of the LAN; none if nothing goes over one.
+    pub(super) lan: Option<Lan>,
+    /// To the TCP router; none if the file has none.
+    pub(super) tcp: Option<Tcp>,
+}
+
+/// What protects datagrams of the LAN.
+#[derive(Clone, Debug)]
+pub(super) enum Lan {
+    Open,
+    /// Sealed with the keys of a file, by their numbers; or why these cannot be used.
+    Keys {
+        file: PathBuf,
+        ids: Result<Vec<u8>, String>,
+    },
+}
+
+/// What protects sessions with the TCP router.
+#[derive(Clone, Debug)]
+pub(super) enum Tcp {
+    Open,
+    /// Both ends show certificates; what this node lacks of its own.
+    Tls {
+        folder: PathBuf,
+        lacking: Vec<String>,
+    },
+}
+
+impl Protection {
+    pub(super) fn of(installation: &Installation, node: &str) -> Self {
+        let lan = installation.network.map(|network| match (network.security, &installation.keys) {
+            (Security::Keys, Some(folder)) => {
+                let file = Keys::file(folder);
+                let ids = Keys::load(&file).map_err(|error| error.to_string());
+                let ids = ids.map(|keys| [Some(keys.newest), keys.older].into_iter().flatten().map(|key| key.id.get()));
+                Lan::Keys { ids: ids.map(Iterator::collect), file }
+            }
+            _ => Lan::Open,
+        });
+        let tcp = installation.tcp.as_ref().map(|tcp| match &tcp.certificates {
+            None => Tcp::Open,
+            Some(folder) => {
+                Tcp::Tls { folder: installation.resolve(folder), lacking: certificates::lacking(installation, node) }
+            }
+        });
+        Self { lan, tcp }
+    }
+}
+
+pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
+    let from = needs.from.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+    let Protection { lan: of_lan, tcp: of_tcp } = &machine.asked.protection;
+    of_lan.iter().map(|of| lan(of, &from)).chain(of_tcp.iter().map(|of| tcp(of, &from))).collect()
+}
+
+fn lan(protection: &Lan, from: &str) -> Finding {
+    let (what, why) =
+        ("network security", "packages between nodes are sealed, or anyone on the network reads and sends");
+    match protection {
+        Lan::Open => Finding::not(
+            State::Warn,
+            what,
+            format!("none, as {from} says"),
+            why,
+            format!(
+                "a network of the robot's own, without a way in from others; or write `security = \"keys\"` into [network] of {from}, \
+                 and run `rohrpost keys new {from}`"
+            ),
+        ),
+        Lan::Keys { file, ids: Ok(ids) } => {
+            let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+            let word = if ids.len() == 1 { "key" } else { "keys" };
+            Finding::ok(what, format!("{word} {} of {}, as {from} says", ids.join(" and "), file.display()), why)
+        }
+        Lan::Keys { ids: Err(error), .. } => Finding::not(
+            State::Bad,
+            what,
+            format!("keys, as {from} says, and there are none: {error}"),
+            why,
+            "copy the keys from the first computer of the installation; only if none has any, `rohrpost keys new` makes them",
+        ),
+    }
+}
+
+fn tcp(protection: &Tcp, from: &str) -> Finding {
+    let (what, why) =
+        ("TCP security", "packages to and from the TCP router are sealed, or anyone on the way reads and sends");
+    match protection {
+        Tcp::Open => Finding::not(
+            State::Warn,
+            what,
+            format!("none, as {from} says"),
+            why,
+            format!(
+                "a network that nobody else reaches; or write `security = \"tls\"` and `certificates = \"certificates\"` into [tcp] of \
+                 {from}, and run `rohrpost keys new {from}`"
+            ),
+        ),
+        Tcp::Tls { folder, lacking } if lacking.is_empty() => {
+            Finding::ok(what, format!("TLS 1.3 with certificates in {}, as {from} says", folder.display()), why)
+        }
+        Tcp::Tls { lacking, .. } => Finding::not(
+            State::Bad,
+            what,
+            format!("TLS, as {from} says, and this node cannot: {}", lacking.join("; ")),
+            why,
+            "copy `ca.pem` and the two files of this node from where the certificates were made",
+        ),
+    }
+}

@@ -1,0 +1,239 @@
+//! What `doctor` says of computers that were written down, and of networks.
+
+use super::machine::{Asked, Bridge, NodeFound, Seen};
+use super::network::{Lan, Peer, Port, PortState, Reach, Stamps};
+use super::security::{Lan as OfLan, Tcp as OfTcp};
+use super::*;
+use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+/// Unpacks a computer that was written down: lines `== PATH`, each followed by what the file holds.
+fn unpack(text: &str, to: &Path) {
+    for file in text.split("\n== ").skip(1) {
+        let (path, content) = file.split_once('\n').unwrap_or((file, ""));
+        let path = to.join(path.trim_start_matches('/'));
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+}
+
+fn examined(name: &str, (asked, needs): (Asked, Needs)) -> Vec<Finding> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/doctor");
+    let root = tempfile::tempdir().unwrap();
+    unpack(&fs::read_to_string(folder.join(format!("{name}.machine"))).unwrap(), root.path());
+    examine(&Machine::at(root.path(), asked), &needs)
+}
+
+fn said(name: &str, computer: (Asked, Needs)) -> String {
+    page(&examined(name, computer)) + "\n"
+}
+
+/// `UPDATE_GOLDEN=1 cargo test --bin rohrpost doctor` writes the texts anew; read the difference before you commit.
+fn compare(name: &str, said: &str) {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../tests/doctor/{name}.txt"));
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        fs::write(&golden, said).unwrap();
+    }
+    assert_eq!(said, fs::read_to_string(&golden).unwrap(), "{}", golden.display());
+}
+
+fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> Lan {
+    let peer = |(host, (name, mtu, reach)): (u8, &(&str, u32, Reach))| Peer {
+        name: (*name).into(),
+        address: [10, 77, 0, host].into(),
+        mtu: Some(*mtu),
+        reach: reach.clone(),
+    };
+    Lan {
+        node: "base".into(),
+        address: [10, 77, 0, 1].into(),
+        mtu: 1500,
+        is_here: true,
+        addresses: vec![("eth0".into(), [10, 77, 0, 1].into())],
+        ports: (21117..).zip(ports).map(|(number, state)| Port { number, state }).collect(),
+        runs: true,
+        stamps: Stamps::Both,
+        peers: (2..).zip(peers).map(peer).collect(),
+    }
+}
+
+fn lan_that_works() -> Lan {
+    lan(
+        [PortState::InUse, PortState::Free, PortState::Free],
+        &[("arm", 1500, Reach::NoRouter), ("desk", 9000, Reach::Neighbour)],
+    )
+}
+
+fn lan_of_trouble() -> Lan {
+    let no_way = Reach::NoWay("Network is unreachable (os error 101)".into());
+    let refused = PortState::Refused("Permission denied (os error 13)".into());
+    Lan {
+        is_here: false,
+        addresses: vec![("eth0".into(), [192, 168, 0, 7].into()), ("wlan0".into(), "fd00::7".parse().unwrap())],
+        runs: false,
+        stamps: Stamps::NoSent,
+        ..lan([PortState::InUse, refused.clone(), refused], &[("arm", 1280, Reach::Silent), ("desk", 1500, no_way)])
+    }
+}
+
+fn sealed(ids: Result<Vec<u8>, String>, lacking: Vec<String>) -> Protection {
+    Protection {
+        lan: Some(OfLan::Keys { file: "keys/udp.keys".into(), ids }),
+        tcp: Some(OfTcp::Tls { folder: "certificates".into(), lacking }),
+    }
+}
+
+fn open() -> Protection {
+    Protection { lan: Some(OfLan::Open), tcp: Some(OfTcp::Open) }
+}
+
+fn good() -> (Asked, Needs) {
+    let asked = Asked {
+        fifo: Ok(()),
+        base: "/dev/shm/rohrpost-1000".into(),
+        room: Some(Room { bytes: 8 << 30, free: 7 << 30 }),
+        nodes: vec![NodeFound { path: "/dev/shm/rohrpost-1000/arm.main".into(), seen: Seen::Launched(812) }],
+        bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: Some(820) }),
+        viewer: Some("/usr/local/bin/rerun".into()),
+        lan: Some(lan_that_works()),
+        protection: sealed(Ok(vec![2, 1]), Vec::new()),
+    };
+    let from = Some("robot.toml".into());
+    (asked, Needs { priority: 34, memory: 4 << 20, gui: true, bridge: None, processes: 6, from })
+}
+
+fn bad() -> (Asked, Needs) {
+    let asked = Asked {
+        fifo: Err("Operation not permitted (os error 1)".into()),
+        base: "/home/robot/nodes".into(),
+        room: Some(Room { bytes: 64 << 20, free: 1 << 20 }),
+        nodes: vec![
+            NodeFound { path: "/home/robot/nodes/demo.main".into(), seen: Seen::Dead },
+            NodeFound { path: "/home/robot/nodes/old.main".into(), seen: Seen::OtherVersion(99) },
+        ],
+        bridge: None,
+        viewer: None,
+        lan: Some(lan_of_trouble()),
+        protection: sealed(
+            Err("keys/udp.keys: keys cannot be read (No such file or directory (os error 2))".into()),
+            vec!["certificates/base.system-1.key: is missing; `rohrpost keys new` makes it".into()],
+        ),
+    };
+    let from = Some("robot.toml".into());
+    (asked, Needs { priority: 34, memory: 40 << 20, gui: true, bridge: None, processes: 6, from })
+}
+
+/// As the unit for systemd has it, in /run: what holds there is told of /run, not of /dev/shm.
+fn too_little_room_in_run() -> (Asked, Needs) {
+    let asked = Asked {
+        base: "/run/rohrpost/main".into(),
+        room: Some(Room { bytes: 64 << 20, free: 60 << 20 }),
+        bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: None }),
+        ..nothing_told()
+    };
+    (asked, Needs { memory: 70 << 20, from: Some("robot.toml".into()), ..Needs::default() })
+}
+
+fn elsewhere() -> (Asked, Needs) {
+    let lan = Lan {
+        addresses: Vec::new(),
+        stamps: Stamps::None("Protocol not available".into()),
+        ..Lan { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &[]) }
+    };
+    let asked = Asked { lan: Some(lan), protection: open(), ..nothing_told() };
+    (asked, Needs { from: Some("robot.toml".into()), ..Needs::default() })
+}
+
+fn nothing_told() -> Asked {
+    Asked {
+        fifo: Ok(()),
+        base: "/dev/shm/rohrpost-0".into(),
+        room: None,
+        nodes: Vec::new(),
+        bridge: None,
+        viewer: None,
+        lan: None,
+        protection: Protection::default(),
+    }
+}
+
+#[test]
+fn a_computer_made_for_a_robot() {
+    let said = said("good", good());
+    assert!(!said.contains("\nwarn ") && !said.contains("\nbad "), "{said}");
+    compare("good", &said);
+}
+
+#[test]
+fn a_computer_on_which_all_is_wrong() {
+    // The version of the layout goes its own way.
+    compare("bad", &said("bad", bad()).replace(&format!("this program {LAYOUT_VERSION}"), "this program …"));
+}
+
+#[test]
+fn a_computer_with_too_little_room_in_run() {
+    compare("run", &said("run", too_little_room_in_run()));
+}
+
+#[test]
+fn a_node_whose_address_is_elsewhere() {
+    let said = said("silent", elsewhere());
+    let network = said.split_once("warn  network security").unwrap().1;
+    compare("elsewhere", &format!("warn  network security{network}"));
+}
+
+/// What a kernel does not tell is not guessed at.
+#[test]
+fn a_computer_that_tells_nothing() {
+    let said = said("silent", (nothing_told(), Needs::default()));
+    assert!(!said.contains("\nbad "), "{said}");
+    compare("silent", &said);
+}
+
+/// With or without a configuration, a node cannot be made in no room.
+#[test]
+fn full_shared_memory_is_bad() {
+    for (free, state) in [(64 << 10, State::Bad), (8 << 20, State::Warn), (64 << 20, State::Ok)] {
+        let asked = Asked { room: Some(Room { bytes: 1 << 30, free }), ..nothing_told() };
+        let found = examined("run", (asked, Needs::default()));
+        let found = found.iter().find(|finding| finding.what == "shared memory").unwrap();
+        assert_eq!(found.state, state, "{found:?}");
+    }
+}
+
+#[test]
+fn waking_up_late_is_told() {
+    let judge = |most| measure::judge(&[Duration::from_micros(60), Duration::from_micros(most)], Some(34));
+    assert_eq!((judge(90).state, judge(6000).state), (State::Ok, State::Warn));
+    assert_ne!(judge(90).is, judge(6000).is);
+}
+
+/// A line that says the same of each computer tells nothing, or lies.
+#[test]
+fn each_line_is_tested_with_the_opposite_state() {
+    // Nothing of it is wrong: each says how it is, in one way here and in another there.
+    const NEVER_WRONG: [&str; 6] = ["fair server", "nice", "user", "container", "isolated cores", "systemd"];
+    // There only when something is wrong.
+    const NEVER_RIGHT: [&str; 2] = ["CPU quota", "real-time quota"];
+    let computers = [
+        ("good", good()),
+        ("bad", bad()),
+        ("run", too_little_room_in_run()),
+        ("silent", elsewhere()),
+        ("silent", (nothing_told(), Needs::default())),
+    ];
+    let found: Vec<Finding> = computers.into_iter().flat_map(|(name, computer)| examined(name, computer)).collect();
+    for what in found.iter().map(|finding| finding.what) {
+        let same = || found.iter().filter(|finding| finding.what == what);
+        let (fine, wrong): (Vec<_>, Vec<_>) = same().partition(|finding| finding.state == State::Ok);
+        if NEVER_RIGHT.contains(&what) {
+            assert!(fine.is_empty(), "{what} is said although nothing is wrong");
+            continue;
+        }
+        assert_eq!(wrong.is_empty(), NEVER_WRONG.contains(&what), "{what}: {wrong:?}");
+        assert!(!fine.is_empty(), "{what} is never seen to be right");
+        assert!(same().any(|other| other.is != fine[0].is), "{what} says of each computer: {}", fine[0].is);
+    }
+}

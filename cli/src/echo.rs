@@ -1,0 +1,127 @@
+//! `rohrpost echo`: the data a module publishes, by the module's own description.
+
+use super::target::Target;
+use super::{Failure, say};
+use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
+use rohrpost::description::{DataItem, Description};
+use rohrpost::value::decode;
+use rohrpost::{Name, ToolLink};
+use rohrpost_mailbox::{Kind, local};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// A subscription lives so long without renewal, and is renewed three times in it.
+const LEASE: Duration = Duration::from_secs(3);
+const PATIENCE: Duration = Duration::from_secs(1);
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost echo odometry.0                 each value; Ctrl-C ends it
+  rohrpost echo laser.0 scan --rate 1      the newest scan once a second
+  rohrpost echo odometry.0 --count 3 --json")]
+pub(super) struct Arguments {
+    /// Module, such as laser.0.
+    name: String,
+    /// Data; may be left out when the module has one kind only.
+    data: Option<String>,
+    #[command(flatten)]
+    target: Target,
+    /// At most so many a second; 0 for each.
+    #[arg(long, default_value_t = 0.0, value_name = "HZ", value_parser = super::units::rate_or_all)]
+    rate: f64,
+    /// End after so many values.
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    count: Option<u64>,
+    /// Fail when no data comes for so long, seconds; 0 waits for ever.
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    timeout: f64,
+    /// One JSON object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let running = arguments.target.find()?;
+    let module = running.module(&arguments.name)?;
+    let mut tool = running.join(PATIENCE)?;
+    let result = echo(arguments, module, &mut tool);
+    tool.close();
+    result.map(|()| ExitCode::SUCCESS).map_err(|error| running.told(module, &*error))
+}
+
+fn echo(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(), Failure> {
+    let description = tool.describe(module)?;
+    let item =
+        choose(&description, arguments.data.as_deref()).map_err(|error| format!("{}: {error}", arguments.name))?;
+    let rate_us = if arguments.rate > 0.0 { (1e6 / arguments.rate) as u32 } else { 0 };
+    let mailbox = local::DATA;
+    let wish =
+        Subscribe { number: item.number, id: 1, period_us: rate_us, lease_ms: LEASE.as_millis() as u32, mailbox };
+    let result = follow(arguments, module, &description, item, wish, tool);
+    // The module may have ended meanwhile; its lease would end anyway.
+    let _ = tool.common::<()>(module, UNSUBSCRIBE, &Unsubscribe { id: wish.id, mailbox });
+    result
+}
+
+fn choose<'a>(description: &'a Description, name: Option<&str>) -> Result<&'a DataItem, Failure> {
+    let names = || description.data.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", ");
+    match (name, &description.data[..]) {
+        (_, []) => Err("publishes no data; `rohrpost call NAME` lists what it offers".into()),
+        (None, [only]) => Ok(only),
+        (None, _) => Err(format!("which data? it has: {}", names()).into()),
+        (Some(name), _) => {
+            description.data_item(name).ok_or_else(|| format!("no data `{name}`; it has: {}", names()).into())
+        }
+    }
+}
+
+fn follow(
+    arguments: &Arguments,
+    module: Name,
+    description: &Description,
+    item: &DataItem,
+    wish: Subscribe,
+    tool: &mut ToolLink,
+) -> Result<(), Failure> {
+    tool.data()?;
+    // What an earlier program under this name asked for still comes for a while.
+    let incarnation = tool.link.incarnation();
+    let patience = super::units::seconds(arguments.timeout)?;
+    let (mut renew_at, mut count) = (Instant::now(), 0);
+    let mut heard = Instant::now();
+    let stop = rohrpost::launch::events()?;
+    loop {
+        if Instant::now() >= renew_at {
+            let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &wish);
+            tool.call(module, SUBSCRIBE, description.hash(), write, |_| Ok(()))?;
+            renew_at = Instant::now() + LEASE / 3;
+        }
+        if let Ok(rohrpost::launch::Event::Stop) = stop.try_recv() {
+            return Ok(());
+        }
+        if !patience.is_zero() && heard.elapsed() > patience {
+            return Err(format!("no data within {patience:?}").into());
+        }
+        let Some(package) = tool.data()?.receive_timeout(Duration::from_millis(50)) else { continue };
+        let Kind::Data(number) = package.head().kind.kind() else { continue };
+        let Some((head, value)) = DataHead::split(package.body()) else { continue };
+        let (from, id) = (package.head().from.module(), package.head().id);
+        if (number, from, id, head.incarnation) != (item.number, module, wish.id, incarnation) {
+            continue;
+        }
+        heard = Instant::now();
+        let value = decode(&item.ty, value)?;
+        let line = if arguments.json {
+            let stamped = serde_json::json!({
+                "time_ns": head.stamp_ns, "sequence": head.sequence, "missed": head.missed, "value": value,
+            });
+            stamped.to_string()
+        } else {
+            format!("{}.{:09} #{} {value}", head.stamp_ns / 1_000_000_000, head.stamp_ns % 1_000_000_000, head.sequence)
+        };
+        count += 1;
+        if !say(line) || arguments.count.is_some_and(|wanted| count >= wanted) {
+            return Ok(());
+        }
+    }
+}

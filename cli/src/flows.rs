@@ -1,0 +1,194 @@
+//! Declared flows as a table: how late each may be at most, and how late it was. Of `net`, and of the demo's summary.
+
+use super::table::table;
+use super::units::fine;
+use super::vocabulary::{Vocabulary, built_in};
+use rohrpost::Name;
+use rohrpost::description::Description;
+use rohrpost::interfaces::{FlowState, FlowStates, Links};
+use rohrpost_config::{Contents, Installation};
+
+/// What the columns say that their heads do not.
+pub(super) const LEGEND: &str = "\
+at worst: the bound that `check` computes, for slots that are kept; kept: the slowest package since whose publishing none was missed or cut
+short; slowest: of all, as the router that sends measured it, up to the arrival at the other computer; beyond: packages slower than the bound,
+of kept: those among them whose slots were kept; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's class
+when they came to its mailbox, by their stamp. A package between two modules is put to the flow that carries it (`carries`), else, declared
+or not, to one that does not say what it carries";
+
+/// A row for each flow that leaves one of these nodes; empty without any. `ask` asks a module for its interface.
+pub(super) fn measured<'a>(
+    installation: &Installation,
+    nodes: impl IntoIterator<Item = &'a FlowStates>,
+    links: &[&Links],
+    vocabulary: &mut Vocabulary,
+    mut ask: impl FnMut(Name) -> Option<Description>,
+) -> String {
+    let rows = nodes.into_iter().flat_map(|node| &node.flows).map(|flow| {
+        let carried = carried(installation, flow, vocabulary, &mut ask);
+        row(installation, flow, carried, links)
+    });
+    let rows: Vec<_> = rows.collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let heads = [
+        "flow",
+        ">bytes",
+        ">packages",
+        ">at worst",
+        ">kept",
+        ">slowest",
+        ">99 of 100",
+        ">within",
+        ">beyond",
+        ">of kept",
+        ">late",
+        ">lost",
+        ">oldest",
+    ];
+    table(heads, rows)
+}
+
+/// What a flow carries, by the name in the interface where that is known; none if the file does not say.
+fn carried(
+    installation: &Installation,
+    flow: &FlowState,
+    vocabulary: &mut Vocabulary,
+    ask: impl FnOnce(Name) -> Option<Description>,
+) -> Option<String> {
+    let contents: Contents = flow.carries.parse().ok()?;
+    let word = contents.kind().and_then(|kind| {
+        let module = |text: &str| installation.classes.parse_module(text).ok();
+        let (from, to) = (module(&flow.from)?, module(&flow.to)?);
+        vocabulary.word(kind, from, to, |module| built_in(installation, module).or_else(|| ask(module)))
+    });
+    Some(word.unwrap_or_else(|| contents.to_string()))
+}
+
+fn row(installation: &Installation, flow: &FlowState, carried: Option<String>, links: &[&Links]) -> [String; 13] {
+    let ns = |ns: u64| fine(ns as f64 * 1e-9);
+    let seen = |of: u64| if flow.packages == 0 { "-".into() } else { ns(of) };
+    let lost: u64 = flow.lost.iter().map(|lost| lost.packages).sum();
+    [
+        format!("{} → {}{}", flow.from, flow.to, carried.map(|word| format!(" {word}")).unwrap_or_default()),
+        flow.size.to_string(),
+        flow.packages.to_string(),
+        flow.bound_ns.map_or("-".into(), ns),
+        flow.bound_ns.filter(|_| flow.kept_worst_ns > 0).map_or("-".into(), |_| ns(flow.kept_worst_ns)),
+        seen(flow.worst_ns),
+        seen(flow.p99_ns),
+        ns(flow.deadline_ns),
+        flow.bound_ns.map_or("-".into(), |_| flow.over_bound.to_string()),
+        flow.bound_ns.map_or("-".into(), |_| flow.kept_over_bound.to_string()),
+        flow.over_deadline.to_string(),
+        lost.to_string(),
+        oldest_ns(installation, flow, links).map_or("-".into(), ns),
+    ]
+}
+
+/// Of the receiver's class, on its node. Commands and replies have no stamp.
+fn oldest_ns(installation: &Installation, flow: &FlowState, links: &[&Links]) -> Option<u64> {
+    let to = installation.classes.parse_module(&flow.to).ok()?;
+    let node = installation.node_of(to)?;
+    let classes = &links.iter().find(|links| links.node == node)?.classes;
+    classes.iter().find(|class| class.class == to.class().0)?.age.map(|age| age.max_ns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rohrpost::interface::Interface;
+    use rohrpost::interfaces::{CarriedLoss, LaserInterface};
+    use std::path::Path;
+
+    fn flow(packages: u64, bound_ns: Option<u64>) -> FlowState {
+        FlowState {
+            from: "laser.0".into(),
+            to: "pilot.0".into(),
+            carries: String::new(),
+            size: 800,
+            packages,
+            worst_ns: 5_100_000,
+            mean_ns: 2_000_000,
+            p99_ns: 4_900_000,
+            bound_ns,
+            deadline_ns: 10_000_000,
+            kept_worst_ns: 5_090_000,
+            over_bound: 2,
+            kept_over_bound: 0,
+            over_deadline: 1,
+            lost: vec![CarriedLoss { cause: "quota".into(), packages: 3 }],
+        }
+    }
+
+    #[test]
+    fn what_was_not_seen_and_what_is_not_known_is_left_open() {
+        let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tdma.toml");
+        let installation = Installation::load(&demo).unwrap();
+        let words = |flow: FlowState| {
+            let node = FlowStates { node: "base".into(), flows: vec![flow] };
+            let text = measured(&installation, [&node], &[], &mut Vocabulary::default(), |_| None);
+            text.lines()
+                .nth(1)
+                .unwrap_or_default()
+                .split("  ")
+                .map(str::trim)
+                .filter(|word| !word.is_empty())
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        let of = |columns: &str| columns.split('|').map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(
+            words(flow(7, Some(5_540_000))),
+            of("laser.0 → pilot.0|800|7|5.540 ms|5.090 ms|5.100 ms|4.900 ms|10.00 ms|2|0|1|3|-")
+        );
+        assert_eq!(words(flow(0, None)), of("laser.0 → pilot.0|800|0|-|-|-|-|10.00 ms|-|-|1|3|-"));
+        let none = FlowStates { node: "base".into(), flows: Vec::new() };
+        assert_eq!(measured(&installation, [&none], &[], &mut Vocabulary::default(), |_| None), "");
+    }
+
+    #[test]
+    fn what_a_flow_carries_has_the_name_that_the_interface_gives_it() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-nodes.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        // One whose interface has to be asked for, and one that does not tell it.
+        let program = |name: &str| format!("[[module]]\nname = \"{name}\"\nnode = \"base\"\nprogram = \"./laser\"\n");
+        let text = text + &program("laser.1") + &program("laser.2");
+        let installation = Installation::parse(&text, &file).unwrap();
+        let told = installation.classes.parse_module("laser.1").unwrap();
+        let mut asked = Vec::new();
+        let ask = |module: Name| {
+            asked.push(module);
+            (module == told).then(LaserInterface::description)
+        };
+        let carrying = |(from, to, carries, _): (&str, &str, &str, &str)| FlowState {
+            from: from.into(),
+            to: to.into(),
+            carries: carries.into(),
+            ..flow(0, None)
+        };
+        let cases = [
+            ("laser.0", "pilot.0", "data 1", "laser.0 → pilot.0 scan"),
+            ("laser.0", "pilot.0", "reply 5", "laser.0 → pilot.0 subscribe answered"),
+            ("pilot.0", "motor.0", "command 16", "pilot.0 → motor.0 drive"),
+            ("motor.0", "pilot.0", "reply 16", "motor.0 → pilot.0 drive answered"),
+            ("laser.1", "pilot.0", "data 1", "laser.1 → pilot.0 scan"),
+            ("laser.0", "pilot.0", "data 9", "laser.0 → pilot.0 data 9"),
+            ("laser.2", "pilot.0", "data 1", "laser.2 → pilot.0 data 1"),
+            ("laser.2", "pilot.0", "data 2", "laser.2 → pilot.0 data 2"),
+            ("laser.0", "pilot.0", "reply", "laser.0 → pilot.0 reply"),
+            ("laser.0", "pilot.0", "", "laser.0 → pilot.0"),
+        ];
+        let node = FlowStates { node: "base".into(), flows: cases.map(carrying).into() };
+        let text = measured(&installation, [&node], &[], &mut Vocabulary::default(), ask);
+        let first = |row: &str| row.split("  ").next().unwrap_or_default().to_owned();
+        let first: Vec<String> = text.lines().skip(1).map(first).collect();
+        assert_eq!(first, cases.map(|(.., expected)| expected));
+        assert_eq!(
+            asked,
+            [told, installation.classes.parse_module("laser.2").unwrap()],
+            "each once, and no built-in one"
+        );
+    }
+}

@@ -1,0 +1,343 @@
+//! `rohrpost graph`: who sends what to whom, how often, from the counters of those who send.
+
+mod dot;
+mod svg;
+
+use super::sight::Silence;
+use super::table::table;
+use super::target::{Running, Target};
+use super::units::{Stop, bytes, seconds};
+use super::vocabulary::{Vocabulary, answered};
+use super::watch::Tracks;
+use super::{Failure, say};
+use rohrpost::Name;
+use rohrpost::output::plain;
+use rohrpost::survey::{Scope, Standing, Survey, is_hop};
+use rohrpost_mailbox::{FlowInfo, Kind};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost graph                             a table: who, to whom, what, how often
+  rohrpost graph --svg -o graph.svg          a drawing
+  rohrpost graph --dot | dot -Tpdf > graph.pdf
+Rates are of the time that it looks. Of several nodes all are shown; --node shows one. A drawing leaves out replies and the calls that every module has (such as the \
+renewing of subscriptions); --all draws them too. It reads counters in shared memory, on other nodes by way \
+of their launches: modules are sent nothing.")]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    target: Target,
+    /// Look for so long.
+    #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
+    seconds: f64,
+    /// Print it for Graphviz.
+    #[arg(long, conflicts_with_all = ["svg", "json"])]
+    dot: bool,
+    /// Draw it.
+    #[arg(long, conflicts_with = "json")]
+    svg: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Draw replies and calls that every module has, too; table and JSON have them anyway.
+    #[arg(long)]
+    all: bool,
+    /// Also what was silent meanwhile.
+    #[arg(long)]
+    silent: bool,
+    /// Write it there.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Modules, and what goes from one to another.
+#[derive(Serialize)]
+struct Graph {
+    installation: String,
+    /// The node that the tool looked from.
+    node: String,
+    /// Those that are shown.
+    nodes: Vec<String>,
+    /// Those of them that do not answer.
+    silent: Vec<Silence>,
+    /// What rates are measured over.
+    interval_s: f64,
+    modules: Vec<Module>,
+    edges: Vec<Edge>,
+}
+
+#[derive(Serialize)]
+struct Module {
+    module: String,
+    node: String,
+    faces: Vec<String>,
+    state: String,
+    priority: u8,
+    /// It need not run.
+    #[serde(skip)]
+    is_left_out: bool,
+}
+
+impl Module {
+    /// Whether nothing of it runs that one could see. What sends from outside the configuration has no standing.
+    fn is_down(&self) -> bool {
+        let down = [Standing::Stopped, Standing::Unreachable];
+        down.iter().any(|standing| standing.word() == self.state)
+    }
+}
+
+/// What an edge carries.
+#[derive(Serialize, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[serde(rename_all = "lowercase")]
+enum Carries {
+    Data,
+    Command,
+    /// A command that every module understands.
+    Common,
+    Reply,
+    Output,
+}
+
+#[derive(Serialize)]
+struct Edge {
+    from: String,
+    to: String,
+    carries: Carries,
+    what: String,
+    packages: u64,
+    packages_per_s: f64,
+    bytes_per_s: f64,
+    refused: u64,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let running = arguments.target.find()?;
+    let long = seconds(arguments.seconds)?;
+    if long.is_zero() {
+        return Err("in 0 s nothing is sent; try --seconds 2".into());
+    }
+    let graph = Graph::new(&running, long, arguments.silent)?;
+    let text = if arguments.json {
+        serde_json::to_string(&graph)?
+    } else if arguments.dot {
+        dot::write(&graph, arguments.all)
+    } else if arguments.svg {
+        svg::write(&graph, arguments.all)
+    } else {
+        in_text(&graph)
+    };
+    match &arguments.output {
+        Some(file) => {
+            let failed = |error| {
+                format!("{}: {error}; name a file in a folder that is there and that you may write to", file.display())
+            };
+            std::fs::write(file, text + "\n").map_err(failed)?;
+        }
+        None => {
+            say(text);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Graph {
+    fn new(running: &Running, long: Duration, silent: bool) -> Result<Self, Failure> {
+        // Each node has a clock of its own. The window is as long as the look at it.
+        let nodes = running.shown();
+        let mut tracks: Vec<Tracks> = nodes.iter().map(|_| Tracks::new(Duration::MAX)).collect();
+        let stop = Stop::new()?;
+        look(running, &nodes, &mut tracks)?;
+        let began = Instant::now();
+        // Ctrl-C ends it early: then it is a shorter look.
+        stop.within(long);
+        let (surveys, away) = look(running, &nodes, &mut tracks)?;
+        let interval_s = began.elapsed().as_secs_f64();
+        let away_names: Vec<&str> = away.iter().map(|silence| silence.node.as_str()).collect();
+        let survey = Survey::joined(surveys, &away_names, &running.installation);
+        let mut names = Names { running, survey: &survey, vocabulary: Vocabulary::default() };
+        let mut edges: Vec<Edge> = Vec::new();
+        // What a router delivers for a node that is seen too is counted there.
+        let is_seen = |node: &str| nodes.contains(&node) && !away_names.contains(&node);
+        let counts = |node: &str, flow: &FlowInfo| {
+            !is_hop(&running.installation, node, flow) || !is_seen(running.node_of(flow.from))
+        };
+        let all =
+            nodes.iter().zip(&tracks).flat_map(|(node, tracks)| tracks.figures().map(move |found| (*node, found)));
+        for (_, (flow, figures)) in all.filter(|(node, (flow, _))| counts(node, flow)) {
+            if !silent && figures.packages == 0 && figures.refused == 0 {
+                continue;
+            }
+            let (carries, what) = names.what(flow);
+            let edge = Edge {
+                from: names.process(flow.from),
+                to: names.process(flow.to),
+                carries,
+                what,
+                packages: figures.packages,
+                packages_per_s: figures.rate_hz.unwrap_or(figures.packages as f64 / interval_s),
+                bytes_per_s: figures.bytes_per_s().unwrap_or(figures.bytes as f64 / interval_s),
+                refused: figures.refused,
+            };
+            let same = |known: &&mut Edge| {
+                (&known.from, &known.to, known.carries, &known.what) == (&edge.from, &edge.to, edge.carries, &edge.what)
+            };
+            match edges.iter_mut().find(same) {
+                Some(known) => known.add(&edge),
+                None => edges.push(edge),
+            }
+        }
+        edges.sort_by(|a, b| (&a.from, &a.to, a.carries, &a.what).cmp(&(&b.from, &b.to, b.carries, &b.what)));
+        let classes = &running.installation.classes;
+        let mut modules: Vec<Module> = survey
+            .modules
+            .iter()
+            .map(|module| Module {
+                module: classes.format(module.name),
+                node: module.node.clone(),
+                faces: module.faces.iter().map(|face| classes.format(*face)).collect(),
+                state: module.standing().word().into(),
+                priority: module.name.class().0,
+                is_left_out: module.is_left_out(&running.installation),
+            })
+            .collect();
+        // Tools send too, and are in no configuration.
+        for name in edges.iter().flat_map(|edge| [&edge.from, &edge.to]) {
+            if modules.iter().all(|module| module.module != *name) {
+                let found = running.module(name).ok();
+                let priority = found.map_or(0, |module| module.class().0);
+                let node = found.map_or(&*running.node_name, |module| running.node_of(module)).into();
+                let (faces, state, is_left_out) = (Vec::new(), "tool".into(), false);
+                modules.push(Module { module: name.clone(), node, faces, state, priority, is_left_out });
+            }
+        }
+        let installation = running.installation.name.clone();
+        let nodes = nodes.into_iter().map(Into::into).collect();
+        Ok(Self { installation, node: running.node_name.clone(), nodes, silent: away, interval_s, modules, edges })
+    }
+
+    /// What a drawing is of.
+    fn title(&self) -> String {
+        let word = if self.nodes.len() == 1 { "node" } else { "nodes" };
+        format!("{word} {} of {}", self.nodes.join(", "), self.installation)
+    }
+
+    /// What stands below a module's name: its node if there are several, its faces.
+    fn below<'a>(&'a self, module: &'a Module) -> impl Iterator<Item = String> + use<'a> {
+        let node = (self.nodes.len() > 1).then(|| format!("on {}", module.node));
+        node.into_iter().chain(module.faces.iter().map(|face| format!("+ {face}")))
+    }
+
+    /// The edges that a drawing shows.
+    fn drawn(&self, all: bool) -> impl Iterator<Item = &Edge> {
+        self.edges.iter().filter(move |edge| all || !matches!(edge.carries, Carries::Reply | Carries::Common))
+    }
+}
+
+/// Looks at all nodes, and takes in what everybody sends.
+fn look(running: &Running, nodes: &[&str], tracks: &mut [Tracks]) -> Result<(Vec<Survey>, Vec<Silence>), Failure> {
+    let (mut surveys, mut silent) = (Vec::new(), Vec::new());
+    for (seen, tracks) in running.look_at(nodes, Scope::All)?.into_iter().zip(tracks) {
+        match seen {
+            Ok(survey) => {
+                tracks.look(survey.at_ns, survey.flows.iter().filter(|flow| flow.to != Name::NONE).cloned());
+                surveys.push(survey);
+            }
+            Err(silence) => silent.push(silence),
+        }
+    }
+    Ok((surveys, silent))
+}
+
+impl Edge {
+    fn add(&mut self, other: &Self) {
+        self.packages += other.packages;
+        self.packages_per_s += other.packages_per_s;
+        self.bytes_per_s += other.bytes_per_s;
+        self.refused += other.refused;
+    }
+
+    /// What a drawing says of it.
+    fn label(&self) -> String {
+        format!("{} {}", plain::line(&self.what), self.rate())
+    }
+
+    fn rate(&self) -> String {
+        match self.packages_per_s {
+            rate if rate < 0.95 => format!("{rate:.2}/s"),
+            rate if rate < 9.5 => format!("{rate:.1}/s"),
+            rate => format!("{rate:.0}/s"),
+        }
+    }
+}
+
+/// What names and numbers mean.
+struct Names<'a> {
+    running: &'a Running,
+    survey: &'a Survey,
+    vocabulary: Vocabulary,
+}
+
+impl Names<'_> {
+    /// The module behind a name, which may be one of its faces.
+    fn process(&self, name: Name) -> String {
+        let name = self.survey.module(name).map_or(name.module(), |module| module.name);
+        self.running.text(name)
+    }
+
+    /// Whether output lines go there. Any other module's mailbox of that local id is its own, for whatever data it likes.
+    fn is_collector(&self, mailbox: Name) -> bool {
+        let class = self.running.installation.classes.id(rohrpost::output::CLASS);
+        class == Some(mailbox.class()) && mailbox.local() == rohrpost::output::LINES
+    }
+
+    fn what(&mut self, flow: &FlowInfo) -> (Carries, String) {
+        let kind = flow.kind.kind();
+        if matches!(kind, Kind::Data(_)) && self.is_collector(flow.to) {
+            return (Carries::Output, "lines".into());
+        }
+        let ask = |module| self.running.describe(module).ok();
+        let word = self.vocabulary.word(kind, flow.from, flow.to, ask);
+        let unknown = |number| format!("number {number}");
+        let (carries, unnamed) = match kind {
+            Kind::Command(number) if number < rohrpost::common::FIRST_OWN => (Carries::Common, unknown(number)),
+            Kind::Command(number) => (Carries::Command, unknown(number)),
+            Kind::Reply(number) => (Carries::Reply, answered(&unknown(number))),
+            Kind::Data(number) => (Carries::Data, unknown(number)),
+            Kind::None => (Carries::Common, "refused before it had a type".into()),
+        };
+        (carries, word.unwrap_or(unnamed))
+    }
+}
+
+fn in_text(graph: &Graph) -> String {
+    let silent: String = graph.silent.iter().map(|silence| format!("\n{}", silence.text())).collect();
+    edges_in_text(graph) + &silent
+}
+
+fn edges_in_text(graph: &Graph) -> String {
+    if graph.edges.is_empty() {
+        return format!("nobody sent anything within {:.1} s; --silent shows who did before", graph.interval_s);
+    }
+    let rows = graph.edges.iter().map(|edge| {
+        let kind = match edge.carries {
+            Carries::Data => "data",
+            Carries::Command | Carries::Common => "command",
+            Carries::Reply => "reply",
+            Carries::Output => "output",
+        };
+        [
+            edge.from.clone(),
+            edge.to.clone(),
+            kind.into(),
+            edge.what.clone(),
+            edge.packages.to_string(),
+            edge.rate(),
+            format!("{}/s", bytes(edge.bytes_per_s)),
+            edge.refused.to_string(),
+        ]
+    });
+    table(["from", "to", "kind", "what", ">packages", ">rate", ">bytes", ">refused"], rows).trim_end().to_owned()
+}

@@ -1,0 +1,257 @@
+//! What the TCP router and the nodes of a system show each other, so that sessions are sealed and everyone is who he says.
+
+mod shown;
+mod written;
+
+use rcgen::{
+    BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose,
+    date_time_ymd,
+};
+use rohrpost_config::{Installation, KeysError, check_secret};
+use rohrpost_mailbox::realtime_ns;
+use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
+pub(crate) use shown::lacking;
+pub(super) use shown::show;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use written::{PUBLIC, SECRET, Written};
+
+pub(super) const DAY: Duration = Duration::from_secs(24 * 3600);
+/// What the authority itself holds, days.
+const AUTHORITY_DAYS: u32 = 3650;
+/// Clocks of computers without a network are behind now and then.
+const BEFORE: Duration = DAY;
+
+/// What is made.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Which {
+    /// What is not there, or does not hold.
+    Missing,
+    /// New certificates of all, by the authority that is there.
+    All,
+    /// The same by a new authority; the old one is kept aside.
+    WithAuthority,
+}
+
+/// Why there are no certificates.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CertificateError {
+    /// A file.
+    #[error("{0}: {1}")]
+    File(PathBuf, io::Error),
+    /// Others than its owner may read a key.
+    #[error(transparent)]
+    Open(#[from] KeysError),
+    /// The certificate of the authority.
+    #[error(transparent)]
+    Authority(#[from] SealError),
+    /// Half of the authority.
+    #[error(
+        "{certificate} is there, and {secret} is not: without it nothing can be signed. Bring it from where the authority was made; if it is lost, \
+         `rohrpost keys rotate --authority {file}` begins anew, and then the same without `--authority` for each other system of the installation",
+        certificate = .0.display(), secret = .1.display(), file = .2.display()
+    )]
+    NoKey(PathBuf, PathBuf, PathBuf),
+    /// Halves of two.
+    #[error(
+        "{secret} is not the key of {certificate}: they are of two authorities. Bring both from where one of them was made, or \
+         `rohrpost keys rotate --authority {file}` begins anew",
+        certificate = .0.display(), secret = .1.display(), file = .2.display()
+    )]
+    OtherKey(PathBuf, PathBuf, PathBuf),
+    /// What lies there is no key, or a certificate cannot be made.
+    #[error("{0}: {1}")]
+    Unfit(PathBuf, rcgen::Error),
+}
+
+/// Where they are, if the file wants any.
+pub(super) fn folder(installation: &Installation) -> Option<PathBuf> {
+    installation.tcp.as_ref()?.certificates.as_ref().map(|folder| installation.resolve(folder))
+}
+
+/// Those who need one: the nodes of the file, and the TCP router if one of them runs it.
+fn holders(installation: &Installation) -> impl Iterator<Item = Holder> {
+    let system = installation.system.id;
+    let nodes = installation.nodes.iter().map(move |node| Holder::Node { node: node.name.clone(), system });
+    let server = installation.tcp.as_ref().and_then(|tcp| tcp.server.as_ref());
+    nodes.chain(server.map(|_| Holder::Router))
+}
+
+/// The files of who has that name: what is shown, and the secret.
+fn files(folder: &Path, name: &str) -> [PathBuf; 2] {
+    ["pem", "key"].map(|end| folder.join(format!("{name}.{end}")))
+}
+
+/// What is there of a holder.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum State {
+    Holds,
+    Missing,
+    /// The key is not that of the certificate.
+    NoPair,
+    /// Not by the authority that is there, or not now.
+    Unsigned,
+}
+
+fn state(folder: &Path, authority: Option<&Authority>, holder: &Holder) -> State {
+    let [certificate, secret] = files(folder, &holder.file_name());
+    if !certificate.exists() || !secret.exists() {
+        State::Missing
+    } else if !is_pair(&certificate, &secret) {
+        State::NoPair
+    } else if authority.is_some_and(|authority| authority.has_signed(&certificate)) {
+        State::Holds
+    } else {
+        State::Unsigned
+    }
+}
+
+fn is_pair(certificate: &Path, secret: &Path) -> bool {
+    let text = fs::read_to_string(secret).unwrap_or_default();
+    KeyPair::from_pem(&text).is_ok_and(|key| is_about(certificate, key.public_key_raw()))
+}
+
+/// Makes what is wanted, to hold for so many days; the files that are new. None if the file wants no certificates.
+///
+/// All of it is made before the first file is written.
+pub(crate) fn make(installation: &Installation, which: Which, days: u32) -> Result<Vec<PathBuf>, CertificateError> {
+    let Some(folder) = folder(installation) else { return Ok(Vec::new()) };
+    let Signing { authority, issuer, mut made } = match which {
+        Which::WithAuthority => begin(&folder, installation)?,
+        Which::Missing | Which::All => signing(&folder, installation)?,
+    };
+    for holder in holders(installation) {
+        if which != Which::Missing || state(&folder, Some(&authority), &holder) != State::Holds {
+            let [certificate, secret] = files(&folder, AUTHORITY);
+            let issuer = issuer.as_ref();
+            let issuer = issuer.ok_or_else(|| CertificateError::NoKey(certificate, secret, installation.shown.clone()));
+            made.extend(issue(&folder, issuer?, &holder, days)?);
+        }
+    }
+    written::put(&folder, &made, || if which == Which::WithAuthority { keep_aside(&folder) } else { Ok(()) })?;
+    Ok(made.into_iter().map(|made| made.path).collect())
+}
+
+/// Who signs.
+struct Signing {
+    authority: Authority,
+    /// None where its key is not.
+    issuer: Option<Issuer<'static, KeyPair>>,
+    /// What of it is new.
+    made: Vec<Written>,
+}
+
+/// The authority that is there, mended if only its certificate is lost; a new one where nothing is signed yet.
+fn signing(folder: &Path, installation: &Installation) -> Result<Signing, CertificateError> {
+    let [certificate, secret] = files(folder, AUTHORITY);
+    let file = || installation.shown.clone();
+    let key = match File::open(&secret) {
+        Ok(file) => {
+            check_secret(&secret, &file)?;
+            let text = io::read_to_string(file).map_err(|error| CertificateError::File(secret.clone(), error))?;
+            Some(KeyPair::from_pem(&text).map_err(|error| CertificateError::Unfit(secret.clone(), error))?)
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+        Err(error) => return Err(CertificateError::File(secret, error)),
+    };
+    if certificate.exists() {
+        let authority = Authority::load(&certificate)?;
+        if key.as_ref().is_some_and(|key| !authority.has_key(key.public_key_raw())) {
+            return Err(CertificateError::OtherKey(certificate, secret, file()));
+        }
+        // By the name in it: the installation may have another one by now.
+        let issuer = key.map(|key| Issuer::new(authority_params(&authority.name), key));
+        return Ok(Signing { authority, issuer, made: Vec::new() });
+    }
+    match (key, a_certificate(folder)) {
+        (Some(key), _) => signed_by_itself(folder, installation, key),
+        (None, Some(signed)) => Err(CertificateError::NoKey(signed, secret, file())),
+        (None, None) => begin(folder, installation),
+    }
+}
+
+/// One that somebody shows: an authority was there.
+fn a_certificate(folder: &Path) -> Option<PathBuf> {
+    let paths = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    paths.filter(|path| path.extension().is_some_and(|end| end == "pem")).min()
+}
+
+/// A new authority.
+fn begin(folder: &Path, installation: &Installation) -> Result<Signing, CertificateError> {
+    let [_, secret] = files(folder, AUTHORITY);
+    let key = KeyPair::generate().map_err(|error| CertificateError::Unfit(secret.clone(), error))?;
+    let made = Written { path: secret, text: key.serialize_pem(), mode: SECRET };
+    let mut signing = signed_by_itself(folder, installation, key)?;
+    signing.made.insert(0, made);
+    Ok(signing)
+}
+
+/// The certificate of an authority, from its key.
+fn signed_by_itself(folder: &Path, installation: &Installation, key: KeyPair) -> Result<Signing, CertificateError> {
+    let [certificate, _] = files(folder, AUTHORITY);
+    let params = authority_params(&format!("{PREFIX}{}", installation.name));
+    let signed = params.self_signed(&key).map_err(|error| CertificateError::Unfit(certificate.clone(), error))?;
+    let text = signed.pem();
+    let authority = Authority::read(&certificate, text.as_bytes())?;
+    let made = vec![Written { path: certificate, text, mode: PUBLIC }];
+    Ok(Signing { authority, issuer: Some(Issuer::new(params, key)), made })
+}
+
+/// Gives what there is of the authority another name besides, which nothing has: it is still needed if the new one is not wanted.
+fn keep_aside(folder: &Path) -> Result<(), CertificateError> {
+    let files = files(folder, AUTHORITY);
+    let aside = |number: u32| {
+        let end = if number == 1 { "old".into() } else { format!("old-{number}") };
+        files.each_ref().map(|file| PathBuf::from(format!("{}.{end}", file.display())))
+    };
+    let is_free = |aside: &[PathBuf; 2]| !aside.iter().any(|path| path.exists());
+    let Some(aside) = (1..).map(aside).find(is_free) else { return Ok(()) };
+    for (file, aside) in files.iter().zip(aside).filter(|(file, _)| file.exists()) {
+        fs::hard_link(file, &aside).map_err(|error| CertificateError::File(aside, error))?;
+    }
+    Ok(())
+}
+
+fn authority_params(name: &str) -> CertificateParams {
+    let mut params = CertificateParams::default();
+    params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+    params.key_usages = vec![KeyUsagePurpose::KeyCertSign];
+    params.distinguished_name.push(DnType::CommonName, name);
+    hold(&mut params, AUTHORITY_DAYS);
+    params
+}
+
+/// A new key and certificate of a holder, to take the place of older ones.
+fn issue(
+    folder: &Path,
+    issuer: &Issuer<'static, KeyPair>,
+    holder: &Holder,
+    days: u32,
+) -> Result<[Written; 2], CertificateError> {
+    let [certificate, secret] = files(folder, &holder.file_name());
+    let unfit = |error| CertificateError::Unfit(certificate.clone(), error);
+    let key = KeyPair::generate().map_err(unfit)?;
+    let mut params = CertificateParams::new([holder.dns_name()]).map_err(unfit)?;
+    params.distinguished_name.push(DnType::CommonName, holder.dns_name());
+    params.extended_key_usages = vec![match holder {
+        Holder::Router => ExtendedKeyUsagePurpose::ServerAuth,
+        Holder::Node { .. } => ExtendedKeyUsagePurpose::ClientAuth,
+    }];
+    // RFC 5280 asks for all of these, and strict verifiers with it: that it is no authority, what its key is for, and
+    // whose key signed it.
+    params.is_ca = IsCa::ExplicitNoCa;
+    params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+    params.use_authority_key_identifier_extension = true;
+    hold(&mut params, days);
+    let signed = params.signed_by(&key, issuer).map_err(unfit)?;
+    let secret = Written { path: secret, text: key.serialize_pem(), mode: SECRET };
+    Ok([secret, Written { path: certificate, text: signed.pem(), mode: PUBLIC }])
+}
+
+/// From a little before now on.
+fn hold(params: &mut CertificateParams, days: u32) {
+    let now = date_time_ymd(1970, 1, 1) + Duration::from_nanos(realtime_ns());
+    (params.not_before, params.not_after) = (now - BEFORE, now + days * DAY);
+}

@@ -1,0 +1,104 @@
+//! What there is of certificates, for people, and for how long it holds.
+
+use super::{AUTHORITY, DAY, State, files, folder, holders, is_pair, state};
+use rcgen::date_time_ymd;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::realtime_ns;
+use rohrpost_routers::tcp::{Authority, Holder, holds_until_s};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Whoever holds for less should be renewed.
+const SOON_DAYS: u64 = 30;
+const MAKES: &str = "`rohrpost keys new` makes it";
+
+/// What there is of each who needs one, and of the authority.
+pub(in crate::keys) fn show(installation: &Installation) -> Vec<String> {
+    let Some(folder) = folder(installation) else { return Vec::new() };
+    let [certificate, secret] = files(&folder, AUTHORITY);
+    let known = Authority::load(&certificate);
+    let mut lines = vec![match &known {
+        Err(_) if !certificate.exists() => format!("{}: is missing; {MAKES}", certificate.display()),
+        Err(error) => error.to_string(),
+        Ok(_) => format!("{}: is there{}", certificate.display(), lasts(&certificate, "keys rotate --authority")),
+    }];
+    lines.push(match &known {
+        _ if !secret.exists() => format!("{}: is not here; whoever makes certificates needs it", secret.display()),
+        Ok(_) if !is_pair(&certificate, &secret) => {
+            format!("{}: is not the key of {}", secret.display(), certificate.display())
+        }
+        _ => format!("{}: is there", secret.display()),
+    });
+    for holder in holders(installation) {
+        let state = state(&folder, known.as_ref().ok(), &holder);
+        lines.extend(files(&folder, &holder.file_name()).map(|file| line(&file, state)));
+    }
+    lines
+}
+
+/// What the programs of a node lack of what sessions with the TCP router take; empty if all of it is there and holds.
+pub(crate) fn lacking(installation: &Installation, node: &str) -> Vec<String> {
+    let Some(folder) = folder(installation) else { return Vec::new() };
+    let [certificate, _] = files(&folder, AUTHORITY);
+    let known = Authority::load(&certificate);
+    let mut lines: Vec<String> = known.as_ref().err().map(ToString::to_string).into_iter().collect();
+    let server = installation.tcp.as_ref().and_then(|tcp| tcp.server.as_deref());
+    let is_its = |holder: &Holder| match holder {
+        Holder::Node { node: name, .. } => name == node,
+        Holder::Router => server == Some(node),
+    };
+    for holder in holders(installation).filter(is_its) {
+        let state = state(&folder, known.as_ref().ok(), &holder);
+        // Without the authority nothing can be said of who has signed.
+        if state == State::Holds || (state == State::Unsigned && known.is_err()) {
+            continue;
+        }
+        let [certificate, secret] = files(&folder, &holder.file_name());
+        let is_at_fault = |file: &PathBuf| state != State::Missing || !file.exists();
+        lines.extend([certificate, secret].into_iter().filter(is_at_fault).take(1).map(|file| line(&file, state)));
+    }
+    lines
+}
+
+/// One of the two files of a holder.
+fn line(file: &Path, state: State) -> String {
+    match state {
+        State::Holds => format!("{}: is there{}", file.display(), lasts(file, "keys rotate")),
+        State::Missing if file.exists() => format!("{}: is there without the other file; {MAKES}", file.display()),
+        State::Missing => format!("{}: is missing; {MAKES}", file.display()),
+        State::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
+        State::Unsigned => {
+            format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
+        }
+    }
+}
+
+/// For how long a certificate holds that holds now, and what `renews` it; nothing of what is no certificate.
+fn lasts(file: &Path, renews: &str) -> String {
+    let now_s = realtime_ns() / 1_000_000_000;
+    holds_until_s(file)
+        .map_or_else(String::new, |until_s| text(until_s, until_s.saturating_sub(now_s) / DAY.as_secs(), renews))
+}
+
+fn text(until_s: u64, days: u64, renews: &str) -> String {
+    let until = date_time_ymd(1970, 1, 1) + Duration::from_secs(until_s);
+    let left = if days == 1 { "1 day".into() } else { format!("{days} days") };
+    let warning = format!("; soon it does not: `rohrpost {renews}` makes new ones");
+    let warning = if days < SOON_DAYS { warning } else { String::new() };
+    format!(", holds for {left}, until {}{warning}", until.date())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ends_within_thirty_days_is_warned_of() {
+        const UNTIL_S: u64 = 1_795_252_380;
+        assert_eq!(text(UNTIL_S, 30, "keys rotate"), ", holds for 30 days, until 2026-11-21");
+        assert_eq!(
+            text(UNTIL_S, 1, "keys rotate"),
+            ", holds for 1 day, until 2026-11-21; soon it does not: `rohrpost keys rotate` makes new ones"
+        );
+    }
+}

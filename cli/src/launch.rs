@@ -1,0 +1,195 @@
+//! `rohrpost launch`: the modules of a node, with a live table.
+
+mod all;
+mod sockets;
+
+use super::Failure;
+use super::manager::Manager;
+use super::speech::Speech;
+use super::summary::{ModuleLine, module_lines, print_modules_live};
+pub(super) use all::{Nodes, lab};
+use rohrpost::launch::{Launch, choose_node, events};
+use rohrpost::output::plain::Lines;
+use rohrpost::survey::Survey;
+use rohrpost_config::{Installation, Keys};
+use rohrpost_routers::impair;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The live table is drawn so often.
+const REFRESH: Duration = Duration::from_millis(500);
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost launch config/demo.toml
+  rohrpost launch robot.toml --node base
+  rohrpost launch config/demo-nodes.toml --all --impair loss=5%,delay=2ms,reorder=5%
+Ctrl-C stops the modules in reverse order.")]
+pub(super) struct Arguments {
+    /// The configuration.
+    file: PathBuf,
+    /// Node to launch, if the configuration has several.
+    #[arg(long, value_name = "NAME")]
+    node: Option<String>,
+    /// Launch all nodes on this computer, each in a network namespace of its own.
+    #[arg(long, conflicts_with = "node")]
+    all: bool,
+    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. To nodes that are reached by TCP alone
+    /// what is lost is a delay, for all that is behind it.
+    #[arg(long, value_name = "TEXT", requires = "all")]
+    impair: Option<impair::Settings>,
+    /// No live table, only what happens.
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if arguments.all {
+        return launch_all(arguments);
+    }
+    all::stop_with_it()?;
+    let speech = Speech::begin()?;
+    let code = launch(arguments, &speech).unwrap_or_else(|error| {
+        speech.complain(&error.to_string());
+        ExitCode::FAILURE
+    });
+    speech.settle();
+    Ok(code)
+}
+
+/// An installation that could run here: mistakes that a router would only find when it starts are told at once. A node without one needs no keys.
+fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
+    let installation = super::check::load(&arguments.file)?;
+    let node = arguments.node.as_deref();
+    if node.is_none_or(|node| installation.router_of(node).is_some()) {
+        installation.keys.as_deref().map(|folder| Keys::load(&Keys::file(folder))).transpose()?;
+    }
+    Ok(Arc::new(installation))
+}
+
+/// Every node here, until all have ended or it is told to stop.
+fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let installation = load(arguments)?;
+    // Before the first thread, of which the speech has two.
+    let lab = all::lab(&installation)?;
+    let speech = Speech::begin()?;
+    installation.security_texts().iter().for_each(|security| speech.say(security));
+    let mut nodes = Nodes::begin(installation, lab, arguments.impair, &speech)?;
+    while nodes.watch(Duration::MAX) {}
+    let code = nodes.stop();
+    speech.settle();
+    Ok(code)
+}
+
+fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
+    let installation = load(arguments)?;
+    let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
+    let mut manager = Manager::from_environment(|warning| speech.complain(warning));
+    manager.starting(&node);
+    let sockets = sockets::of(installation.clone(), node.clone());
+    let mut launch = Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, sockets)?;
+    manager.ready(&launch);
+    let mut view = View::new(arguments.quiet, speech);
+    view.began(&launch, &node);
+    let mut shown = Ok(());
+    while shown.is_ok() && launch.watch(view.wait().min(manager.wait())) {
+        manager.alive(&launch);
+        shown = view.show(&mut launch);
+    }
+    view.leave();
+    manager.stopping();
+    // Also when it can be shown no more: the modules are stopped in order.
+    let code = end(launch, speech);
+    shown.map(|()| code)
+}
+
+/// Stops everything; what failed for good or is in error makes the exit code.
+pub(super) fn end(mut launch: Launch, speech: &Speech) -> ExitCode {
+    launch.take_notes().iter().for_each(|note| speech.say(note));
+    let failures = launch.failures();
+    launch.stop().iter().for_each(|note| speech.say(note));
+    // What failed for good stands below all else, where both streams lead to one place.
+    speech.settle();
+    failures.iter().for_each(|failure| speech.complain(failure));
+    if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// What a person at the terminal sees while a node runs.
+pub(super) struct View<'a> {
+    speech: &'a Speech,
+    /// Draw the table over and over in one place.
+    live: bool,
+    begun: Instant,
+    next: Instant,
+    last: Option<Survey>,
+    notes: Vec<String>,
+}
+
+/// Notes that stay below the live table.
+const NOTES_MAX: usize = 8;
+
+impl<'a> View<'a> {
+    pub(super) fn new(quiet: bool, speech: &'a Speech) -> Self {
+        let live = !quiet && std::io::stdout().is_terminal();
+        Self { speech, live, begun: Instant::now(), next: Instant::now(), last: None, notes: Vec::new() }
+    }
+
+    /// All modules are on. Without a table, one line says so.
+    fn began(&self, launch: &Launch, node: &str) {
+        if !self.live {
+            let modules = launch.phases().count();
+            let word = if modules == 1 { "module" } else { "modules" };
+            let runs = all::runs(node, &launch.installation().name);
+            self.speech.say(&format!("{runs}: {modules} {word}"));
+        }
+    }
+
+    /// How long to watch until the next drawing.
+    pub(super) fn wait(&self) -> Duration {
+        self.next.saturating_duration_since(Instant::now()).max(Duration::from_millis(1))
+    }
+
+    /// Shows what is new, if it is time.
+    pub(super) fn show(&mut self, launch: &mut Launch) -> Result<(), Failure> {
+        let notes = launch.take_notes();
+        if !self.live {
+            notes.iter().for_each(|note| self.speech.say(note));
+        }
+        self.notes.extend(notes);
+        if Instant::now() < self.next {
+            return Ok(());
+        }
+        self.next = Instant::now() + REFRESH;
+        if !self.live {
+            return Ok(());
+        }
+        let survey = launch.survey()?;
+        let lines = module_lines(launch.installation(), &survey, self.last.as_ref());
+        self.draw(&launch.installation().name, &lines);
+        self.last = Some(survey);
+        Ok(())
+    }
+
+    fn draw(&mut self, installation: &str, lines: &[ModuleLine]) {
+        let excess = self.notes.len().saturating_sub(NOTES_MAX);
+        self.notes.drain(..excess);
+        let head = format!("{installation}, {} s. Ctrl-C stops it.", self.begun.elapsed().as_secs());
+        // Home, then each line cleared to its end, then all below: no flicker. Lines that are too long are cut off, not
+        // wrapped: else the table would be no table.
+        let text = format!("{head}\n\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
+        let text = Lines(text).to_string().replace('\n', "\x1b[K\n");
+        let first = if self.last.is_none() { "\x1b[2J" } else { "" };
+        self.speech.draw(format!("{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J"));
+    }
+
+    /// Leaves the last table where it stands.
+    pub(super) fn leave(&mut self) {
+        if self.live {
+            self.speech.say("");
+        }
+        self.notes.clear();
+    }
+}

@@ -1,0 +1,294 @@
+//! `rohrpost launch --all`: every node of a configuration on this computer, each in a network namespace of its own.
+//!
+//! ```text
+//!  this command ─┬─ rohrpost launch FILE --node base ─┬─ router.0      namespace of base ──┐
+//!                │                                    └─ motor.0 …                         ├─ bridge
+//!                └─ rohrpost launch FILE --node desk ─── router.1 …    namespace of desk ──┘
+//! ```
+//!
+//! The nodes start at once, as computers that are switched on together do, and are stopped one after the other, the last first. If this
+//! command dies, the kernel tells each launch to stop; when the last process of a node has ended, its namespace is gone.
+
+use super::Failure;
+use crate::speech::Speech;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::{Pid, getppid};
+use rohrpost::launch::{Event, events};
+use rohrpost_config::{Installation, Reach};
+use rohrpost_routers::impair;
+use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, Command, ExitCode, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+/// Tells a launch which process it must not outlive.
+const WITHIN: &str = "ROHRPOST_LAUNCH_ALL";
+/// Of links where no configuration says it, as of Ethernet.
+const MTU: u16 = 1500;
+/// Lines on their way from the nodes; who has more to say waits.
+const LINES_MAX: usize = 256;
+/// How a launch is told to stop, and to hurry. Two signals, since of two that are the same the kernel may deliver one.
+const WORDS: [Signal; 2] = [Signal::SIGINT, Signal::SIGTERM];
+/// So long, at the end, for the last lines.
+const LAST_LINES: Duration = Duration::from_secs(1);
+
+/// What a launch says when all its modules are on.
+pub(super) fn runs(node: &str, installation: &str) -> String {
+    format!("node {node} of {installation} runs")
+}
+
+/// Ends this launch in order when the command that started it for one of its nodes dies. Started otherwise, it does nothing.
+///
+/// # Errors
+/// When that command is gone already.
+pub(super) fn stop_with_it() -> Result<(), Failure> {
+    let Some(parent) = std::env::var(WITHIN).ok().and_then(|pid| pid.parse().ok()) else { return Ok(()) };
+    nix::sys::prctl::set_pdeathsig(Some(Signal::SIGTERM))?;
+    // It may have died before the call above.
+    if getppid() == Pid::from_raw(parent) {
+        Ok(())
+    } else {
+        Err(format!("process {parent}, which launches all nodes, is gone").into())
+    }
+}
+
+/// The nodes of an installation, all running here.
+pub(crate) struct Nodes<'a> {
+    installation: Arc<Installation>,
+    nodes: Vec<Node>,
+    happenings: Receiver<Happening>,
+    /// Streams of nodes that have not ended.
+    open: usize,
+    speech: &'a Speech,
+    /// Words to stop so far.
+    words: u32,
+    /// The nodes are being stopped, so that their ends are no news.
+    stopping: bool,
+    lab: Lab,
+}
+
+struct Node {
+    name: String,
+    child: Child,
+    /// All its modules are on.
+    runs: bool,
+    ended: Option<ExitStatus>,
+    /// Words to stop that it was given.
+    told: usize,
+}
+
+enum Happening {
+    /// A node said something.
+    Line { node: usize, text: String, complaint: bool },
+    /// One of its two streams has ended.
+    Closed,
+    /// A word to stop, or a child may have ended.
+    Event(Event),
+}
+
+/// The namespaces of all nodes. To be called before this process has a second thread.
+///
+/// # Errors
+/// When there is one node only, or the system does not allow it.
+pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
+    if installation.nodes.len() == 1 {
+        let file = installation.shown.display();
+        return Err(format!("{file} has one node; launch it without --all: rohrpost launch {file}").into());
+    }
+    // One that is alone on its LAN may have no address there: then it is reached where the TCP router is.
+    let server = installation.tcp.as_ref().and_then(|tcp| Some((tcp.server.as_deref()?, tcp.address.ip())));
+    let address = |node: &rohrpost_config::Node| node.address.or_else(|| server.map(|(_, address)| address));
+    let spec = |node: &rohrpost_config::Node| Some(NodeSpec { name: node.name.clone(), address: address(node)? });
+    let specs: Vec<NodeSpec> = installation.lan_nodes().iter().filter_map(spec).collect();
+    rohrpost_routers::lab::become_able()?;
+    let mut lab = Lab::new(&specs, installation.network.map_or(MTU, |network| network.mtu))?;
+    if let Some((home, address)) = server {
+        let beyond = installation.nodes.iter().filter(|node| node.reach == Reach::Tcp);
+        let beyond: Vec<&str> = beyond.map(|node| node.name.as_str()).collect();
+        let is_on_lan = specs.iter().any(|spec| spec.address == address);
+        if !beyond.is_empty() || !is_on_lan {
+            lab.join_beyond(home, address, &beyond)?;
+        }
+    }
+    Ok(lab)
+}
+
+impl<'a> Nodes<'a> {
+    /// Starts the launch of each node. The calling thread must live as long as they: the kernel takes its end for this command's.
+    ///
+    /// # Errors
+    /// When one cannot be started; then none is left running.
+    pub(crate) fn begin(
+        installation: Arc<Installation>,
+        lab: Lab,
+        bad: Option<impair::Settings>,
+        speech: &'a Speech,
+    ) -> Result<Self, Failure> {
+        let (sender, happenings) = sync_channel(LINES_MAX);
+        listen(sender.clone())?;
+        let executable = std::env::current_exe()?;
+        let mut all =
+            Self { installation, nodes: Vec::new(), happenings, open: 0, speech, words: 0, stopping: false, lab };
+        for index in 0..all.installation.nodes.len() {
+            let started = all.start(index, &executable, bad, &sender);
+            if let Err(error) = started {
+                all.stop();
+                return Err(error);
+            }
+        }
+        Ok(all)
+    }
+
+    fn start(
+        &mut self,
+        index: usize,
+        executable: &Path,
+        bad: Option<impair::Settings>,
+        sender: &SyncSender<Happening>,
+    ) -> Result<(), Failure> {
+        let name = self.installation.nodes[index].name.clone();
+        let mut command = Command::new(executable);
+        command.arg("launch").arg(&self.installation.path).args(["--node", &name, "--quiet"]);
+        command.env(WITHIN, std::process::id().to_string());
+        if let Some(bad) = bad {
+            command.env(impair::ENVIRONMENT, bad.to_string());
+        }
+        // A process group of its own: a Ctrl-C is ours to handle.
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
+        let mut child = self.lab.command(&name, &mut command).map_err(|error: LabError| Failure::from(error))?;
+        let (out, err) = (child.stdout.take(), child.stderr.take());
+        self.nodes.push(Node { name, child, runs: false, ended: None, told: 0 });
+        read(index, false, out, sender.clone())?;
+        self.open += 1;
+        read(index, true, err, sender.clone())?;
+        self.open += 1;
+        Ok(())
+    }
+
+    /// Begins to watch what crosses the network.
+    pub(crate) fn capture(&self) -> Result<Capture, Failure> {
+        Ok(self.lab.capture()?)
+    }
+
+    /// Watches for at most `period`, or until something happens; false when it is time to stop: somebody said so, a node did not start,
+    /// or none runs any more.
+    pub(crate) fn watch(&mut self, period: Duration) -> bool {
+        match self.happenings.recv_timeout(period) {
+            Ok(happening) => self.note(happening),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => self.words += 1,
+        }
+        self.words == 0
+            && self.nodes.iter().all(|node| node.runs || node.ended.is_none())
+            && self.nodes.iter().any(|node| node.ended.is_none())
+    }
+
+    /// Whether all modules of all nodes are on.
+    pub(crate) fn all_run(&self) -> bool {
+        self.nodes.iter().all(|node| node.runs)
+    }
+
+    fn note(&mut self, happening: Happening) {
+        match happening {
+            Happening::Line { node, text, complaint } => self.line(node, &text, complaint),
+            Happening::Closed => self.open -= 1,
+            Happening::Event(Event::Stop) => self.words += 1,
+            Happening::Event(Event::Child) => self.look_for_ended(),
+        }
+    }
+
+    fn line(&mut self, index: usize, text: &str, complaint: bool) {
+        let width = self.nodes.iter().map(|node| node.name.len()).max().unwrap_or(0);
+        let node = &mut self.nodes[index];
+        node.runs |= text.starts_with(&runs(&node.name, &self.installation.name));
+        let line = format!("{:>width$} │ {text}", node.name);
+        if complaint { self.speech.complain(&line) } else { self.speech.say(&line) }
+    }
+
+    fn look_for_ended(&mut self) {
+        for node in self.nodes.iter_mut().filter(|node| node.ended.is_none()) {
+            node.ended = node.child.try_wait().ok().flatten();
+            if let Some(status) = node.ended.filter(|_| !self.stopping) {
+                let how = if node.runs { "ended" } else { "did not start" };
+                self.speech.complain(&format!("node {} {how}: {status}", node.name));
+            }
+        }
+    }
+
+    /// Stops all nodes, the last first; all at once when another word to stop comes. A node that failed makes the exit code.
+    pub(crate) fn stop(mut self) -> ExitCode {
+        // What ended before is told.
+        self.look_for_ended();
+        self.stopping = true;
+        let words = self.words;
+        while let Some(last) = self.nodes.iter().rposition(|node| node.ended.is_none()) {
+            let hurry = self.words > words;
+            for (index, node) in self.nodes.iter_mut().enumerate() {
+                node.tell(if hurry { WORDS.len() } else { usize::from(index == last) });
+            }
+            match self.happenings.recv() {
+                Ok(happening) => self.note(happening),
+                Err(_) => break,
+            }
+        }
+        let deadline = Instant::now() + LAST_LINES;
+        while self.open > 0 && Instant::now() < deadline {
+            let left = deadline.saturating_duration_since(Instant::now());
+            self.happenings.recv_timeout(left).into_iter().for_each(|happening| self.note(happening));
+        }
+        let well = self.nodes.iter().all(|node| node.ended.is_some_and(|status| status.success()));
+        if well { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    }
+}
+
+impl Node {
+    /// Tells it to stop, until it has been told so often.
+    fn tell(&mut self, often: usize) {
+        for word in WORDS.iter().take(often).skip(self.told) {
+            if self.ended.is_none() {
+                // It is our child and not reaped, so the number is its own.
+                let _ = kill(Pid::from_raw(self.child.id() as i32), *word);
+            }
+        }
+        self.told = self.told.max(often);
+    }
+}
+
+/// Passes signals on.
+fn listen(sender: SyncSender<Happening>) -> Result<(), Failure> {
+    let events = events()?;
+    let pass = move || {
+        for event in events {
+            if sender.send(Happening::Event(event)).is_err() {
+                break;
+            }
+        }
+    };
+    std::thread::Builder::new().name("events".into()).spawn(pass)?;
+    Ok(())
+}
+
+/// Passes on what a node says.
+fn read(
+    node: usize,
+    complaint: bool,
+    pipe: Option<impl Read + Send + 'static>,
+    sender: SyncSender<Happening>,
+) -> Result<(), Failure> {
+    let Some(pipe) = pipe else { return Ok(()) };
+    let pass = move || {
+        for line in BufReader::new(pipe).split(b'\n').map_while(Result::ok) {
+            let text = String::from_utf8_lossy(&line).into_owned();
+            if sender.send(Happening::Line { node, text, complaint }).is_err() {
+                return;
+            }
+        }
+        let _ = sender.send(Happening::Closed);
+    };
+    std::thread::Builder::new().name("lines".into()).spawn(pass)?;
+    Ok(())
+}

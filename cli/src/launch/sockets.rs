@@ -1,0 +1,17 @@
+//! The sockets of a node's router are launch's: what peers send while a router that died is started again waits in the kernel for the next one.
+
+use rohrpost_config::{Installation, Module};
+use std::os::fd::OwnedFd;
+use std::sync::Arc;
+
+/// What launch keeps for the modules of a node: for its router, the sockets by which that is reached.
+pub(super) fn of(installation: Arc<Installation>, node: String) -> impl Fn(&Module) -> Vec<OwnedFd> {
+    move |module| {
+        let network = installation.network.filter(|_| installation.router_of(&node) == Some(module.name));
+        let address = installation.node(&node).and_then(|node| node.address);
+        let (Some(network), Some(address)) = (network, address) else { return Vec::new() };
+        let others = installation.lan_nodes().iter().filter(|other| other.name != node);
+        let peers: Vec<_> = others.filter_map(|other| other.address).collect();
+        rohrpost_routers::shell::listen(address, (network.port, installation.rest_port()), &peers)
+    }
+}

@@ -1,0 +1,193 @@
+//! The `rohrpost` command: one file or folder a subcommand.
+
+#![forbid(unsafe_code)]
+// What is printed goes through `say` and `complain`, and so nothing in it that a terminal would obey.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+mod bench;
+mod bw;
+mod call;
+mod check;
+mod clean;
+mod completions;
+mod control;
+mod daemons;
+mod delay;
+mod demo;
+mod doctor;
+mod echo;
+mod flows;
+mod graph;
+mod help;
+mod hz;
+mod keys;
+mod launch;
+mod list;
+mod log;
+mod mailbox;
+mod manager;
+mod net;
+mod new;
+mod param;
+mod ping;
+mod published;
+mod round;
+mod router;
+mod run;
+mod send;
+mod sight;
+mod slots;
+mod speech;
+mod status;
+mod summary;
+mod table;
+mod target;
+mod tcp;
+mod time;
+mod top;
+mod units;
+mod version;
+mod vocabulary;
+mod watch;
+
+use clap::{FromArgMatches, Parser, Subcommand};
+use rohrpost::output::plain::Lines;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// What went wrong, in words for the person at the terminal.
+type Failure = Box<dyn std::error::Error>;
+
+/// Prioritised mailboxes for robots: configure, launch, look, call.
+#[derive(Parser)]
+#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Explain what a configuration will run, or what is wrong with it.
+    Check(check::Arguments),
+    /// Start the modules of a node and watch over them.
+    Launch(launch::Arguments),
+    /// Run a simulated robot that drives and maps, or play a robot's log.
+    Demo(demo::Arguments),
+    /// End a module and start it again.
+    Restart(control::Arguments),
+    /// End a module; it stays ended until it is started.
+    Stop(control::Arguments),
+    /// Start a module that was stopped, has ended, or failed.
+    Start(control::Arguments),
+    /// List the modules and mailboxes of a running node.
+    List(list::Arguments),
+    /// Show one mailbox: its slots, losses and waits; disturbs nobody.
+    Mailbox(mailbox::Arguments),
+    /// Watch modules, and switch them on and off.
+    Top(top::Arguments),
+    /// Ask modules how they are.
+    Status(status::Arguments),
+    /// Call a function of a module.
+    Call(call::Arguments),
+    /// Print the data that a module publishes.
+    Echo(echo::Arguments),
+    /// Print what modules say.
+    Log(log::Arguments),
+    /// Measure how often a module publishes; disturbs nobody.
+    Hz(hz::Arguments),
+    /// Measure the bytes that go in and out of a module; disturbs nobody.
+    Bw(bw::Arguments),
+    /// Measure how long packages wait; disturbs nobody.
+    Delay(delay::Arguments),
+    /// Show or draw who sends what to whom; disturbs nobody.
+    Graph(graph::Arguments),
+    /// Measure how long a module takes to answer.
+    Ping(ping::Arguments),
+    /// Show how the nodes hear each other, what waits and what is lost.
+    Net(net::Arguments),
+    /// Send a command over and over.
+    Send(send::Arguments),
+    /// Show, set, save and load the parameters of modules.
+    Param(param::Arguments),
+    /// Show how well each node knows the common time.
+    Time(time::Arguments),
+    /// Remove what a crash left in shared memory, and nothing that lives.
+    Clean(clean::Arguments),
+    /// Look whether this computer lets a robot run in time.
+    Doctor(doctor::Arguments),
+    /// Measure how this computer hands packages over.
+    Bench(bench::Arguments),
+    /// Make, change and show keys and certificates of nodes.
+    Keys(keys::Arguments),
+    /// Begin a module of your own: a project that builds and runs.
+    New(new::Arguments),
+    /// Print a script by which a shell completes what you type.
+    Completions(completions::Arguments),
+    /// Print versions, of this program and of what nodes share.
+    Version(version::Arguments),
+    /// Run a built-in module by hand.
+    Run(run::Arguments),
+    /// Carry packages between this node and the others.
+    Router(router::Arguments),
+    /// Carry packages beyond the LAN: the server.
+    TcpRouter(tcp::Arguments),
+    /// Carry packages between this node and the TCP router.
+    TcpClient(tcp::Arguments),
+}
+
+fn main() -> ExitCode {
+    completions::answer();
+    let arguments = Arguments::from_arg_matches(&help::command().get_matches()).unwrap_or_else(|error| error.exit());
+    let result = match arguments.command {
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Launch(arguments) => launch::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Restart(arguments) => control::run(&arguments, control::Order::Restart),
+        Command::Stop(arguments) => control::run(&arguments, control::Order::Stop),
+        Command::Start(arguments) => control::run(&arguments, control::Order::Start),
+        Command::List(arguments) => list::run(&arguments),
+        Command::Mailbox(arguments) => mailbox::run(&arguments),
+        Command::Top(arguments) => top::run(&arguments),
+        Command::Status(arguments) => status::run(&arguments),
+        Command::Call(arguments) => call::run(&arguments),
+        Command::Echo(arguments) => echo::run(&arguments),
+        Command::Log(arguments) => log::run(&arguments),
+        Command::Hz(arguments) => hz::run(&arguments),
+        Command::Bw(arguments) => bw::run(&arguments),
+        Command::Delay(arguments) => delay::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
+        Command::Ping(arguments) => ping::run(&arguments),
+        Command::Net(arguments) => net::run(&arguments),
+        Command::Send(arguments) => send::run(&arguments),
+        Command::Param(arguments) => param::run(&arguments),
+        Command::Time(arguments) => time::run(&arguments),
+        Command::Clean(arguments) => clean::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
+        Command::Keys(arguments) => keys::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
+        Command::Version(arguments) => version::run(&arguments),
+        Command::Run(arguments) => run::run(arguments),
+        Command::Router(arguments) => router::run(arguments),
+        Command::TcpRouter(arguments) => tcp::serve(arguments),
+        Command::TcpClient(arguments) => tcp::join(arguments),
+    };
+    result.unwrap_or_else(|error| {
+        complain(error);
+        ExitCode::FAILURE
+    })
+}
+
+/// Prints a line, or several; false when nobody reads any more (a closed pipe is the reader's way to say enough). All that the command prints
+/// goes through here and [`complain`], and so nothing that a terminal would obey: names, texts and faults are those of others.
+fn say(line: impl std::fmt::Display) -> bool {
+    writeln!(std::io::stdout(), "{}", Lines(line)).is_ok()
+}
+
+/// Prints a line, or several, to the standard error.
+fn complain(line: impl std::fmt::Display) {
+    // Who would read it may be gone.
+    let _ = writeln!(std::io::stderr(), "{}", Lines(line));
+}

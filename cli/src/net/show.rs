@@ -1,0 +1,212 @@
+//! `rohrpost net`, for people.
+
+use super::{Told, beyond};
+use crate::flows;
+use crate::slots::kept;
+use crate::table::{table, time};
+use crate::target::Running;
+use crate::units::{bytes, fine};
+use crate::vocabulary::Vocabulary;
+use rohrpost::Class;
+use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
+use rohrpost::output::plain;
+use std::time::Duration;
+
+/// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
+pub(super) fn text(running: &Running, all: &[Told], vocabulary: &mut Vocabulary) -> String {
+    let mut parts = vec![links(all)];
+    parts.extend(
+        all.iter()
+            .filter_map(|told| told.failure.as_ref().map(|why| (told, why)))
+            .map(|(told, why)| format!("node {}: {}\n", told.node, plain::line(why))),
+    );
+    let refused = |peer: &&PeerLink| !peer.why.is_empty();
+    for told in all {
+        for peer in told.links.iter().flat_map(|links| &links.peers).filter(refused) {
+            parts.push(format!(
+                "node {} and node {} refuse each other: {}\n",
+                told.node,
+                peer.node,
+                plain::line(&peer.why)
+            ));
+        }
+    }
+    let slots = all.iter().filter_map(|told| told.slots.as_ref());
+    parts.extend([
+        strangers(all),
+        rejections(all),
+        failures(all),
+        waiting(all),
+        losses(running, all),
+        clocks(all),
+        kept(slots),
+    ]);
+    parts.push(measured(running, all, vocabulary));
+    parts.extend(beyond::text(running, all));
+    parts.retain(|part| !part.is_empty());
+    parts.join("\n")
+}
+
+fn links(all: &[Told]) -> String {
+    let mut rows = Vec::new();
+    for told in all {
+        for peer in told.links.iter().flat_map(|links| &links.peers) {
+            let rates = told.rates.iter().find(|rates| rates.node == peer.node);
+            let rate = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.0}"));
+            let bytes_s = |value: Option<f64>| value.map_or("-".into(), bytes);
+            rows.push([
+                told.node.clone(),
+                peer.node.clone(),
+                state(peer.state).into(),
+                peer.heard_ms.map_or("never".into(), |ms| time(Duration::from_millis(ms))),
+                rate(rates.map(|rates| rates.sent_packages_s)),
+                bytes_s(rates.map(|rates| rates.sent_bytes_s)),
+                rate(rates.map(|rates| rates.received_packages_s)),
+                bytes_s(rates.map(|rates| rates.received_bytes_s)),
+                peer.lost.to_string(),
+                peer.missed.to_string(),
+                peer.copies.to_string(),
+                peer.damaged.to_string(),
+                peer.refused.to_string(),
+                peer.unsent.to_string(),
+            ]);
+        }
+    }
+    if rows.is_empty() {
+        return String::new();
+    }
+    let heads = [
+        "node", "peer", "state", ">heard", ">out/s", ">B/s", ">in/s", ">B/s", ">lost", ">missed", ">copies",
+        ">damaged", ">refused", ">unsent",
+    ];
+    table(heads, rows)
+}
+
+fn state(state: LinkState) -> &'static str {
+    match state {
+        LinkState::Unknown => "unknown",
+        LinkState::Alive => "alive",
+        LinkState::Silent => "silent",
+        LinkState::Unheard => "unheard",
+        LinkState::Refused => "refused",
+    }
+}
+
+/// Datagrams that were not taken since they came from nobody, or from a peer that is another than it should be, and what to do.
+fn strangers(all: &[Told]) -> String {
+    let mut text = String::new();
+    for links in all.iter().filter_map(|told| told.links.as_ref()) {
+        for peer in links.peers.iter().filter(|peer| peer.refused > 0) {
+            text += &format!(
+                "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or version (launch all \
+                 nodes from the same file; `rohrpost version`), or of a router of it that is over\n",
+                links.node,
+                datagrams(peer.refused),
+                peer.address,
+                peer.node
+            );
+        }
+        if links.foreign > 0 {
+            text += &format!(
+                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's, or found the router's socket full: if \
+                 another installation uses this network, give one of them another `port` in [network]\n",
+                links.node,
+                datagrams(links.foreign)
+            );
+        }
+    }
+    text
+}
+
+/// Datagrams that were not sealed as they must be, by where they seem to come from.
+fn rejections(all: &[Told]) -> String {
+    let links = all.iter().filter_map(|told| told.links.as_ref());
+    let told = links.flat_map(|links| links.rejections.iter().map(|rejected| (&links.node, rejected)));
+    let rows: Vec<_> = told
+        .map(|(node, Rejected { node: from, cause, datagrams })| {
+            let from = if from.is_empty() { "no node" } else { from };
+            [node.clone(), from.to_owned(), cause.clone(), datagrams.to_string()]
+        })
+        .collect();
+    if rows.is_empty() { String::new() } else { table(["node", "not taken from", "cause", ">datagrams"], rows) }
+}
+
+fn datagrams(count: u64) -> String {
+    if count == 1 { "1 datagram".into() } else { format!("{count} datagrams") }
+}
+
+/// What was refused by computers themselves. That nobody listened is no news: that one is silent.
+fn failures(all: &[Told]) -> String {
+    let links = all.iter().filter_map(|told| told.links.as_ref());
+    let all = links.flat_map(|links| links.failures.iter().map(|failure| (&links.node, failure)));
+    let told = all.filter(|(_, failure)| failure.cause != "nobody-there");
+    told.map(|(node, failure)| format!("node {node}: {} not sent: {}\n", datagrams(failure.times), failure.cause))
+        .collect()
+}
+
+fn waiting(all: &[Told]) -> String {
+    let links = all.iter().filter_map(|told| told.links.as_ref());
+    let queues = links.filter(|links| !links.waiting.is_empty()).map(|links| {
+        let levels: Vec<String> =
+            links.waiting.iter().map(|level| format!("{} on level {}", level.packages, level.level)).collect();
+        let memory = bytes(links.waiting_bytes as f64);
+        format!("node {}: packages that wait for the network: {} ({memory})\n", links.node, levels.join(", "))
+    });
+    queues.collect()
+}
+
+/// Classes of which something was lost; the others are in the JSON.
+fn losses(running: &Running, all: &[Told]) -> String {
+    let mut rows = Vec::new();
+    for links in all.iter().filter_map(|told| told.links.as_ref()) {
+        for class in links.classes.iter().filter(|class| !class.lost.is_empty()) {
+            let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
+            let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
+            rows.push([
+                links.node.clone(),
+                name.unwrap_or_else(|| class.class.to_string()),
+                class.taken.to_string(),
+                class.sent.to_string(),
+                class.came.to_string(),
+                class.delivered.to_string(),
+                lost.join(", "),
+            ]);
+        }
+    }
+    if rows.is_empty() {
+        return String::new();
+    }
+    table(["node", "class", ">taken", ">sent", ">came", ">delivered", "lost"], rows)
+}
+
+/// Declared flows; nothing without any.
+fn measured(running: &Running, all: &[Told], vocabulary: &mut Vocabulary) -> String {
+    let links: Vec<&Links> = all.iter().filter_map(|told| told.links.as_ref()).collect();
+    let states = all.iter().filter_map(|told| told.flows.as_ref());
+    let table =
+        flows::measured(&running.installation, states, &links, vocabulary, |module| running.describe(module).ok());
+    if table.is_empty() { table } else { format!("{table}({})\n", flows::LEGEND) }
+}
+
+fn clocks(all: &[Told]) -> String {
+    let clocks: Vec<&ClockState> = all.iter().filter_map(|told| told.clock.as_ref()).collect();
+    if clocks.is_empty() {
+        return String::new();
+    }
+    let ns = |ns: u64| fine(ns as f64 * 1e-9);
+    let rows = clocks.into_iter().map(|clock| {
+        [
+            clock.node.clone(),
+            match clock.role {
+                ClockRole::Listening => "listening".into(),
+                ClockRole::Slave => format!("slave of {}", clock.master),
+                ClockRole::Master => "master".into(),
+            },
+            clock.error_ns.map_or("unknown".into(), |error_ns| format!("±{}", ns(error_ns))),
+            format!("{} ns", clock.offset_ns),
+            format!("{:.3} ppm", clock.rate_ppb as f64 / 1e3),
+            clock.round_trip_ns.map_or("-".into(), ns),
+        ]
+    });
+    table(["node", "time", ">error", ">offset", ">rate", ">there and back"], rows)
+}

@@ -1,0 +1,110 @@
+//! `rohrpost new`: a module's project that compiles, runs and has a test.
+
+mod name;
+
+use super::{Failure, say};
+use name::ModuleName;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Where this command was built from: there the library is, too.
+const BUILT_FROM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+/// The project's files: where they go, and what is in them, with `{{…}}` for what differs.
+const FILES: [(&str, &str); 7] = [
+    ("Cargo.toml", include_str!("template/Cargo.toml.in")),
+    (".gitignore", include_str!("template/gitignore.in")),
+    ("README.md", include_str!("template/README.md.in")),
+    ("robot.toml", include_str!("template/robot.toml.in")),
+    ("src/lib.rs", include_str!("template/lib.rs.in")),
+    ("src/main.rs", include_str!("template/main.rs.in")),
+    ("tests/module.rs", include_str!("template/module.rs.in")),
+];
+
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  rohrpost new wind-vane
+  cd wind-vane && cargo build && rohrpost launch robot.toml")]
+pub(super) struct Arguments {
+    /// The module's class, which names the project too: lower-case letters, digits and `-`.
+    name: String,
+    /// Folder of the project; NAME in the present folder unless said.
+    #[arg(long, value_name = "DIR")]
+    path: Option<PathBuf>,
+    /// Folder of Rohrpost's sources; where this command was built from unless said.
+    #[arg(long, value_name = "DIR")]
+    rohrpost: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let name: ModuleName = arguments.name.parse()?;
+    let rohrpost = sources(arguments.rohrpost.as_deref())?;
+    let folder = arguments.path.clone().unwrap_or_else(|| name.as_str().into());
+    // Whatever is there stays as it is.
+    match fs::read_dir(&folder).map(|mut entries| entries.next().is_none()) {
+        Ok(true) => {}
+        Ok(false) => {
+            return Err(format!("{} is not empty; name another folder with --path DIR", folder.display()).into());
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => return Err(format!("{}: {error}; name another folder with --path DIR", folder.display()).into()),
+    }
+    for (file, template) in FILES {
+        write(&folder.join(file), &fill(template, &name, &rohrpost))?;
+    }
+    let shown = folder.display();
+    say(format_args!(
+        "made {shown}: a module that counts, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost launch robot.toml\n\n\
+         README.md there says how to go on."
+    ));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(file: &Path, text: &str) -> Result<(), Failure> {
+    let failed = |error| format!("{}: {error}", file.display());
+    if let Some(folder) = file.parent() {
+        fs::create_dir_all(folder).map_err(failed)?;
+    }
+    Ok(fs::write(file, text).map_err(failed)?)
+}
+
+fn fill(template: &str, name: &ModuleName, rohrpost: &str) -> String {
+    let filled = template.replace("{{name}}", name.as_str()).replace("{{crate}}", &name.crate_name());
+    filled.replace("{{Type}}", &name.type_name()).replace("{{rohrpost}}", rohrpost)
+}
+
+/// Rohrpost's sources, as they stand in a Cargo.toml.
+fn sources(given: Option<&Path>) -> Result<String, Failure> {
+    let folder = given.unwrap_or(Path::new(BUILT_FROM));
+    let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
+    if !manifest.contains("name = \"rohrpost\"") {
+        let why = if given.is_some() { "holds" } else { "was where this command was built, and holds" };
+        return Err(format!(
+            "{} {why} no sources of Rohrpost; say where they are with --rohrpost DIR",
+            folder.display()
+        )
+        .into());
+    }
+    let folder = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
+    // As TOML writes it between quotes.
+    Ok(folder.display().to_string().replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_left_to_fill_in_and_the_configuration_is_right() {
+        let name: ModuleName = "wind-vane".parse().unwrap();
+        for (file, template) in FILES {
+            let text = fill(template, &name, "/opt/rohrpost");
+            assert!(!text.contains("{{"), "{file}: {text}");
+            if file == "robot.toml" {
+                let installation = rohrpost_config::Installation::parse(&text, Path::new(file)).unwrap();
+                assert_eq!(installation.modules.len(), 2);
+            }
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! `param load`.
+
+use super::set::{set, told};
+use super::{Failure, Session, complain, find, say};
+use rohrpost::Name;
+use rohrpost::parameter::from_file;
+use rohrpost::value::Value;
+use rohrpost_config::Saved;
+use std::path::Path;
+use std::process::ExitCode;
+
+pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> Result<ExitCode, Failure> {
+    let installation = &session.running.installation;
+    let path = file.or(installation.parameters.as_deref()).map(Path::to_owned);
+    let path = path.ok_or("load what? name a file, such as one that `rohrpost param save -o FILE` wrote")?;
+    std::fs::metadata(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let saved = Saved::load(&path, installation)?;
+    let modules: Vec<Name> = saved.modules().collect();
+    let mut failed = modules.is_empty();
+    if failed {
+        complain(format_args!("{} has no parameters of any module", path.display()));
+    }
+    for module in modules {
+        let name = session.running.text(module);
+        let node = session.running.node_of(module);
+        if !session.running.shown().contains(&node) {
+            say(format_args!("{name} is on node {node}, which is not meant; leave --node out"));
+            continue;
+        }
+        match load(session, &saved, module, dry_run) {
+            Ok(lines) => {
+                for line in lines {
+                    say(format_args!("{name} {line}"));
+                }
+            }
+            Err(error) => {
+                complain(format_args!("{name} keeps its values: {error}"));
+                failed = true;
+            }
+        }
+    }
+    if dry_run {
+        say("(nothing was set)");
+    }
+    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// Sets what the file says of one module, all of it or nothing; a line for each parameter.
+fn load(session: &mut Session, saved: &Saved, module: Name, dry_run: bool) -> Result<Vec<String>, Failure> {
+    let values = saved.values::<Value>(&session.running.installation, module)?;
+    let parameters = session.parameters(module)?;
+    let name = session.running.text(module);
+    let mut wanted = Vec::with_capacity(values.len());
+    for saved_value in values {
+        let at = format!("{}:{}", saved.path.display(), saved_value.line);
+        let parameter = find(&parameters, &name, &saved_value.name).map_err(|error| format!("{at}: {error}"))?;
+        let bytes = from_file(&parameter.ty, &saved_value.value)
+            .map_err(|error| format!("{at}: `{}`: {error}", saved_value.name))?;
+        wanted.push((parameter.name.clone(), bytes));
+    }
+    let changes = set(session, module, wanted, dry_run)?;
+    changes.iter().map(|change| told(change, find(&parameters, &name, &change.name)?)).collect()
+}

@@ -1,0 +1,192 @@
+//! `rohrpost param`: settings that modules change while they run.
+
+mod file;
+mod load;
+mod save;
+mod set;
+mod show;
+
+use super::target::{Running, Target};
+use super::{Failure, complain, say};
+use rohrpost::output::plain;
+use rohrpost::parameter::{Parameter, Refusal};
+use rohrpost::{CallError, Fault, Name, ToolLink};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost param list                          the parameters of all modules
+  rohrpost param get pilot.0                   those of one
+  rohrpost param set pilot.0 cruise-m-s 0.4    another value, from now on
+  rohrpost param save                          into the file that the configuration names
+  rohrpost param load tuned.toml --dry-run     what a file would change")]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(clap::Subcommand)]
+enum Action {
+    /// List parameters with their values.
+    List(List),
+    /// Show the parameters of a module, or one of them.
+    Get(Get),
+    /// Change a parameter of a running module.
+    Set(Set),
+    /// Write present values into a file.
+    Save(Save),
+    /// Set what a file says: of each module all of it, or nothing.
+    Load(Load),
+}
+
+#[derive(clap::Args)]
+struct Common {
+    #[command(flatten)]
+    target: Target,
+    /// Wait so long for an answer, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    timeout: f64,
+}
+
+#[derive(clap::Args)]
+struct List {
+    /// Module; all, if none is named.
+    name: Option<String>,
+    #[command(flatten)]
+    common: Common,
+    /// One JSON object a parameter, in a list.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+struct Get {
+    /// Module, such as pilot.0.
+    name: String,
+    /// Parameter; all, if none is named.
+    parameter: Option<String>,
+    #[command(flatten)]
+    common: Common,
+    /// One JSON object a parameter, in a list.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+struct Set {
+    /// Module, such as pilot.0.
+    name: String,
+    /// Parameter, as `param get` lists it.
+    parameter: String,
+    /// Its new value.
+    #[arg(allow_hyphen_values = true)]
+    value: String,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(clap::Args)]
+struct Save {
+    /// Modules; all that have parameters, if none is named.
+    names: Vec<String>,
+    /// File to write; else the one that the configuration names as `parameters`.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(clap::Args)]
+struct Load {
+    /// File to read; else the one that the configuration names as `parameters`.
+    file: Option<PathBuf>,
+    /// Only say what would change, or be refused for its name, type or range.
+    #[arg(long)]
+    dry_run: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    match &arguments.action {
+        Action::List(list) => at_work(&list.common, |session| show::list(session, list.name.as_deref(), list.json)),
+        Action::Get(get) => {
+            at_work(&get.common, |session| show::get(session, &get.name, get.parameter.as_deref(), get.json))
+        }
+        Action::Set(set) => at_work(&set.common, |session| set::run(session, &set.name, &set.parameter, &set.value)),
+        Action::Save(save) => at_work(&save.common, |session| save::run(session, &save.names, save.output.as_deref())),
+        Action::Load(load) => at_work(&load.common, |session| load::run(session, load.file.as_deref(), load.dry_run)),
+    }
+}
+
+/// A running node, and a place on it.
+struct Session {
+    running: Running,
+    tool: ToolLink,
+}
+
+/// Takes part as a tool for as long as `work` takes.
+fn at_work(common: &Common, work: impl FnOnce(&mut Session) -> Result<ExitCode, Failure>) -> Result<ExitCode, Failure> {
+    let running = common.target.find()?;
+    let tool = running.join(super::units::seconds(common.timeout)?)?;
+    let mut session = Session { running, tool };
+    let result = work(&mut session);
+    session.tool.close();
+    result
+}
+
+impl Session {
+    /// The parameters of a module, with what went wrong in words.
+    fn parameters(&mut self, module: Name) -> Result<Vec<Parameter>, Failure> {
+        match self.tool.parameters(module) {
+            Err(CallError::Fault(_, Fault::Unknown(_))) => {
+                let name = self.running.text(module);
+                Err(format!("{name} was built with a Rohrpost that had no parameters; build it anew").into())
+            }
+            other => other.map_err(|error| self.running.told(module, &error)),
+        }
+    }
+
+    /// All modules, as the configuration has them; what cannot be asked is told.
+    fn modules(&self) -> Result<Vec<Name>, Failure> {
+        let mut asked = Vec::new();
+        for (module, silence) in self.running.modules_to_ask()? {
+            match silence {
+                Some(silence) => complain(format_args!("{}: {}", self.running.text(module), silence.text())),
+                None => asked.push(module),
+            }
+        }
+        Ok(asked)
+    }
+
+    /// A refusal or failed call, with the module as people write it, and what to try.
+    fn refused(&self, module: Name, error: CallError<Refusal>) -> Failure {
+        match error {
+            CallError::NotSent(error @ rohrpost_mailbox::SendError::TooLarge { .. }) => {
+                let told = self.running.told(module, &error);
+                format!("{told}; raise `size` in [module.mailbox.commands] of the module, or set fewer at a time")
+                    .into()
+            }
+            error => self.running.told(module, &error),
+        }
+    }
+}
+
+/// The parameter of this name; else the nearest, and all there are.
+fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) -> Result<&'p Parameter, Failure> {
+    let unknown = || {
+        if parameters.is_empty() {
+            return no_parameters(module).into();
+        }
+        let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+        let nearest = rohrpost_config::nearest(name, names.iter().copied());
+        let nearest = nearest.map_or(String::new(), |nearest| format!("did you mean `{nearest}`? "));
+        plain::line(&format!("{module} has no parameter `{name}`; {nearest}it has: {}", names.join(", "))).into()
+    };
+    parameters.iter().find(|parameter| parameter.name == name).ok_or_else(unknown)
+}
+
+fn no_parameters(module: &str) -> String {
+    format!("{module} has no parameters: its settings are read when it starts")
+}

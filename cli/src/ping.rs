@@ -1,0 +1,207 @@
+//! `rohrpost ping`: how long a module takes to answer.
+
+mod ways;
+
+use super::table::time;
+use super::target::{Running, Target};
+use super::units::{Stop, seconds};
+use super::{Failure, say};
+use rohrpost::common::TimeReport;
+use rohrpost::survey::Scope;
+use rohrpost::{CallError, Fault, Name};
+use rohrpost_mailbox::{Latency, ModuleState};
+use serde_json::json;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+use ways::{Moments, WaySum, Ways};
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost ping motor.0               once a second; Ctrl-C ends it
+  rohrpost ping motor.0 -c 100 --interval 0.01
+It asks for system time. The time is that of the whole round: a module answers between its own work, and so what it does just \
+then is in it, as is being waited for behind more important classes. The ways there and back are by system time, with how far \
+off they may be; between nodes that do not have the master's time, or where that is too unsure, it says so instead. p50 and p99 \
+come from a histogram and are right to a quarter or so; the others are exact. The exit code is 1 if nothing was answered.")]
+pub(super) struct Arguments {
+    /// Module or face, such as motor.0.
+    name: String,
+    #[command(flatten)]
+    target: Target,
+    /// End after so many calls; without it, at Ctrl-C.
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    count: Option<u64>,
+    /// From one to the next.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    interval: f64,
+    /// Wait so long for each answer.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    timeout: f64,
+    /// One JSON object a line: each answer, then all.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let running = arguments.target.find()?;
+    let module = running.module(&arguments.name)?;
+    let (interval, timeout) = (seconds(arguments.interval)?, seconds(arguments.timeout)?);
+    let stop = Stop::new()?;
+    let mut tool = running.join(timeout)?;
+    let mut rounds = Rounds::default();
+    loop {
+        // The round encloses the ways: whoever holds this process up in between makes neither longer than the round.
+        let (began, before) = (Instant::now(), TimeReport::of(&tool.clock));
+        let answer = tool.time(module);
+        let (after, took) = (TimeReport::of(&tool.clock), began.elapsed());
+        rounds.sent += 1;
+        let told = match answer {
+            Ok(there) => {
+                let pace = tool.clock.record().map_or(1.0, |record| record.pace_ppb as f64 / 1e9);
+                let moments = Moments { before: &before, there: &there, after: &after };
+                let ways = Ways::new(&moments, running.is_own(module), pace);
+                rounds.answered(took, ways.as_ref().ok());
+                tell_answer(arguments, rounds.sent, took, &ways)
+            }
+            // It has answered, if only that it does not know this function.
+            Err(CallError::Fault(_, Fault::Unknown(_))) => {
+                rounds.answered(took, None);
+                let why = "the module was built with a Rohrpost that tells no time; build it anew".into();
+                tell_answer(arguments, rounds.sent, took, &Err(why))
+            }
+            Err(error) => tell_loss(arguments, &running, module, rounds.sent, &error),
+        };
+        let enough = arguments.count.is_some_and(|count| rounds.sent >= count);
+        let wait = interval.saturating_sub(began.elapsed());
+        if !told || enough || stop.within(wait) {
+            break;
+        }
+    }
+    tool.close();
+    let summary = if arguments.json { rounds.json(&arguments.name) } else { rounds.text(&arguments.name) };
+    say(summary);
+    if rounds.answered == 0 {
+        return Err(why_silent(&running, module)?.into());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn tell_answer(arguments: &Arguments, number: u64, took: Duration, ways: &Result<Ways, String>) -> bool {
+    let name = &arguments.name;
+    if arguments.json {
+        let (ways, why) = (ways.as_ref().ok(), ways.as_ref().err());
+        return say(json!({
+            "module": name, "number": number, "round_trip_s": took.as_secs_f64(), "there_s": ways.map(|ways| ways.there_s),
+            "back_s": ways.map(|ways| ways.back_s), "ways_error_s": ways.map(|ways| ways.error_s), "ways_unknown": why,
+        }));
+    }
+    let ways = match ways {
+        Ok(ways) => ways.text(),
+        Err(why) => format!("ways unknown: {why}"),
+    };
+    say(format_args!("{name}: answer {number} after {} ({ways})", time(took)))
+}
+
+fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64, error: &CallError) -> bool {
+    let why = match error {
+        CallError::Timeout(_, time) => format!("no answer within {time:?}"),
+        error => running.told(module, error).to_string(),
+    };
+    if arguments.json {
+        return say(json!({"module": arguments.name, "number": number, "round_trip_s": null, "error": why}));
+    }
+    say(format_args!("{}: none {number}: {why}", arguments.name))
+}
+
+/// What shared memory tells of a module that does not answer, and what to do.
+fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
+    let name = running.text(module);
+    let survey = running.look(running.node_of(module), Scope::Module(module.raw()))?;
+    let found = survey.module(module);
+    Ok(match found.and_then(|found| found.process.as_ref().map(|process| (found, process))) {
+        Some((found, process)) => format!(
+            "{name} answered nothing: its process {} is there, its state is {}, and {} packages wait for it; it hangs, was \
+             stopped (kill -CONT {0} goes on), or works longer than that: see `rohrpost log --module {name}`",
+            process.pid,
+            process.state.map_or("unknown", ModuleState::name),
+            found.depth
+        ),
+        None => running.absent(module).to_string(),
+    })
+}
+
+/// All rounds so far, in as much memory for a million as for one.
+#[derive(Default)]
+struct Rounds {
+    sent: u64,
+    answered: u64,
+    min: Option<Duration>,
+    took: Latency,
+    there: WaySum,
+    back: WaySum,
+}
+
+impl Rounds {
+    fn answered(&mut self, took: Duration, ways: Option<&Ways>) {
+        self.answered += 1;
+        if let Some(ways) = ways {
+            self.there.add(ways.there_s, ways.error_s);
+            self.back.add(ways.back_s, ways.error_s);
+        }
+        self.min = Some(self.min.map_or(took, |min| min.min(took)));
+        self.took.count_one(took);
+    }
+
+    fn lost(&self) -> u64 {
+        self.sent - self.answered
+    }
+
+    /// Min, mean, p50, p99, max; none when nothing was answered.
+    fn times(&self) -> Option<[Duration; 5]> {
+        let (min, mean) = (self.min?, self.took.sum.div_f64(self.answered as f64));
+        // A bucket may begin before the shortest time in it.
+        let at = |share| self.took.quantile(share).map_or(min, |found| found.max(min));
+        Some([min, mean, at(0.5), at(0.99), self.took.max])
+    }
+
+    fn text(&self, name: &str) -> String {
+        let count = format!("\n{name}: {} sent, {} answered, {} lost", self.sent, self.answered, self.lost());
+        let Some(times) = self.times() else { return count };
+        let [min, mean, p50, p99, max] = times.map(time);
+        let ways = [("there", &self.there), ("back", &self.back)];
+        let ways = ways.map(|(name, way)| way.text().map_or(String::new(), |text| format!("\n{name:5} {text}")));
+        format!("{count}\nround min {min}  mean {mean}  p50 {p50}  p99 {p99}  max {max}{}", ways.concat())
+    }
+
+    fn json(&self, module: &str) -> String {
+        let [min, mean, p50, p99, max] = match self.times() {
+            Some(times) => times.map(|time| Some(time.as_secs_f64())),
+            None => [None; 5],
+        };
+        let object = json!({
+            "module": module, "sent": self.sent, "answered": self.answered, "lost": self.lost(),
+            "min_s": min, "mean_s": mean, "p50_s": p50, "p99_s": p99, "max_s": max,
+            "there": self.there.json(), "back": self.back.json(),
+        });
+        object.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_are_told_exactly_but_for_the_quantiles() {
+        let ms = Duration::from_millis;
+        let mut rounds = Rounds { sent: 101, ..Rounds::default() };
+        assert!(rounds.times().is_none());
+        (1..=100).for_each(|took| rounds.answered(ms(took), None));
+        let [min, mean, p50, p99, max] = rounds.times().unwrap();
+        assert_eq!((min, mean, max, rounds.lost()), (ms(1), Duration::from_micros(50_500), ms(100), 1));
+        assert!((ms(38)..ms(63)).contains(&p50) && (ms(75)..=ms(100)).contains(&p99), "{p50:?} {p99:?}");
+        let mut one = Rounds { sent: 1, ..Rounds::default() };
+        one.answered(ms(3), None);
+        assert_eq!(one.times(), Some([ms(3); 5]));
+    }
+}

@@ -1,0 +1,154 @@
+//! What a module publishes, by its own counters, on a node that may be launched again meanwhile.
+
+use super::target::{Running, Target};
+use super::watch::{Figures, Tracks};
+use super::{Failure, complain};
+use rohrpost::Name;
+use rohrpost::output::plain;
+use rohrpost::survey::{Scope, Survey};
+use rohrpost_mailbox::{FlowInfo, Type};
+use std::time::Duration;
+
+/// Numbers and names of the data that are meant.
+pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Result<Vec<(u16, String)>, Failure> {
+    let text = running.text(module);
+    let description = running.describe(module)?;
+    let known: Vec<(u16, String)> = description.data.into_iter().map(|item| (item.number, item.name)).collect();
+    let names = || known.iter().map(|(_, name)| plain::line(name)).collect::<Vec<_>>().join(", ");
+    match name {
+        _ if known.is_empty() => {
+            let faces = running.installation.module(module).map(|found| &found.faces[..]).unwrap_or_default();
+            let faces: Vec<String> = faces.iter().map(|face| running.text(*face)).collect();
+            let faces = if faces.is_empty() { String::new() } else { format!("; its faces may: {}", faces.join(", ")) };
+            Err(format!("{text} publishes no data{faces}").into())
+        }
+        None => Ok(known),
+        Some(name) => match known.iter().find(|(_, known)| known == name) {
+            Some(one) => Ok(vec![one.clone()]),
+            None => Err(format!("{text} has no data `{name}`; it has: {}", names()).into()),
+        },
+    }
+}
+
+/// A module that is looked at again and again.
+pub(super) struct Watched {
+    pub(super) running: Running,
+    pub(super) module: Name,
+    /// The module as the user named it.
+    text: String,
+    pub(super) tracks: Tracks,
+    /// Whether a launch watched over the node when it was last looked for.
+    launched: bool,
+    /// Whether the node was launched again, or answers again, and what the module publishes now is not known yet.
+    changed: bool,
+    /// Whether the module's node was heard, and does not answer now.
+    heard: bool,
+    silent: bool,
+}
+
+impl Watched {
+    /// The module of this name, over so long a window.
+    pub(super) fn new(target: &Target, text: &str, window: Duration) -> Result<Self, Failure> {
+        let running = target.find()?;
+        let module = running.module(text)?;
+        if running.is_beyond(module) {
+            return Err(format!(
+                "{text} is beyond this system's nodes, and what it counts stands in its own node's memory; run this in system {}, or \
+                 take `rohrpost echo {text}`, which subscribes",
+                module.system()
+            )
+            .into());
+        }
+        let launched = running.node.launcher().is_some();
+        Ok(Self {
+            running,
+            module,
+            text: text.into(),
+            tracks: Tracks::new(window),
+            launched,
+            changed: false,
+            heard: false,
+            silent: false,
+        })
+    }
+
+    /// What there is of the module now; none while its node is away, which is said once.
+    pub(super) fn look(&mut self) -> Result<Option<Survey>, Failure> {
+        let own = self.running.is_own(self.module);
+        if own {
+            self.find_again()?;
+        }
+        let node = self.running.node_of(self.module);
+        match self.running.look(node, Scope::Module(self.module.raw())) {
+            Ok(survey) => {
+                if std::mem::take(&mut self.silent) {
+                    complain(format_args!("node {node} answers again"));
+                    self.changed = true;
+                }
+                self.heard = true;
+                Ok(Some(survey))
+            }
+            // Its directory goes with a node that has ended; there is nothing to be seen until the next.
+            Err(_) if own && !self.launched => Ok(None),
+            Err(error) if own || !self.heard => Err(error),
+            Err(error) => {
+                if !std::mem::replace(&mut self.silent, true) {
+                    complain(format_args!("{error}; waiting for it (Ctrl-C ends this)"));
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// Looks once, and fails when the module has no mailboxes.
+    pub(super) fn require_present(&mut self) -> Result<(), Failure> {
+        let module = self.module;
+        let has = |survey: Survey| survey.mailboxes.iter().any(|mailbox| mailbox.name.module() == module);
+        if self.look()?.is_some_and(has) { Ok(()) } else { Err(self.running.absent(module)) }
+    }
+
+    /// If the node's launch has ended, looks for the node that was launched in its place; when there is one, what was seen
+    /// before counts no more. Both are said where they do not stand among the figures.
+    fn find_again(&mut self) -> Result<(), Failure> {
+        if self.running.node.launcher().is_some() {
+            self.launched = true;
+            return Ok(());
+        }
+        let node = &self.running.node_name;
+        if std::mem::take(&mut self.launched) {
+            complain(format_args!(
+                "launch of node `{node}` has ended; waiting until it is launched again (Ctrl-C ends this)"
+            ));
+        }
+        let Some(running) = self.running.again().ok().filter(|again| again.node.launcher().is_some()) else {
+            return Ok(());
+        };
+        complain(format_args!("node `{node}` was launched again"));
+        self.module = running.module(&self.text)?;
+        self.tracks = Tracks::new(self.tracks.window());
+        (self.running, self.launched, self.changed) = (running, true, true);
+        Ok(())
+    }
+
+    /// What is to be told of, as [`data_of`] has it. On a node that was launched again it may be something else; until the
+    /// module is there, `known` is what it will be.
+    pub(super) fn renew(&mut self, known: &mut Vec<(u16, String)>, name: Option<&str>) {
+        if self.changed
+            && let Ok(found) = data_of(&self.running, self.module, name)
+        {
+            (*known, self.changed) = (found, false);
+        }
+    }
+
+    /// Takes in what is published under the module's name.
+    pub(super) fn take_published(&mut self, survey: Survey) {
+        let module = self.module;
+        let is_own = |flow: &FlowInfo| flow.is_publication() && flow.from.module() == module;
+        self.tracks.look(survey.at_ns, survey.flows.into_iter().filter(is_own));
+    }
+
+    /// Figures of data of this number, if it was ever published.
+    pub(super) fn figures(&self, number: u16) -> Option<Figures> {
+        self.tracks.figures().find(|(flow, _)| flow.kind == Type::data(number)).map(|(_, figures)| figures)
+    }
+}

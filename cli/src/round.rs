@@ -1,0 +1,84 @@
+//! The routers of all nodes, asked one after the other, once or again and again: what `net` and `time` have in common.
+
+use super::Failure;
+use super::target::{Running, Target};
+use super::units::{Stop, seconds};
+use rohrpost::Name;
+use rohrpost::common::GET_DATA;
+use rohrpost::macro_support::{DataPort, append, from_bytes};
+use rohrpost::serde::de::DeserializeOwned;
+use rohrpost::{CallError, Fault, ToolLink};
+use rohrpost_config::Installation;
+use std::time::Duration;
+
+/// A router that does not answer for so long is silent.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Whom to ask, and how often.
+#[derive(clap::Args)]
+pub(super) struct Rounds {
+    #[command(flatten)]
+    target: Target,
+    /// Show it again and again.
+    #[arg(long)]
+    pub(super) watch: bool,
+    /// From one to the next, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS", requires = "watch")]
+    interval: f64,
+    /// One JSON object a line.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Who asks.
+pub(super) struct Round {
+    pub(super) running: Running,
+    pub(super) interval: Duration,
+    pub(super) stop: Stop,
+    tool: ToolLink,
+}
+
+impl Rounds {
+    /// Finds the installation; of one that has nobody to ask, `alone` says what to look at instead.
+    pub(super) fn begin(&self, alone: &str, has: impl Fn(&Installation) -> bool) -> Result<Round, Failure> {
+        let running = self.target.find()?;
+        if !has(&running.installation) {
+            return Err(alone.into());
+        }
+        let (interval, stop) = (seconds(self.interval)?, Stop::new()?);
+        let tool = running.join(PATIENCE)?;
+        Ok(Round { running, interval, stop, tool })
+    }
+}
+
+impl Round {
+    /// Names of the nodes that are meant.
+    pub(super) fn nodes(&self) -> Vec<String> {
+        self.running.shown().into_iter().map(str::to_owned).collect()
+    }
+
+    /// The newest value that a node's router has published and of when it is, or why there is none.
+    pub(super) fn newest<T: DeserializeOwned>(&mut self, node: &str, port: DataPort<T>) -> Result<(u64, T), String> {
+        let router = self.running.installation.router_of(node).ok_or("it has no router")?;
+        self.newest_of(router, port)
+    }
+
+    /// The same of any module.
+    pub(super) fn newest_of<T: DeserializeOwned>(
+        &mut self,
+        module: Name,
+        port: DataPort<T>,
+    ) -> Result<(u64, T), String> {
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let newest = self.tool.call(module, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
+        newest.map_err(|error| match error {
+            CallError::Fault(_, Fault::NothingYet) => "it has just begun; ask again".into(),
+            error => self.running.told(module, &error).to_string(),
+        })
+    }
+
+    /// Nobody is asked any more.
+    pub(super) fn close(self) {
+        self.tool.close();
+    }
+}

@@ -1,0 +1,107 @@
+//! `rohrpost router`: carries packages between this node and the others of its system. Launch starts one on each node.
+
+mod clock;
+pub(super) mod faults;
+mod flows;
+pub(crate) mod keys;
+mod links;
+mod slots;
+
+use super::Failure;
+use rohrpost::interfaces::{Router, RouterInterface};
+use rohrpost::{Context, Module, ModuleError, Start};
+use rohrpost_modules::runtime::{exit, kept, run_started};
+use rohrpost_routers::impair;
+use rohrpost_routers::settings::Settings;
+use rohrpost_routers::shell::clock::ClockParts;
+use rohrpost_routers::shell::{Parts, Shell};
+use serde::Deserialize;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How often it tells how it is.
+const PERIOD: Duration = Duration::from_millis(500);
+
+#[derive(clap::Args)]
+#[command(after_help = "Example, on the first node of robot.toml: rohrpost router --config robot.toml --name router.0
+Launch starts it by itself on each node of a system with several; by hand it is of use where modules are started by hand.")]
+pub(super) struct Arguments {
+    /// What every module takes: --config FILE --name router.I [--off]; I is the place of its node in the configuration, from 0.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = Start::from_arguments(arguments.arguments.into_iter());
+    Ok(exit(start.and_then(run_started::<RouterModule>)))
+}
+
+/// Settings of a router: there are none in `[[module]]`, all is said in the sections of the network.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct NoSettings {}
+
+struct RouterModule {
+    shell: Shell,
+}
+
+impl Router for RouterModule {}
+
+impl Module for RouterModule {
+    type Settings = NoSettings;
+    type Interfaces = RouterInterface;
+
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
+        let installation = context.installation();
+        let impair = impairment()?;
+        let node = installation.node_of(context.me()).unwrap_or_default();
+        let keys = keys::of(installation)?;
+        let settings = Settings::new(installation, node, keys::incarnation(keys.is_some())?)?;
+        if let Some(security) = installation.security_text() {
+            match &keys {
+                Some(_) => tracing::info!("{security}"),
+                None => tracing::warn!("{security}"),
+            }
+        }
+        if let Some(impair) = impair {
+            tracing::warn!("makes the network worse, as {} says: {impair}", impair::ENVIRONMENT);
+        }
+        let faults = Arc::new(faults::Encoded::of(installation));
+        let node = context.link().borrow().participant().node().clone();
+        let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
+        let (name, sockets) = (context.me(), kept());
+        let parts = Parts { node: &node, name, settings, faults, sockets, impair, clock };
+        let shell = match keys {
+            Some(keys) => Shell::start_sealed(parts, keys)?,
+            None => Shell::start(parts)?,
+        };
+        context.set_period(PERIOD);
+        Ok(Self { shell })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        // Without one of its threads it is of no use; started again, it is.
+        assert!(self.shell.is_well(), "a thread of the router has ended");
+        context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
+        if let Some(clock) = self.shell.clock() {
+            context.publish_now(RouterInterface::CLOCK, &clock::of(&self.shell, clock))?;
+        }
+        if let Some(slots) = self.shell.slots() {
+            context.publish_now(RouterInterface::SLOTS, &slots::of(&self.shell, slots))?;
+        }
+        let flows = flows::of(&self.shell, &context.installation().classes);
+        context.publish_now(RouterInterface::FLOWS, &flows)?;
+        Ok(())
+    }
+}
+
+/// The bad network that a test wants.
+pub(super) fn impairment() -> Result<Option<impair::Settings>, ModuleError> {
+    let text = std::env::var(impair::ENVIRONMENT).unwrap_or_default();
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let parsed = text.parse().map_err(|error| ModuleError::new(format!("{}: {error}", impair::ENVIRONMENT)));
+    parsed.map(Some)
+}

@@ -1,0 +1,30 @@
+//! `rohrpost run`: what launch starts built-in modules with, and what a person starts one by hand with.
+
+use super::Failure;
+use rohrpost::Start;
+use rohrpost_config::BUILTINS;
+use rohrpost_modules::runtime::exit;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+#[command(after_help = "Example: rohrpost run sim --config config/demo.toml --name motor.0")]
+pub(super) struct Arguments {
+    /// Which built-in module.
+    #[arg(value_parser = clap::builder::PossibleValuesParser::new(BUILTINS))]
+    builtin: String,
+    /// What every module takes: --config FILE --name CLASS.INSTANCE [--off].
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let start = match Start::from_arguments(arguments.arguments.into_iter()) {
+        Ok(start) => start,
+        Err(error) => return Ok(exit(Err(error))),
+    };
+    match rohrpost_modules::builtin::run(&arguments.builtin, start) {
+        Some(result) => Ok(exit(result)),
+        // The command line takes no other names; one of them without a program would be our own mistake.
+        None => Err(format!("the built-in module `{}` has no program; report this", arguments.builtin).into()),
+    }
+}

@@ -1,0 +1,224 @@
+//! What a node does, as text: modules, and traffic by class.
+
+use super::table::{table, table_of, time};
+use rohrpost::Class;
+use rohrpost::common::Status;
+use rohrpost::output::plain;
+use rohrpost::survey::{ModuleSurvey, Standing, Survey};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::sys::Scheduling;
+use rohrpost_mailbox::{ClassTraffic, Loss, saturating_sum};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A module, as the tables show it.
+#[derive(Clone, Serialize)]
+pub(super) struct ModuleLine {
+    pub(super) module: String,
+    pub(super) node: String,
+    pub(super) faces: Vec<String>,
+    #[serde(flatten)]
+    pub(super) account: Account,
+    pub(super) priority: u8,
+    pub(super) scheduling: String,
+    pub(super) pid: Option<u32>,
+    pub(super) received: u64,
+    pub(super) received_per_s: Option<f64>,
+    pub(super) waiting: u32,
+    #[serde(flatten)]
+    pub(super) losses: Losses,
+}
+
+/// How a module stands, the same in every table and for every program that reads JSON.
+#[derive(Clone, Serialize)]
+pub(super) struct Account {
+    pub(super) state: Standing,
+    /// It is started again for the so manieth time that counts,
+    attempt: Option<u32>,
+    /// and at so many it is given up.
+    attempts_max: Option<u32>,
+    /// The last that went wrong.
+    pub(super) error: Option<String>,
+    pub(super) restarts: u32,
+}
+
+impl Account {
+    pub(super) fn of(module: &ModuleSurvey, installation: &Installation) -> Self {
+        let state = module.standing();
+        let counts = match state {
+            Standing::Restarting { attempt, most } => Some((attempt, most)),
+            _ => None,
+        };
+        Self {
+            state,
+            attempt: counts.map(|(attempt, _)| attempt),
+            attempts_max: counts.map(|(_, most)| most),
+            error: Some(module.last_error(installation)).filter(|error| !error.is_empty()),
+            restarts: module.restarts(),
+        }
+    }
+
+    /// As the module itself has just said; `before` is what others know of it.
+    pub(super) fn said(status: &Status, before: Option<Self>) -> Self {
+        let before = before.unwrap_or_else(Self::unknown);
+        let error = Some(status.error.clone()).filter(|error| !error.is_empty()).or(before.error);
+        Self { state: status.state.into(), attempt: None, attempts_max: None, error, restarts: before.restarts }
+    }
+
+    /// Of one that does not answer, for this reason.
+    pub(super) fn unreachable(why: &str, before: Option<Self>) -> Self {
+        let before = before.unwrap_or_else(Self::unknown);
+        Self { state: Standing::Unreachable, attempt: None, attempts_max: None, error: Some(why.into()), ..before }
+    }
+
+    const fn unknown() -> Self {
+        Self { state: Standing::Unreachable, attempt: None, attempts_max: None, error: None, restarts: 0 }
+    }
+
+    /// The last that went wrong, at most so many characters of it.
+    pub(super) fn short_error(&self, most: usize) -> String {
+        let error = plain::line(self.error.as_deref().unwrap_or_default());
+        match error.char_indices().nth(most) {
+            Some(_) => error.chars().take(most - 1).chain(['…']).collect(),
+            None => error.into_owned(),
+        }
+    }
+}
+
+/// The modules of a survey; rates since an earlier one.
+pub(super) fn module_lines(installation: &Installation, survey: &Survey, earlier: Option<&Survey>) -> Vec<ModuleLine> {
+    let line = |module: &ModuleSurvey| ModuleLine {
+        module: installation.classes.format(module.name),
+        node: module.node.clone(),
+        faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
+        account: Account::of(module, installation),
+        priority: module.name.class().0,
+        scheduling: scheduling(module.scheduling),
+        pid: module.process.as_ref().map(|process| process.pid),
+        received: module.received,
+        received_per_s: earlier.map(|earlier| survey.received_per_s(earlier, module.name)),
+        waiting: module.depth,
+        losses: Losses::new(&module.losses),
+    };
+    survey.modules.iter().map(line).collect()
+}
+
+/// How the module's process really is scheduled, which may differ from what was asked for.
+fn scheduling(scheduling: Option<Scheduling>) -> String {
+    match scheduling {
+        Some(Scheduling::Fifo(priority)) => format!("fifo {priority}"),
+        Some(Scheduling::Normal(nice)) => format!("nice {nice}"),
+        None => "-".into(),
+    }
+}
+
+/// Modules as a table, one a line; of several nodes, with their nodes.
+pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
+    let mut all = heads(">received").to_vec();
+    let mut rows: Vec<Vec<String>> =
+        lines.iter().map(|line| cells(line, " ", line.received.to_string()).into()).collect();
+    // As a column only if it says anything.
+    if lines.iter().any(|line| line.account.error.is_some()) {
+        all.push("last error");
+        rows.iter_mut().zip(lines).for_each(|(row, line)| row.push(line.account.short_error(ERROR_MAX)));
+    }
+    if with_nodes {
+        all.insert(1, "node");
+        rows.iter_mut().zip(lines).for_each(|(row, line)| row.insert(1, line.node.clone()));
+    }
+    table_of(&all, rows)
+}
+
+/// The same for a terminal of 80 columns: faces below their module, and rates; below all, what went wrong last.
+pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
+    let rate = |line: &ModuleLine| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}"));
+    let mut text = table(heads(">in/s"), lines.iter().map(|line| cells(line, "\n", rate(line))));
+    for line in lines.iter().filter(|line| line.account.error.is_some()) {
+        let room = LIVE_COLUMNS.saturating_sub(line.module.len() + 2);
+        text.push_str(&format!("{}: {}\n", line.module, line.account.short_error(room)));
+    }
+    text
+}
+
+/// As much of an error as a table shows; the whole is in JSON.
+const ERROR_MAX: usize = 100;
+const LIVE_COLUMNS: usize = 80;
+
+const HEADS: usize = 9;
+
+const fn heads(received: &str) -> [&str; HEADS] {
+    ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"]
+}
+
+/// Of what does not answer, nothing is known.
+fn cells(line: &ModuleLine, gap: &str, received: String) -> [String; HEADS] {
+    let faces: Vec<String> = line.faces.iter().map(|face| format!("{gap}+ {face}")).collect();
+    let known = |text: String| if line.account.state == Standing::Unreachable { "-".into() } else { text };
+    [
+        line.module.clone() + &faces.concat(),
+        line.account.state.to_string(),
+        line.priority.to_string(),
+        line.scheduling.clone(),
+        line.pid.map_or("-".into(), |pid| pid.to_string()),
+        known(received),
+        known(line.waiting.to_string()),
+        known(line.losses.lost.to_string()),
+        known(line.account.restarts.to_string()),
+    ]
+}
+
+/// Packages that were lost so far, as programs read it.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct Losses {
+    /// Somebody misses them.
+    pub(super) lost: u64,
+    pub(super) lost_by_cause: BTreeMap<&'static str, u64>,
+    /// A newer one took their place, as was wished.
+    pub(super) replaced: u64,
+}
+
+impl Losses {
+    /// Of these counts, in the order of [`Loss::ALL`].
+    pub(super) fn new(counts: &[u64; Loss::ALL.len()]) -> Self {
+        let missed = Loss::ALL.into_iter().filter(|cause| cause.is_missed() && counts[*cause as usize] > 0);
+        let lost_by_cause: BTreeMap<_, _> = missed.map(|cause| (cause.name(), counts[cause as usize])).collect();
+        Self {
+            lost: saturating_sum(lost_by_cause.values().copied()),
+            lost_by_cause,
+            replaced: counts[Loss::Replaced as usize],
+        }
+    }
+}
+
+/// Losses by cause. Packages that a newer one replaced are nobody's loss, so they stand apart.
+pub(super) fn losses(lost: impl Fn(Loss) -> u64) -> String {
+    let (missed, replaced): (Vec<Loss>, _) =
+        Loss::ALL.into_iter().filter(|cause| lost(*cause) > 0).partition(|cause| cause.is_missed());
+    let list =
+        |causes: &[Loss]| causes.iter().map(|c| format!("{} {}", lost(*c), c.name())).collect::<Vec<_>>().join(", ");
+    let missed = if missed.is_empty() { "none".into() } else { list(&missed) };
+    if replaced.is_empty() { missed } else { format!("{missed} ({})", list(&replaced)) }
+}
+
+/// A class as tables name it; none: all for which there was no row left.
+pub(super) fn class_name(installation: &Installation, class: Option<Class>) -> String {
+    let name = |class| installation.classes.name(class).map_or_else(|| class.0.to_string(), ToOwned::to_owned);
+    class.map_or("others".into(), name)
+}
+
+/// Traffic by class as a table: packages, losses by cause, waiting times.
+pub(super) fn print_classes(installation: &Installation, classes: &[ClassTraffic]) -> String {
+    let rows = classes.iter().map(|class| {
+        let quantile = |share| class.latency.quantile(share).map_or("-".into(), time);
+        [
+            class_name(installation, class.class),
+            class.class.map_or("-".into(), |id| id.0.to_string()),
+            class.received.to_string(),
+            losses(|cause| class.lost(cause)),
+            quantile(0.5),
+            quantile(0.99),
+            if class.received > 0 { time(class.latency.max) } else { "-".into() },
+        ]
+    });
+    table(["class", ">priority", ">received", "lost", ">waited p50", ">p99", ">max"], rows)
+}

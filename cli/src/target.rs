@@ -1,0 +1,231 @@
+//! Which running node a tool means, and what the other nodes of its system are.
+
+use super::Failure;
+use super::sight::Sight;
+use clap::Args;
+use rohrpost::launch::{choose_node, launcher_of};
+use rohrpost::output::plain;
+use rohrpost::survey::node_of;
+use rohrpost::{Fault, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Name, Node, NodeError, SendError, local, node_directory};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Which node. Without options, a tool takes the installation that runs here; of several of its nodes that run here, the first of
+/// the configuration. Modules of the others are reached by its router, so for most tools it makes no difference which it is.
+#[derive(Args)]
+pub(super) struct Target {
+    /// Configuration of the nodes; without it, the one that runs here.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Look from this node, and show it alone; else from the first of the configuration that runs here.
+    #[arg(long, value_name = "NAME")]
+    node: Option<String>,
+}
+
+/// A node that runs, and its configuration.
+pub(super) struct Running {
+    pub(super) installation: Installation,
+    /// The node that the tool takes part on.
+    pub(super) node_name: String,
+    pub(super) node: Arc<Node>,
+    /// The node that was asked for, which may be another one, on another computer.
+    only: Option<String>,
+    pub(super) sight: Sight,
+}
+
+impl Target {
+    pub(super) fn new(config: Option<PathBuf>, node: Option<String>) -> Self {
+        Self { config, node }
+    }
+
+    /// Finds the node that is meant.
+    pub(super) fn find(&self) -> Result<Running, Failure> {
+        let only = self.node.as_deref();
+        let installation = match &self.config {
+            Some(config) => Installation::load(config)?,
+            None => Installation::load(&config_here(only)?)?,
+        };
+        let named = only.map(|name| choose_node(&installation, Some(name))).transpose()?;
+        // The one that is named, if it runs here; else the first that does.
+        let all = named.into_iter().chain(&installation.nodes);
+        let mut failed = None;
+        for config in all {
+            match Node::open(&node_directory(&installation.name, &config.name)) {
+                Ok(node) => {
+                    let (node_name, only) = (config.name.clone(), named.map(|node| node.name.clone()));
+                    return Ok(Running { installation, node_name, node, only, sight: Sight::default() });
+                }
+                Err(error @ NodeError::Missing(_)) => failed = failed.or(Some(error)),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Err(failed.map_or_else(|| "the configuration has no node".into(), Failure::from))
+    }
+}
+
+/// Configuration of the one installation that runs here, or of the one that has a node of this name.
+fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
+    let running = rohrpost::find_running();
+    if running.is_empty() {
+        // One that cannot be looked into is no reason to say that none is there.
+        let others = rohrpost::find_other_versions().into_iter().next();
+        return Err(others.map_or_else(
+            || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
+            Failure::from,
+        ));
+    }
+    let noted: Vec<(PathBuf, String)> = running.iter().map(|path| noted_config(path)).collect::<Result<_, _>>()?;
+    let is_meant = |(_, name): &&(PathBuf, String)| node.is_none_or(|node| node == name);
+    let mut configs: Vec<&PathBuf> = noted.iter().filter(is_meant).map(|(config, _)| config).collect();
+    if configs.is_empty() {
+        // It may be a node of another computer.
+        configs = noted.iter().map(|(config, _)| config).collect();
+    }
+    configs.sort_unstable();
+    configs.dedup();
+    match configs[..] {
+        [only] => Ok(only.clone()),
+        _ => {
+            let list: Vec<String> = running.iter().map(|path| path.display().to_string()).collect();
+            Err(format!("several nodes run here; say which with --config and --node:\n  {}", list.join("\n  ")).into())
+        }
+    }
+}
+
+/// What launch wrote about its configuration.
+fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
+    let file = directory.join(rohrpost::launch::CONFIG_FILE);
+    let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+    match text.lines().collect::<Vec<_>>()[..] {
+        [config, node] => Ok((config.into(), node.into())),
+        _ => Err(format!("{} was written by another version of launch; say --config FILE", file.display()).into()),
+    }
+}
+
+impl Running {
+    /// The same node, launched anew: what it runs may have changed since.
+    pub(super) fn again(&self) -> Result<Self, Failure> {
+        let (config, node_name) = noted_config(self.node.path())?;
+        let node = Node::open(self.node.path())?;
+        let (installation, only) = (Installation::load(&config)?, self.only.clone());
+        Ok(Self { installation, node_name, node, only, sight: Sight::default() })
+    }
+
+    /// Takes part as a tool.
+    pub(super) fn join(&self, timeout: Duration) -> Result<ToolLink, Failure> {
+        Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)
+    }
+
+    /// The nodes that are meant when no module is named: the one asked for, or all.
+    pub(super) fn shown(&self) -> Vec<&str> {
+        let all = self.installation.nodes.iter().map(|node| node.name.as_str());
+        all.filter(|name| self.only.as_deref().is_none_or(|only| only == *name)).collect()
+    }
+
+    /// Where a module is. What is in no configuration can only be here.
+    pub(super) fn node_of(&self, module: Name) -> &str {
+        node_of(&self.installation, module).unwrap_or(&self.node_name)
+    }
+
+    /// The launch that watches over a module.
+    pub(super) fn launcher_of(&self, module: Name) -> Option<Name> {
+        launcher_of(&self.installation, self.node_of(module))
+    }
+
+    /// Whether it is on the node that the tool takes part on.
+    pub(super) fn is_own(&self, module: Name) -> bool {
+        self.node_of(module) == self.node_name && !self.is_beyond(module)
+    }
+
+    /// Whether it is nowhere but at the TCP router: of another system, or a program of this one that the configuration does not have.
+    pub(super) fn is_beyond(&self, module: Name) -> bool {
+        if self.installation.tcp.is_none() || module.system() != self.installation.system.id {
+            return self.installation.tcp.is_some();
+        }
+        !self.is_known(module) && !self.is_here(module)
+    }
+
+    /// Whether the configuration has it, or has a range of tools for it.
+    fn is_known(&self, module: Name) -> bool {
+        self.installation.module(module).is_some() || module.class() == self.installation.classes.tool()
+    }
+
+    /// Whether it has mailboxes on the node that the tool takes part on.
+    fn is_here(&self, module: Name) -> bool {
+        self.node.mailboxes().is_ok_and(|all| all.iter().any(|mailbox| mailbox.module() == module))
+    }
+
+    /// The module or face that a user names, or a program run by hand: one of the configuration, with mailboxes here, of another system,
+    /// or of this one and registered at the TCP router.
+    pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
+        let module = self.installation.classes.parse_name(text)?.module();
+        let is_other = self.is_beyond(module) && module.system() != self.installation.system.id;
+        if is_other || self.is_known(module) || self.is_here(module) || self.is_hosted_beyond(module) {
+            return Ok(module);
+        }
+        let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
+        Err(format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into())
+    }
+
+    /// A module that has no mailboxes where it should be: why, and what to do.
+    pub(super) fn absent(&self, module: Name) -> Failure {
+        let name = self.text(module);
+        match self.installation.module(module) {
+            Some(known) if known.node != self.node_name => {
+                format!(
+                    "{name} does not run on node {0}; `rohrpost start {name}` starts it, or says why it cannot",
+                    known.node
+                )
+            }
+            Some(_) if self.node.launcher().is_some() => {
+                format!("{name} does not run; `rohrpost start {name}` starts it, or says why it cannot")
+            }
+            Some(_) => {
+                format!("{name} does not run, and no launch watches over it; start it as you started the others")
+            }
+            None if self.is_beyond(module) && module.system() != self.installation.system.id => {
+                format!("{name} does not run; start it in system {}, where it belongs", module.system())
+            }
+            None => format!(
+                "{name} does not run, and the configuration has no such module; `rohrpost list` shows what runs"
+            ),
+        }
+        .into()
+    }
+
+    /// An error about a module, with its name as users write it: the lower layers know numbers only.
+    pub(super) fn told(&self, module: Name, error: &dyn std::error::Error) -> Failure {
+        let text = error.to_string();
+        // Found by the sender, or by the router of the module's node.
+        let absences = [SendError::NoMailbox(module).to_string(), Fault::NoMailbox.to_string()];
+        if absences.iter().any(|absence| text.contains(absence)) {
+            return self.absent(module);
+        }
+        if let Some(router) = self.missing_router(&text) {
+            return router;
+        }
+        plain::line(&text.replace(&module.to_string(), &self.text(module))).into()
+    }
+
+    /// An error about this node's own router, without which nothing goes to other nodes.
+    fn missing_router(&self, text: &str) -> Option<Failure> {
+        let router = self.installation.router_of(&self.node_name)?;
+        let transit = router.with_local(local::TRANSIT).to_string();
+        text.contains(&transit).then(|| {
+            let (router, node) = (self.text(router), &self.node_name);
+            format!(
+                "the router of this node, {router}, does not run, and without it nothing goes from {node} to other nodes; \
+                 `rohrpost start {router}` starts it, or says why it cannot"
+            )
+            .into()
+        })
+    }
+
+    /// A name as users write it.
+    pub(super) fn text(&self, name: Name) -> String {
+        self.installation.classes.format(name)
+    }
+}

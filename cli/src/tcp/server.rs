@@ -1,0 +1,167 @@
+//! The TCP router, as a module.
+
+use super::{NoSettings, PERIOD, called, certificates, classes, configured, levels, short};
+use crate::router::faults::Encoded;
+use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, Tcp, TcpInterface};
+use rohrpost::{Context, Module, ModuleError, Name};
+use rohrpost_config::Node;
+use rohrpost_mailbox::{monotonic_ns, realtime_ns};
+use rohrpost_routers::session::frame::Range;
+use rohrpost_routers::session::server::{Names, OwnNode, OwnNodes, ServerSettings};
+use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+pub(super) struct ServerModule {
+    shell: ServerShell,
+    address: SocketAddr,
+    began_ns: u64,
+}
+
+impl Tcp for ServerModule {}
+
+impl Module for ServerModule {
+    type Settings = NoSettings;
+    type Interfaces = TcpInterface;
+
+    fn new(_: NoSettings, context: &mut Context) -> Result<Self, ModuleError> {
+        let installation = context.installation();
+        let tcp = configured(installation)?;
+        let seal = certificates(installation, tcp).map(|folder| ServerSeal::load(&folder)).transpose()?;
+        let digest = installation.digest();
+        let names_of = |ranges: Vec<(Name, Name)>| -> Names {
+            ranges.into_iter().map(|(first, last)| Range { first, last }).collect()
+        };
+        let registered = |node: &Node| (node.name.clone(), names_of(installation.names_registered(&node.name)));
+        let names: BTreeMap<String, Names> = installation.nodes.iter().map(registered).collect();
+        let own = |node: &Node| {
+            let names = names.get(&node.name).cloned().unwrap_or_default();
+            let all = names_of(installation.names_on(&node.name));
+            OwnNode { name: called(&node.name, installation), names, all, address: node.address }
+        };
+        let settings = ServerSettings {
+            name: short(&format!("the TCP router of {}", installation.system.name)),
+            common: digest.common,
+            system: Some((installation.system.id, digest.system)),
+            own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
+            life: realtime_ns().max(1),
+            clients_max: tcp.clients,
+            greetings_max: tcp.clients.max(GREETINGS_MIN),
+            quota_bytes: tcp.quota_bytes,
+            levels: levels(tcp),
+        };
+        let address = tcp.address;
+        let faults = Arc::new(Encoded::of(installation));
+        let node = context.link().borrow().participant().node().clone();
+        let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node })?;
+        context.set_period(PERIOD);
+        Ok(Self { shell, address, began_ns: monotonic_ns() })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        // Without its thread it is of no use; started again, it is.
+        assert!(self.shell.is_well(), "the thread of the TCP router has ended");
+        let seen = self.shell.members();
+        context.publish_now(TcpInterface::HOSTS, &hosts(&seen.members))?;
+        context.publish_now(
+            TcpInterface::CLIENTS,
+            &BeyondClients {
+                address: self.address.to_string(),
+                uptime_ms: monotonic_ns().saturating_sub(self.began_ns) / 1_000_000,
+                clients: seen.members.into_iter().map(client).collect(),
+                more: seen.more,
+                left: seen.left,
+                refused: seen.refused,
+                refusal: seen.refusal,
+                crowded: BeyondCrowded {
+                    greetings: seen.crowded.greetings,
+                    clients: seen.crowded.clients,
+                    ranges: seen.crowded.ranges,
+                    packages: seen.crowded_packages,
+                },
+                overtaken: seen.overtaken,
+                held_lines: seen.held,
+                classes: classes(&seen.classes),
+            },
+        )?;
+        Ok(())
+    }
+}
+
+/// Connections that have not said hello yet, at least.
+const GREETINGS_MIN: u16 = 64;
+
+/// Ranges that are told at a time: with the names of their clients they fit in a package.
+const HOSTS_MAX: usize = 512;
+
+fn hosts(members: &[Member]) -> BeyondHosts {
+    let all = members.iter().flat_map(|member| member.hosts.iter().map(move |range| (range, member)));
+    let host = |((first, last), member): (&(Name, Name), &Member)| BeyondHost {
+        first: first.raw(),
+        last: last.raw(),
+        client: member.name.clone(),
+    };
+    let hosts: Vec<BeyondHost> = all.take(HOSTS_MAX).map(host).collect();
+    let ranges: u64 = members.iter().map(|member| member.ranges).sum();
+    BeyondHosts { more: ranges.saturating_sub(hosts.len() as u64), hosts }
+}
+
+fn client(member: Member) -> BeyondClient {
+    BeyondClient {
+        name: member.name,
+        address: member.peer,
+        system: member.system,
+        takes_part: member.is_member,
+        ranges: member.ranges,
+        age_ms: member.age_ns / 1_000_000,
+        heard_ms: member.heard_ns / 1_000_000,
+        lost: member.lost,
+        bytes: member.bytes,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tcp::NAME_BYTES_MAX;
+    use rohrpost::interfaces::{CarriedLoss, ClassPassed};
+    use rohrpost::macro_support::append;
+    use rohrpost_routers::session::Cause;
+    use rohrpost_routers::tcp::MEMBERS_MAX;
+
+    /// With more than that nothing would be shown at all.
+    #[test]
+    fn as_many_clients_as_are_told_fit_into_a_package() {
+        let most = u64::from(u32::MAX);
+        let client = BeyondClient {
+            name: "x".repeat(NAME_BYTES_MAX),
+            address: "[2001:db8:ffff:ffff:ffff:ffff:ffff:ffff]:65535".into(),
+            system: u8::MAX,
+            takes_part: true,
+            ranges: most,
+            age_ms: most,
+            heard_ms: most,
+            lost: most,
+            bytes: most,
+        };
+        let lost = Cause::ALL.map(|cause| CarriedLoss { cause: cause.word().into(), packages: most });
+        let class = ClassPassed { class: u8::MAX, packages: most, passed: most, replaced: most, lost: lost.into() };
+        let all = BeyondClients {
+            address: client.address.clone(),
+            uptime_ms: most,
+            clients: vec![client; MEMBERS_MAX],
+            more: most,
+            left: most,
+            refused: most,
+            refusal: "x".repeat(1000),
+            crowded: BeyondCrowded { greetings: most, clients: most, ranges: most, packages: most },
+            overtaken: most,
+            held_lines: most,
+            classes: vec![class; 64],
+        };
+        let mut body = Vec::new();
+        append(&mut body, &all).unwrap();
+        assert!(body.len() < rohrpost_mailbox::BODY_BYTES_MAX, "{}", body.len());
+    }
+}

@@ -1,0 +1,183 @@
+//! `rohrpost time`: which node is the master of time, and how well each of the others knows it.
+
+use super::round::{Round, Rounds};
+use super::table::{table, time};
+use super::{Failure, say};
+use rohrpost::interfaces::{BeyondLink, BeyondTime, ClockRole, ClockState, RouterInterface, TcpInterface};
+use rohrpost_config::Reach;
+use rohrpost_mailbox::SystemClock;
+use serde::Serialize;
+use std::process::ExitCode;
+use std::time::Duration;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost time              all nodes, once
+  rohrpost time --watch      again and again; Ctrl-C ends it
+`bound`: the node's time is not further off the master's. `off`: what it found itself off by at its last exchange with the master. \
+`way`: the shortest way there and back of late; a bound cannot be much less than half of it. `ago`: when the node said so. Two nodes \
+of the same term and epoch differ by at most the sum of their bounds. The exit code is 1 if a node does not answer or does not know the \
+time, or if there are two masters.")]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    rounds: Rounds,
+}
+
+/// What a node says of its time.
+#[derive(Clone, Debug, Default, Serialize)]
+struct Told {
+    node: String,
+    clock: Option<ClockState>,
+    /// Of a node that has its time from the TCP router.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beyond: Option<BeyondTime>,
+    /// Shortest way there and back to that, ns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    round_trip_ns: Option<u64>,
+    /// How long ago it said so, by this node's system time, ns; less than nothing if this node's time is behind.
+    ago_ns: Option<i64>,
+    /// Why there is nothing.
+    failure: Option<String>,
+}
+
+/// All nodes.
+#[derive(Debug, Serialize)]
+struct Nodes {
+    /// Whether all answer, know the time, and follow one master.
+    agree: bool,
+    nodes: Vec<Told>,
+}
+
+pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
+    let alone = "this installation has one node, whose time is its own; `rohrpost top` shows it";
+    let mut round = rounds.begin(alone, |installation| installation.nodes.len() > 1)?;
+    let clock = SystemClock::open(&round.running.node);
+    let agree = loop {
+        let told = round.nodes().into_iter().map(|node| ask(&mut round, &clock, node)).collect();
+        let nodes = Nodes::new(told);
+        let text = if rounds.json { serde_json::to_string(&nodes)? } else { nodes.text() };
+        if !say(text.trim_end()) || !rounds.watch || round.stop.within(round.interval) {
+            break nodes.agree;
+        }
+    };
+    round.close();
+    Ok(if agree || rounds.watch { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn ask(round: &mut Round, clock: &SystemClock, node: String) -> Told {
+    let mut told = Told { node, ..Told::default() };
+    let installation = &round.running.installation;
+    let is_beyond = installation.node(&told.node).is_some_and(|node| node.reach == Reach::Tcp);
+    let client = installation.tcp_client_of(&told.node).filter(|_| is_beyond);
+    let asked = match client {
+        Some(client) => round.newest_of(client, TcpInterface::LINK).map(|(_, link)| told.by_tcp(link)),
+        // With no other on its LAN there is no router, and its own clock is the time of all.
+        None if installation.network.is_none() => Ok(None),
+        None => round.newest(&told.node, RouterInterface::CLOCK).map(|(_, clock)| {
+            let now_ns = clock.now_ns;
+            told.clock = Some(clock);
+            Some(now_ns)
+        }),
+    };
+    match asked {
+        Ok(said_ns) => told.ago_ns = said_ns.map(|said_ns| clock.now().ns.wrapping_sub(said_ns).cast_signed()),
+        Err(failure) => told.failure = Some(failure),
+    }
+    told
+}
+
+impl Told {
+    /// Takes what a client of the TCP router says; when it said so, system time.
+    fn by_tcp(&mut self, link: BeyondLink) -> Option<u64> {
+        (self.beyond, self.round_trip_ns) = (link.time, link.round_trip_ns);
+        self.beyond.as_ref().map(|time| time.now_ns)
+    }
+
+    fn row(&self) -> [String; 11] {
+        let ago = self.ago_ns.map_or_else(String::new, |ns| time(Duration::from_nanos(ns.max(0).unsigned_abs())));
+        let bound = |error_ns: Option<u64>| error_ns.map_or_else(|| "unknown".into(), |ns| us(ns as f64));
+        let way = |ns: Option<u64>| ns.map_or_else(|| "-".into(), |ns| us(ns as f64));
+        let none = || String::from("-");
+        let node = self.node.clone();
+        match (&self.clock, &self.beyond) {
+            (Some(clock), _) => [
+                node,
+                role(clock.role).into(),
+                if clock.master.is_empty() { "none".into() } else { clock.master.clone() },
+                clock.term.to_string(),
+                clock.epoch.to_string(),
+                bound(clock.error_ns),
+                us(clock.offset_ns as f64),
+                format!("{:.3} ppm", clock.rate_ppb as f64 / 1000.0),
+                way(clock.round_trip_ns),
+                stamps(clock).into(),
+                ago,
+            ],
+            (None, Some(told)) => {
+                let (epoch, way) = (told.epoch.to_string(), way(self.round_trip_ns));
+                let master = "TCP router".into();
+                [node, "by TCP".into(), master, none(), epoch, bound(told.error_ns), none(), none(), way, none(), ago]
+            }
+            (None, None) => {
+                let own = || String::from("own");
+                [node, own(), none(), none(), none(), us(0.0), none(), none(), none(), none(), ago]
+            }
+        }
+    }
+}
+
+impl Nodes {
+    fn new(nodes: Vec<Told>) -> Self {
+        let follows = |told: &Told| {
+            let clock = told.clock.as_ref().filter(|clock| clock.error_ns.is_some())?;
+            Some((clock.master.clone(), clock.term, clock.epoch)).filter(|(master, ..)| !master.is_empty())
+        };
+        // Those that have it from the TCP router know no master, but its epoch.
+        let first = nodes.iter().find(|told| told.clock.is_some()).and_then(follows);
+        let agrees = |told: &Told| match (&told.clock, &told.beyond) {
+            (Some(_), _) => first.is_some() && follows(told) == first,
+            (None, Some(time)) => {
+                let epoch = first.as_ref().map_or(time.epoch, |(.., epoch)| *epoch);
+                time.error_ns.is_some() && time.epoch == epoch
+            }
+            (None, None) => told.failure.is_none(),
+        };
+        let agree = nodes.iter().all(agrees);
+        Self { agree, nodes }
+    }
+
+    fn text(&self) -> String {
+        let heads = ["node", "role", "master", ">term", ">epoch", ">bound", ">off", ">rate", ">way", "stamps", ">ago"];
+        let rows = self.nodes.iter().filter(|told| told.failure.is_none()).map(Told::row);
+        let mut text = table(heads, rows);
+        for told in &self.nodes {
+            if let Some(failure) = &told.failure {
+                text += &format!("{}: {failure}\n", told.node);
+            }
+        }
+        text
+    }
+}
+
+/// Who stamps the frames that it measures by.
+fn stamps(clock: &ClockState) -> &'static str {
+    match (clock.role, clock.exchanges) {
+        (ClockRole::Master, _) | (_, 0) => "-",
+        _ if clock.by_kernel => "kernel",
+        _ => "own",
+    }
+}
+
+fn role(role: ClockRole) -> &'static str {
+    match role {
+        ClockRole::Listening => "listening",
+        ClockRole::Slave => "slave",
+        ClockRole::Master => "master",
+    }
+}
+
+/// Microseconds, with as many places as clocks have.
+fn us(ns: f64) -> String {
+    let us = ns / 1000.0;
+    if us.abs() < 1000.0 { format!("{us:.1} µs") } else { format!("{:.2} ms", us / 1000.0) }
+}

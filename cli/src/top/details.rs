@@ -1,0 +1,177 @@
+//! The page about one module: what it is, its mailboxes and how long packages waited there, what it offers.
+
+use super::super::call::usage;
+use super::super::list::mailbox_lines;
+use super::super::summary::print_classes;
+use super::super::table::{table, time};
+use super::columns::{memory, short};
+use super::model::{Model, Peer, Row, Sample};
+use rohrpost::Name;
+use rohrpost::description::Description;
+use rohrpost::output::plain;
+use rohrpost::survey::sum;
+use rohrpost::value::{describe_result, describe_type};
+use rohrpost_config::{Installation, Program};
+use rohrpost_mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
+use std::time::Duration;
+
+/// The page as lines; those that begin without a blank are headings. `describe` knows what modules say of themselves.
+pub(super) fn page(
+    installation: &Installation,
+    sample: &Sample,
+    model: &Model,
+    name: Name,
+    mut describe: impl FnMut(Name) -> Option<Description>,
+) -> Vec<String> {
+    let Some(row) = model.row(name) else {
+        return vec![format!("{} is not here any more", installation.classes.format(name))];
+    };
+    let mut lines = vec![format!("{}: {}", row.line.module, row.line.account.state)];
+    lines.extend(indented(&about(installation, sample, row)));
+    let module = sample.survey.module(name);
+    let own = |mailbox: &&MailboxInfo| {
+        module.is_some_and(|module| {
+            let of = mailbox.name.module();
+            of == module.name || module.faces.contains(&of)
+        })
+    };
+    let mailboxes: Vec<MailboxInfo> = sample.survey.mailboxes.iter().filter(own).cloned().collect();
+    if !mailboxes.is_empty() {
+        lines.extend(["".into(), "mailboxes".into()]);
+        lines.extend(indented(&mailbox_table(installation, &mailboxes)));
+        let classes = sum(&mailboxes);
+        lines.extend(["".into(), "received, by the class that packages came with".into()]);
+        lines.extend(indented(&print_classes(installation, &classes)));
+        lines.extend(["".into(), "how long packages waited".into()]);
+        for class in &classes {
+            let name = class.class.and_then(|id| installation.classes.name(id)).unwrap_or("others");
+            lines.extend(histogram(name, &class.latency));
+        }
+    }
+    lines.extend(peers("sends to", &row.sends_to));
+    lines.extend(peers("receives from", &row.receives_from));
+    let names = module.into_iter().flat_map(|module| std::iter::once(&module.name).chain(&module.faces));
+    for face in names {
+        lines.extend(describe(*face).into_iter().flat_map(|description| interface(installation, *face, &description)));
+    }
+    lines
+}
+
+fn indented(text: &str) -> Vec<String> {
+    text.lines().map(|line| format!("  {line}")).collect()
+}
+
+/// What it is and how its process does.
+fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
+    let mut lines = Vec::new();
+    let mut say = |what: &str, text: String| lines.push(format!("{what:<11}{text}"));
+    if let Some(error) = &row.line.account.error {
+        say("why", plain::line(error).into_owned());
+    }
+    let text = installation.classes.text(row.name.class()).filter(|text| !text.is_empty());
+    let text = text.map_or(String::new(), |text| format!(": {text}"));
+    say("class", format!("{}, priority {}{text}", row.class, row.line.priority));
+    if !row.line.faces.is_empty() {
+        say("also", row.line.faces.join(", "));
+    }
+    if let Some(module) = installation.module(row.name) {
+        let program = match &module.program {
+            Program::Builtin(name) => format!("builtin {name}"),
+            Program::Command(words) => words.join(" "),
+        };
+        say("program", format!("{program} ({}:{})", installation.path.display(), module.line));
+        let names = |names: Vec<Name>| match &names[..] {
+            [] => "nobody".into(),
+            names => names.iter().map(|name| installation.classes.format(*name)).collect::<Vec<_>>().join(", "),
+        };
+        say("calls", names(module.calls.clone()));
+        let callers =
+            installation.modules.iter().filter(|other| module.names().any(|name| other.calls.contains(&name)));
+        say("called by", names(callers.map(|other| other.name).collect()));
+    }
+    let process = sample.survey.module(row.name).and_then(|module| module.process.as_ref());
+    if let Some(process) = process {
+        let since = Duration::from_secs_f64(row.uptime_s.unwrap_or(0.0));
+        let restarts = match row.line.account.restarts {
+            0 => String::new(),
+            count => format!(", started again {count} times"),
+        };
+        say("process", format!("{}, for {}{restarts}, {}", process.pid, span(since), row.line.scheduling));
+        let percent = row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}"));
+        say("takes", format!("{percent} % of a processor, {} of memory", row.memory_bytes.map_or("-".into(), memory)));
+    }
+    lines.join("\n")
+}
+
+/// Narrower than that of `list`: it stands in a terminal of 80 columns.
+fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> String {
+    let lines = mailbox_lines(installation, mailboxes);
+    let rows = mailboxes.iter().zip(lines).map(|(mailbox, line)| {
+        [
+            format!("{} {}", installation.classes.format(mailbox.name.module()), line.purpose),
+            format!("{} x {} B", line.slots, line.body_bytes_max),
+            line.full.into(),
+            format!("{} (most {})", line.waiting, line.waiting_max),
+            line.received.to_string(),
+            line.lost_text.clone(),
+        ]
+    });
+    table(["", ">slots", "when full", ">waiting", ">received", "lost"], rows)
+}
+
+/// Whom it has to do with, and how much.
+fn peers(head: &str, peers: &[Peer]) -> Vec<String> {
+    if peers.is_empty() {
+        return Vec::new();
+    }
+    let rows = peers.iter().map(|peer| {
+        let per_s = peer.packages_per_s.map_or("-".into(), short);
+        [peer.module.clone(), format!("{per_s}/s"), format!("{} so far", peer.packages)]
+    });
+    let mut lines = vec![String::new(), head.into()];
+    lines.extend(indented(&table(["", ">", ">"], rows)).into_iter().skip(1));
+    lines
+}
+
+/// A long time, in hours, minutes and seconds.
+fn span(time: Duration) -> String {
+    let seconds = time.as_secs();
+    format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
+}
+
+/// Bars for the octaves of waiting times that were seen, from the shortest to the longest.
+fn histogram(class: &str, latency: &Latency) -> Vec<String> {
+    const BAR: usize = 40;
+    let octaves: Vec<(usize, u64)> = (0..LATENCY_BUCKETS)
+        .step_by(2)
+        .map(|at| (at, latency.buckets[at..at + 2].iter().map(|count| u64::from(*count)).sum()))
+        .collect();
+    let most = octaves.iter().map(|(_, count)| *count).max().unwrap_or(0);
+    if most == 0 {
+        return Vec::new();
+    }
+    let seen = |octave: &(usize, u64)| octave.1 > 0;
+    let (first, last) = (octaves.iter().position(seen), octaves.iter().rposition(seen));
+    let mut lines = vec![format!("  {class}")];
+    for (at, count) in &octaves[first.unwrap_or(0)..=last.unwrap_or(0)] {
+        // One of a million is seen, too.
+        let bar = (*count as f64 / most as f64 * BAR as f64).ceil() as usize;
+        let below = time(Latency::bucket_start(at + 2));
+        lines.push(format!("    below {below:>7}  {count:>9}  {}", "#".repeat(bar)));
+    }
+    lines
+}
+
+/// Functions and data, as the module itself describes them.
+fn interface(installation: &Installation, face: Name, description: &Description) -> Vec<String> {
+    let mut lines = vec!["".into(), format!("{} offers: {}", installation.classes.format(face), description.text)];
+    for function in &description.functions {
+        lines.push(format!("  {} -> {}", usage(function), describe_result(&function.result)));
+        lines.push(format!("      {}", function.text));
+    }
+    for item in &description.data {
+        lines.push(format!("  data {}: {}", item.name, describe_type(&item.ty)));
+        lines.push(format!("      {}", item.text));
+    }
+    lines
+}

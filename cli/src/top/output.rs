@@ -1,0 +1,77 @@
+//! The newest output lines, followed in the collector's ring.
+
+use super::app::LineFilter;
+use super::draw::OutputText;
+use rohrpost::Name;
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::{CollectorInterface, Page};
+use rohrpost::output::{Format, OutputLine};
+use rohrpost_config::Installation;
+use std::collections::VecDeque;
+
+/// Lines that were said before, and that are kept.
+const BACKLOG: u64 = 200;
+const KEPT: usize = 2000;
+/// No screen shows more.
+const SHOWN: usize = 500;
+
+/// What was said, as far as it is kept here.
+pub(super) struct Output {
+    collector: Option<Name>,
+    lines: VecDeque<OutputLine>,
+    /// The collector's life that `next` counts in; none until it has said how far it is.
+    life: Option<u32>,
+    /// Number of the next line.
+    next: u64,
+    /// Why there is none.
+    pub(super) silence: Option<String>,
+}
+
+impl Output {
+    /// Of the installation's collector.
+    pub(super) fn new(installation: &Installation) -> Self {
+        let class = installation.classes.id(CollectorInterface::CLASS);
+        let name = class.map(|class| Name::new(installation.system.id, class.0, 0, 0));
+        let collector = name.filter(|name| installation.module(*name).is_some());
+        let silence = collector.is_none().then(|| "the configuration has no module `output.0`".into());
+        Self { collector, lines: VecDeque::new(), life: None, next: u64::MAX, silence }
+    }
+
+    /// Whom to ask for lines, and from which number on.
+    pub(super) fn wants(&self) -> Option<(Name, u64)> {
+        // No line has the highest number: the first answer tells how far the collector is.
+        Some((self.collector?, self.next))
+    }
+
+    /// Takes the collector's answer; true when there is more to ask for at once.
+    pub(super) fn take(&mut self, page: Result<Page, String>) -> bool {
+        let page = match page {
+            Ok(page) => page,
+            Err(error) => {
+                self.silence = Some(error);
+                return false;
+            }
+        };
+        self.silence = None;
+        if self.life != Some(page.life) {
+            (self.life, self.next) = (Some(page.life), page.next.saturating_sub(BACKLOG));
+            return page.next > 0;
+        }
+        let more = !page.lines.is_empty();
+        self.next = page.first + page.lines.len() as u64;
+        self.lines.extend(page.lines);
+        let excess = self.lines.len().saturating_sub(KEPT);
+        self.lines.drain(..excess);
+        more && self.next < page.next
+    }
+
+    /// The newest lines that pass, as they are shown.
+    pub(super) fn shown(&self, installation: &Installation, filter: LineFilter) -> Vec<OutputText> {
+        let format = Format::new(installation);
+        let passing = self.lines.iter().rev().filter(|line| filter.passes(line)).take(SHOWN);
+        let shown = passing.map(|line| OutputText { level: line.level, text: format.short(line) });
+        let mut shown: Vec<OutputText> = shown.collect();
+        shown.reverse();
+        shown
+    }
+}

@@ -1,0 +1,52 @@
+//! One look at a node, and at those others that showed themselves: it waits for nobody.
+
+use super::super::Failure;
+use super::super::sight::Silence;
+use super::super::summary::module_lines;
+use super::super::target::Running;
+use super::model::{Sample, TimeNow};
+use rohrpost::Name;
+use rohrpost::survey::{Scope, Standing, Survey};
+use rohrpost_mailbox::SystemClock;
+use std::collections::HashMap;
+
+/// Why modules are in error, as they said when they were asked.
+pub(super) type Said = HashMap<Name, String>;
+
+/// What each of some nodes shows, or why it does not.
+pub(super) type Seen = Vec<Result<Survey, Silence>>;
+
+/// Looks at the own node, if it is meant.
+pub(super) fn own(running: &Running) -> Result<Seen, Failure> {
+    let is_own = |node: &&str| *node == running.node_name;
+    let own: Vec<&str> = running.shown().into_iter().filter(is_own).collect();
+    running.look_at(&own, Scope::All)
+}
+
+/// Puts together what nodes show; `earlier` makes rates.
+pub(super) fn put_together(running: &Running, seen: Seen, earlier: Option<&Sample>, said: &Said) -> Sample {
+    let (mut surveys, mut silent) = (Vec::new(), Vec::new());
+    for seen in seen {
+        match seen {
+            Ok(survey) => surveys.push(survey),
+            Err(silence) => silent.push(silence),
+        }
+    }
+    let names: Vec<&str> = silent.iter().map(|silence| silence.node.as_str()).collect();
+    let mut survey = Survey::joined(surveys, &names, &running.installation);
+    for module in survey.modules.iter_mut().filter(|module| module.standing() == Standing::Error) {
+        if let Some(error) = said.get(&module.name) {
+            module.error = Some(error.clone());
+        }
+    }
+    let lines = module_lines(&running.installation, &survey, earlier.map(|sample| &sample.survey));
+    let clock = SystemClock::open(&running.node);
+    let record = clock.record();
+    let time = TimeNow {
+        time_ns: clock.now().ns,
+        time_source: record.map_or("local", |record| record.source.name()),
+        time_pace: record.map_or(1.0, |record| record.pace_ppb as f64 / 1e9),
+    };
+    let launched = running.node.launcher().is_some();
+    Sample { survey, silent, lines, time, launched }
+}

@@ -1,0 +1,80 @@
+//! What packages are called: commands and replies by their functions, data by their item, as the interfaces of modules declare them.
+
+use rohrpost::Name;
+use rohrpost::common as c;
+use rohrpost::description::Description;
+use rohrpost_config::{Installation, Program};
+use rohrpost_mailbox::Kind;
+use std::collections::BTreeMap;
+
+/// The interfaces that were found out so far. Who does not tell its own is not asked again.
+#[derive(Default)]
+pub(super) struct Vocabulary {
+    descriptions: BTreeMap<Name, Option<Description>>,
+}
+
+impl Vocabulary {
+    /// What packages of a type from one module to another are called; none if it is not known. `ask` asks a module for its interface.
+    pub(super) fn word(
+        &mut self,
+        kind: Kind,
+        from: Name,
+        to: Name,
+        ask: impl FnOnce(Name) -> Option<Description>,
+    ) -> Option<String> {
+        match kind {
+            Kind::Command(number) => self.function(number, to, ask),
+            Kind::Reply(number) => self.function(number, from, ask).map(|name| answered(&name)),
+            Kind::Data(number) => {
+                let items = &self.description(from, ask)?.data;
+                items.iter().find(|item| item.number == number).map(|item| item.name.clone())
+            }
+            Kind::None => None,
+        }
+    }
+
+    fn function(&mut self, number: u16, module: Name, ask: impl FnOnce(Name) -> Option<Description>) -> Option<String> {
+        if number < c::FIRST_OWN {
+            return common(number).map(str::to_owned);
+        }
+        let functions = &self.description(module, ask)?.functions;
+        functions.iter().find(|function| function.number == number).map(|function| function.name.clone())
+    }
+
+    fn description(&mut self, module: Name, ask: impl FnOnce(Name) -> Option<Description>) -> Option<&Description> {
+        self.descriptions.entry(module.module()).or_insert_with(|| ask(module.module())).as_ref()
+    }
+}
+
+/// What a reply to a function is called.
+pub(super) fn answered(function: &str) -> String {
+    format!("{function} answered")
+}
+
+/// The interface of a built-in module or of its face; it need not run.
+pub(super) fn built_in(installation: &Installation, module: Name) -> Option<Description> {
+    match &installation.module(module)?.program {
+        Program::Builtin(name) => {
+            rohrpost_modules::builtin::description(name, installation.classes.name(module.class())?)
+        }
+        Program::Command(_) => None,
+    }
+}
+
+/// The functions that every module has.
+fn common(number: u16) -> Option<&'static str> {
+    Some(match number {
+        c::ON => "on",
+        c::OFF => "off",
+        c::STATUS => "status",
+        c::GET_DATA => "get",
+        c::SUBSCRIBE => "subscribe",
+        c::UNSUBSCRIBE => "unsubscribe",
+        c::OUTPUT_LEVEL => "output-level",
+        c::DESCRIBE => "describe",
+        c::PARAMETERS => "param get",
+        c::SET_PARAMETERS => "param set",
+        c::TIME => "time",
+        _ => return None,
+    })
+}

@@ -1,0 +1,112 @@
+//! What other people's crates come along: none of a tool for who writes a module, none whose licence asks for more than to be named, and of none
+//! two versions without a reason.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::process::Command;
+
+/// Of these each may be used, also in what is not open.
+const LICENCES: [&str; 9] = [
+    "0BSD",
+    "Apache-2.0",
+    "Apache-2.0 WITH LLVM-exception",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "ISC",
+    "MIT",
+    "Unicode-3.0",
+    "Zlib",
+];
+
+/// What comes in two versions, and why.
+const DOUBLED: [(&str, &str); 3] = [
+    ("getrandom", "ring 0.17 stays at 0.2, tempfile takes 0.4"),
+    ("signal-hook", "crossterm 0.29, the terminal of `top`, stays at 0.3"),
+    ("syn", "clap_derive takes 3, all other macros 2; only the compiler runs them"),
+];
+
+/// A tool of ours, or a crate that only tools need.
+const NOT_FOR_MODULES: [&str; 10] =
+    ["clap", "comfy-table", "flate2", "rand", "ratatui", "rcgen", "rerun", "rohrpost-bench", "rustls", "serde_json"];
+/// Peers that only benches need, and what only the GUI bridge does.
+const NOT_FOR_THE_COMMAND: [&str; 3] = ["iceoryx2", "rerun", "zenoh"];
+
+struct Crate {
+    name: String,
+    version: String,
+    licence: String,
+}
+
+/// All that is compiled for a package of ours, with itself.
+fn compiled_for(package: &str) -> Vec<Crate> {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["tree", "--package", package, "--edges", "normal,build", "--prefix", "none", "--format", "{p}|{l}"]);
+    let output = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let lines: BTreeSet<String> = String::from_utf8(output.stdout).unwrap().lines().map(String::from).collect();
+    let read = |line: &String| {
+        let (what, licence) = line.split_once('|')?;
+        let mut words = what.split(' ');
+        let (name, version) = (words.next()?.into(), words.next()?.into());
+        // A line of what stands above is repeated without what it needs, and with a star.
+        Some(Crate { name, version, licence: licence.trim_end_matches(" (*)").into() })
+    };
+    lines.iter().filter_map(read).collect()
+}
+
+/// Whether one of those that it may be chosen from is among [`LICENCES`]; of several that hold together each.
+fn is_free(expression: &str) -> bool {
+    let one_of = |choice: &str| {
+        let choice = choice.trim_matches(['(', ')']).replace('/', " OR ");
+        choice.split(" OR ").any(|licence| LICENCES.contains(&licence.trim()))
+    };
+    expression.split(" AND ").all(one_of)
+}
+
+#[test]
+fn each_licence_may_be_used_and_nothing_comes_twice_without_a_reason() {
+    assert!(is_free("(MIT OR Apache-2.0) AND Unicode-3.0") && is_free("Apache-2.0/MIT") && is_free("GPL-3.0 OR MIT"));
+    assert!(!is_free("GPL-3.0") && !is_free("MIT AND GPL-3.0") && !is_free(""));
+    let all = compiled_for("rohrpost-cli");
+    assert!(all.len() > 100, "cargo tree is read no more: {}", all.len());
+    let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for its in &all {
+        assert!(is_free(&its.licence), "{} {} is under `{}`", its.name, its.version, its.licence);
+        versions.entry(&its.name).or_default().insert(&its.version);
+    }
+    let doubled: BTreeSet<&str> = versions.iter().filter(|(_, all)| all.len() > 1).map(|(name, _)| *name).collect();
+    assert_eq!(doubled, DOUBLED.iter().map(|(name, _)| *name).collect(), "left: what comes twice, right: why");
+}
+
+#[test]
+fn who_writes_a_module_compiles_no_tool() {
+    for (package, unwanted) in [("rohrpost", &NOT_FOR_MODULES[..]), ("rohrpost-cli", &NOT_FOR_THE_COMMAND)] {
+        let all = compiled_for(package);
+        assert!(all.iter().any(|its| its.name == package));
+        let found: Vec<&str> = all.iter().map(|its| its.name.as_str()).filter(|name| unwanted.contains(name)).collect();
+        assert!(found.is_empty(), "who compiles {package} compiles {found:?}");
+    }
+}
+
+/// What `Cargo.toml` says of a package is true, and said of each that others may have.
+#[test]
+fn each_package_says_what_it_is() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = |path: &Path| std::fs::read_to_string(path.join("Cargo.toml")).unwrap();
+    let workspace = text(root);
+    let members = workspace.split_once("members = [").unwrap().1.split_once(']').unwrap().0;
+    let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
+    assert!(members.len() > 10, "{members:?}");
+    for member in [""].iter().chain(&members) {
+        let manifest = text(&root.join(member));
+        let package = manifest.split_once("[package]").unwrap().1;
+        let is_ours_alone = manifest.contains("\npublish = false");
+        let keys = ["name", "description", "version", "license", "rust-version"];
+        for key in keys.into_iter().filter(|_| !is_ours_alone) {
+            assert!(package.contains(&format!("\n{key}")), "{member}/Cargo.toml has no `{key}`");
+        }
+        assert!(!manifest.contains("example."), "{member}/Cargo.toml names a place that there is not");
+    }
+}
