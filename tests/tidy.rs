@@ -75,7 +75,6 @@ const KNOTS: &[(&str, usize)] = &[
     ("modules/src/survey.rs", 8),
     ("modules/src/runtime/runner.rs", 4),
     ("routers/src/stats.rs", 10),
-    ("routers/src/frame/mod.rs", 3),
     ("routers/src/inbound/mod.rs", 3),
     ("routers/src/lab/mod.rs", 3),
     ("routers/src/session/frame/mod.rs", 5),

@@ -14,9 +14,10 @@ use crate::view::{Datum, View};
 use crate::views::is;
 use rerun::blueprint::{ContainerLike, Spatial2DView, TimeSeriesView, Vertical};
 use rerun::{Boxes2D, LineStrips2D, Points2D};
-use rohrpost::config::{Flow, Installation, Tdma, duration_decimal};
+use rohrpost::config::{Flow, Installation, duration_decimal};
 use rohrpost::description::{DataItem, Description};
 use rohrpost::interfaces::{FlowState, FlowStates, SlotState, SlotUse};
+use rohrpost_network::Tdma;
 use std::collections::HashMap;
 use std::time::Duration;
 

@@ -12,8 +12,9 @@
 use crate::flows::Flows;
 use crate::frame::NodeIndex;
 use crate::link::Link;
-use crate::settings::{LEVELS, Settings};
+use crate::settings::Settings;
 use rohrpost_mailbox::Priority;
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 

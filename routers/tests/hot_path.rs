@@ -7,8 +7,8 @@
 pub mod counting;
 
 use counting::{CountingHeap, heap_uses};
-use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_network::{Network, Route, Security};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};

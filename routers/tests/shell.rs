@@ -7,9 +7,9 @@
 mod common;
 
 use common::{PATIENCE, Pair, Side, label, module};
-use rohrpost_config::Security;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::{Kind, Label, Name, Options, Receiver, SendError, Shape, Type, local};
+use rohrpost_network::Security;
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_routers::lab::stalls::{Watched, judged};

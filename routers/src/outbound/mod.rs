@@ -14,9 +14,10 @@ use crate::link::State;
 use crate::queue::{Place, Queue, Waiting};
 use crate::report::Report;
 use crate::security::Acquaintances;
-use crate::settings::{LEVELS, Settings};
+use crate::settings::Settings;
 use crate::stats::{Cause, Stats};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 mod datagram;

@@ -7,9 +7,9 @@ use super::table::Table;
 use crate::frame::Frame;
 use crate::intake::MAKING_NS;
 use crate::outbound::WAIT_MAX_NS;
-use crate::settings::LEVELS;
 use crate::stats::Cause;
 use rohrpost_mailbox::{Head, Name};
+use rohrpost_network::LEVELS;
 use std::collections::BTreeSet;
 
 /// Packages that one life of a router has to account for.

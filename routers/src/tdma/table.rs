@@ -14,8 +14,8 @@ use super::wire::Wire;
 use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::InSlots;
-use rohrpost_config::Tdma;
-use rohrpost_config::wire::TimeShare;
+use rohrpost_network::Tdma;
+use rohrpost_network::TimeShare;
 use std::time::Duration;
 
 /// What a window is for.

@@ -3,8 +3,8 @@
 
 use crate::frames::checked;
 use crate::split::Bytes;
-use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_network::{Network, Route, Security};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::fragment::PARTIAL_MAX;
 use rohrpost_routers::frame::NodeIndex;

@@ -123,7 +123,7 @@ fn busiest_ns(table: &Table, period_ns: u64) -> u64 {
 mod tests {
     use super::*;
     use crate::harness::settings;
-    use rohrpost_config::{Tdma, TimeSlot};
+    use rohrpost_network::{Tdma, TimeSlot};
 
     const US: u64 = 1_000;
     const MS: u64 = 1_000_000;
@@ -133,7 +133,7 @@ mod tests {
         let mut offset = Duration::from_micros(300);
         let slot = |(length_us, period): &(u64, u32)| {
             let length = Duration::from_micros(*length_us);
-            let slot = TimeSlot { node: 0, offset, length, period: *period, phase: 0, line: 0 };
+            let slot = TimeSlot { node: 0, offset, length, period: *period, phase: 0 };
             offset += length;
             slot
         };
@@ -144,7 +144,6 @@ mod tests {
             link_bytes_s: 125_000_000,
             slots: slots.iter().map(slot).collect(),
             tunnel: None,
-            line: 0,
         };
         Wanted::new(&Table::new(&tdma, &[0], 0, 3, settings(0, 3).overhead_bytes()))
     }
