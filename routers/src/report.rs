@@ -1,8 +1,8 @@
 //! What the cores tell of: packages that go no further, and what happens to peers.
 
+use crate::counts::Cause;
 use crate::frame::{NodeIndex, Reason};
 use crate::security::NotOpened;
-use crate::stats::Cause;
 use rohrpost_mailbox::{Head, SendError};
 use std::net::IpAddr;
 

@@ -3,9 +3,9 @@
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
 use crate::admission::{Admission, Way, capped};
+use crate::counts::Cause;
 use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
-use crate::stats::Cause;
 use crate::tdma::{LATE_NS, Wire};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Head, Name};

@@ -19,7 +19,7 @@ pub(crate) use packet::tests::v4;
 
 use crate::broken::broken;
 use crate::frame::NodeIndex;
-use crate::{session, stats};
+use crate::{counts, session};
 use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER};
 use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
@@ -74,7 +74,7 @@ pub enum Refused {
     NotAllowed,
 }
 
-impl From<Refused> for stats::Cause {
+impl From<Refused> for counts::Cause {
     fn from(why: Refused) -> Self {
         match why {
             Refused::ForeignName => Self::ForeignName,

@@ -10,11 +10,11 @@
 use super::threads::Shared;
 use super::ways::Ways;
 use crate::admission::{Addresses, Admission, PACKET, PACKET_PRIORITY, TUNNEL};
+use crate::counts::Count;
 use crate::frame::NodeIndex;
 use crate::netlink::Netlink;
 use crate::outbound::DIRECT_HEAD_BYTES;
 use crate::settings::{QUOTA_BYTES_MIN, Settings};
-use crate::stats::Count;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use rohrpost_mailbox::{CreateError, Head, Name, Participant, Receiver, Shape, sys};
 use rohrpost_network::KEPT_IN_BYTES;

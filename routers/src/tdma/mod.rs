@@ -35,9 +35,9 @@ pub mod table;
 mod tests;
 pub mod wire;
 
-pub use discipline::{Counts, Discipline, Next, Planned, Silent, UNPROVEN_CYCLES, Verdict};
+pub use discipline::{Counts, Discipline, Next, Planned, Silent, Verdict};
 pub use permit::{Carries, Permit};
-pub use table::{Kind, Owner, Table, Window};
+pub use table::{Kind, Owner, Table, UNPROVEN_CYCLES, Window};
 pub use wire::Wire;
 
 /// Bounds reckon with slots that are begun so much after their beginning.

@@ -1,12 +1,12 @@
 //! What leaves in a time slot.
 
 use super::{ids, to};
+use crate::counts::Cause;
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
 use crate::harness::{End, MS, START};
 use crate::link::ALIVE_EVERY_NS;
 use crate::outbound::{DIRECT_HEAD_BYTES, WAIT_MAX_NS};
 use crate::settings::Settings;
-use crate::stats::Cause;
 use rohrpost_mailbox::Priority;
 use rohrpost_network::{Tdma, TimeSlot};
 use std::time::Duration;
