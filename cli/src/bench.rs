@@ -1,6 +1,6 @@
 //! `rohrpost bench local`: how this computer hands packages over, beside what it could do at best.
 
-use super::{Failure, complain, say};
+use crate::terminal::{Failure, complain, say};
 use rohrpost_bench::environment::Environment;
 use rohrpost_bench::harness::Scheduling;
 use rohrpost_bench::report::{self, Report};

@@ -4,7 +4,7 @@ use super::published::{Watched, data_of};
 use super::target::Target;
 use super::units::{bytes, short};
 use super::watch::{Figures, Pace};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::survey::is_hop;
 use rohrpost_mailbox::{FlowInfo, Type};
 use serde_json::json;

@@ -2,7 +2,7 @@
 
 use super::target::Target;
 use super::units::seconds;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::description::{Description, Function};
 use rohrpost::output::plain;

@@ -1,7 +1,7 @@
 //! `rohrpost clean`.
 
 use super::demo::remove_abandoned;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost_mailbox::{Node, NodeError, base_directory, remove_base_if_empty};
 use std::path::Path;
 use std::process::ExitCode;

@@ -6,7 +6,7 @@
 
 use super::call::COMMON;
 use super::target::{Running, Target};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use clap::builder::StyledStr;
 use clap::{Arg, Command, CommandFactory, ValueEnum};
 use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCandidate, PathCompleter};

@@ -1,7 +1,7 @@
 //! `rohrpost restart`, `stop` and `start`: one module of a running node, by way of its launch.
 
 use super::target::{Running, Target};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::launch::{ChildState, ControlError, Phase};
 use rohrpost::output::plain;
 use rohrpost::survey::Scope;

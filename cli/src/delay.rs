@@ -6,7 +6,7 @@ use super::table::table;
 use super::target::{Running, Target};
 use super::units::short;
 use super::watch::{Pace, Window};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost::survey::{Scope, Survey, purpose};
 use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, Kind, Latency, MailboxInfo};

@@ -14,7 +14,7 @@ mod takeover;
 use super::launch::{View, end};
 use super::speech::Speech;
 use super::summary::print_classes;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use folder::Folder;
 pub(super) use folder::remove_abandoned;
 use rohrpost::common::State;

@@ -1,7 +1,7 @@
 //! `rohrpost echo`: the data a module publishes, by the module's own description.
 
 use super::target::Target;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use rohrpost::description::{DataItem, Description};
 use rohrpost::value::decode;

@@ -4,7 +4,7 @@ use super::published::{Watched, data_of};
 use super::target::Target;
 use super::units::{fine, short};
 use super::watch::{Figures, Pace};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::output::plain;
 use serde_json::json;
 use std::process::ExitCode;

@@ -3,10 +3,10 @@
 mod all;
 mod sockets;
 
-use super::Failure;
 use super::manager::Manager;
 use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
+use crate::terminal::Failure;
 pub(super) use all::{Nodes, lab};
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::output::plain::Lines;

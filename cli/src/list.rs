@@ -4,7 +4,7 @@ use super::sight::Silence;
 use super::summary::{Losses, ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
 use super::target::{Running, Target};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost::interfaces::{BeyondHost, BeyondHosts};
 use rohrpost::output::plain;

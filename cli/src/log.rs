@@ -5,7 +5,7 @@ mod levels;
 mod reader;
 
 use super::target::{Running, Target};
-use super::{Failure, complain, say};
+use crate::terminal::{Failure, complain, say};
 use filter::Filter;
 use levels::Setting;
 use reader::Reader;

@@ -4,7 +4,7 @@ use super::summary::{Losses, class_name, losses, print_classes};
 use super::table::{table, time};
 use super::target::{Running, Target};
 use super::units::fine;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost::survey::{MailboxLook, Scope, purpose};
 use rohrpost_config::{Installation, nearest};

@@ -43,6 +43,7 @@ mod summary;
 mod table;
 mod target;
 mod tcp;
+mod terminal;
 mod time;
 mod top;
 mod units;
@@ -51,12 +52,8 @@ mod vocabulary;
 mod watch;
 
 use clap::{FromArgMatches, Parser, Subcommand};
-use rohrpost::output::plain::Lines;
-use std::io::Write;
 use std::process::ExitCode;
-
-/// What went wrong, in words for the person at the terminal.
-type Failure = Box<dyn std::error::Error>;
+use terminal::complain;
 
 /// Prioritised mailboxes for robots: configure, launch, look, call.
 #[derive(Parser)]
@@ -178,16 +175,4 @@ fn main() -> ExitCode {
         complain(error);
         ExitCode::FAILURE
     })
-}
-
-/// Prints a line, or several; false when nobody reads any more (a closed pipe is the reader's way to say enough). All that the command prints
-/// goes through here and [`complain`], and so nothing that a terminal would obey: names, texts and faults are those of others.
-fn say(line: impl std::fmt::Display) -> bool {
-    writeln!(std::io::stdout(), "{}", Lines(line)).is_ok()
-}
-
-/// Prints a line, or several, to the standard error.
-fn complain(line: impl std::fmt::Display) {
-    // Who would read it may be gone.
-    let _ = writeln!(std::io::stderr(), "{}", Lines(line));
 }

@@ -5,7 +5,7 @@ mod ways;
 use super::table::time;
 use super::target::{Running, Target};
 use super::units::{Stop, seconds};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::common::TimeReport;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, Fault, Name};

@@ -2,7 +2,7 @@
 
 use super::target::{Running, Target};
 use super::watch::{Figures, Tracks};
-use super::{Failure, complain};
+use crate::terminal::{Failure, complain};
 use rohrpost::Name;
 use rohrpost::output::plain;
 use rohrpost::survey::{Scope, Survey};

@@ -1,8 +1,8 @@
 //! The routers of all nodes, asked one after the other, once or again and again: what `net` and `time` have in common.
 
-use super::Failure;
 use super::target::{Running, Target};
 use super::units::{Stop, seconds};
+use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::GET_DATA;
 use rohrpost::macro_support::{DataPort, append, from_bytes};

@@ -1,6 +1,6 @@
 //! `rohrpost run`: what launch starts built-in modules with, and what a person starts one by hand with.
 
-use super::Failure;
+use crate::terminal::Failure;
 use rohrpost::Start;
 use rohrpost_config::BUILTINS;
 use rohrpost_modules::runtime::exit;

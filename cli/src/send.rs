@@ -4,7 +4,7 @@
 use super::call::{COMMON, body_of, names};
 use super::target::{Running, Target};
 use super::units::{Stop, rate, seconds};
-use super::{Failure, complain, say};
+use crate::terminal::{Failure, complain, say};
 use rohrpost::description::{Description, Function};
 use rohrpost::output::plain;
 use rohrpost::value::{Value, decode};

@@ -1,9 +1,9 @@
 //! How tools look at nodes: at their own in its shared memory, at others by way of their launches. Nothing waits longer than
 //! [`PATIENCE`]; a node that does not answer is silent, and that is told.
 
-use super::Failure;
 use super::target::Running;
 use super::units::short;
+use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
 use rohrpost::description::Description;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};

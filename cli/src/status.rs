@@ -4,7 +4,7 @@ use super::sight::Silence;
 use super::summary::Account;
 use super::table::{table, time};
 use super::target::{Running, Target};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::common::{OutputLevel, Refused, Status};
 use rohrpost::output::plain;
 use rohrpost::survey::{ModuleSurvey, Scope, Standing, Survey};

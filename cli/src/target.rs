@@ -1,7 +1,7 @@
 //! Which running node a tool means, and what the other nodes of its system are.
 
-use super::Failure;
 use super::sight::Sight;
+use crate::terminal::Failure;
 use clap::Args;
 use rohrpost::launch::{choose_node, launcher_of};
 use rohrpost::output::plain;

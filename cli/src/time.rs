@@ -2,7 +2,7 @@
 
 use super::round::{Round, Rounds};
 use super::table::{table, time};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::interfaces::{BeyondLink, BeyondTime, ClockRole, ClockState, RouterInterface, TcpInterface};
 use rohrpost_config::Reach;
 use rohrpost_mailbox::SystemClock;

@@ -1,7 +1,7 @@
 //! Times, rates and bytes: as a user gives them, and as they are shown.
 
-use super::Failure;
 use super::table::time;
+use crate::terminal::Failure;
 use rohrpost::launch::{Event, events};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;

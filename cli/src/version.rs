@@ -1,6 +1,6 @@
 //! `rohrpost version`: of this program, of what it shares with others, and of the nodes that are here.
 
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::common;
 use rohrpost_mailbox::LAYOUT_VERSION;
 use std::process::ExitCode;

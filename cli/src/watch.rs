@@ -1,7 +1,7 @@
 //! Counters watched over time: what `hz`, `bw` and `delay` have in common. Looking subscribes to nothing, and sends modules nothing.
 
-use super::Failure;
 use super::units::{Stop, seconds};
+use crate::terminal::Failure;
 use rohrpost_mailbox::{FlowInfo, FlowSecond};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};

@@ -5,7 +5,7 @@ use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::module::{Lines, Module};
 use crate::reader::Reader;
-use crate::tdma;
+use crate::tdma::{self, TdmaLines};
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
 use std::collections::BTreeMap;
@@ -17,8 +17,8 @@ const TOOLS: usize = 2;
 /// Most bytes a second that a flow may ask for: past it, somebody has mistaken a unit.
 const FLOW_BYTES_MAX: u64 = 1 << 30;
 
-/// Judges all that takes more than one module to see; `lines` are those of the modules.
-pub(crate) fn across(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
+/// Judges all that takes more than one module to see; `lines` are those of the modules, `slots` those of the time slots.
+pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option<&TdmaLines>, reader: &Reader<'_>) {
     claims(installation, lines, reader);
     for (module, lines) in installation.modules.iter().zip(lines) {
         access::judge(installation, module, lines, reader);
@@ -31,8 +31,8 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], reader: &Read
     }
     carried_twice(installation, reader);
     // What follows from other mistakes is not worth judging.
-    if reader.is_content() {
-        tdma::judge(installation, reader);
+    if let Some(slots) = slots.filter(|_| reader.is_content()) {
+        tdma::judge(installation, slots, reader);
     }
 }
 

@@ -4,7 +4,9 @@
 //! SipHash-2-4 under a fixed key gives the same on every node, compiler and release, which std's hasher does not promise.
 
 use crate::installation::Installation;
+use crate::network;
 use crate::node::Reach;
+use crate::tdma;
 use siphasher::sip::SipHasher24;
 use std::fmt::Write;
 use std::hash::Hasher;
@@ -63,11 +65,11 @@ impl Installation {
         if let Some(network) = &self.network {
             let order: Vec<&str> = self.lan_nodes().iter().map(|node| node.name.as_str()).collect();
             if let Some(tdma) = &self.tdma {
-                lines.push(tdma.lan_text());
+                lines.push(tdma::lan_text(tdma));
             }
             lines.push(format!(
                 "network {} order {} time {}",
-                network.lan_text(),
+                network::lan_text(network),
                 order.join(" "),
                 self.time.lan_text()
             ));

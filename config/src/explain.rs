@@ -7,7 +7,7 @@ use crate::Full;
 use crate::installation::Installation;
 use crate::mailbox::MailboxSpec;
 use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start};
-use crate::network::{LEVEL_NOT_REAL_TIME, TRANSIT};
+use crate::network::TRANSIT;
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
 use crate::saved::SavedValue;
@@ -15,6 +15,7 @@ use crate::tcp::{TCP_CLIENT, TCP_ROUTER};
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;
+use rohrpost_network::LEVEL_NOT_REAL_TIME;
 use std::fmt::Write;
 use std::time::Duration;
 

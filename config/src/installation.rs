@@ -8,16 +8,17 @@ use crate::errors::{Errors, Problem};
 use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::module::{Context, Module};
-use crate::network::{self, Network};
+use crate::network;
 use crate::node::{self, Node, System};
 use crate::output::{Level, Output};
 use crate::reader::{Reader, Section};
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tcp::{self, Tcp};
-use crate::tdma::Tdma;
+use crate::tdma;
 use crate::time::TimeSource;
 use rohrpost_mailbox::{Class, Name};
+use rohrpost_network::{Network, Tdma};
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -174,8 +175,8 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let scheduling = SchedulingRule::read(file.section("scheduling", "[scheduling]"));
     let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
     let on_lan = node::on_lan(&nodes);
-    let tdma = Tdma::read(&file, sections(&file, "slot"), on_lan);
-    let network = file.section("network", "[network]").map(|section| Network::read(section, on_lan, tdma.as_ref()));
+    let (tdma, slot_lines) = tdma::read(&file, sections(&file, "slot"), on_lan).unzip();
+    let network = file.section("network", "[network]").map(|section| network::read(section, on_lan, tdma.as_ref()));
     let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
     let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
@@ -230,7 +231,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         saved: None,
         scheduling,
     };
-    check::across(&installation, &lines, reader);
+    check::across(&installation, &lines, slot_lines.as_ref(), reader);
     Some(installation)
 }
 

@@ -32,7 +32,6 @@
 #![forbid(unsafe_code)]
 
 mod access;
-mod bounds;
 mod calls;
 mod check;
 mod classes;
@@ -50,6 +49,7 @@ mod module;
 mod network;
 mod node;
 mod output;
+mod plan;
 mod principal;
 mod program;
 mod reader;
@@ -60,10 +60,8 @@ mod tcp;
 mod tdma;
 mod time;
 mod units;
-pub mod wire;
 
 pub use access::Access;
-pub use bounds::{Bound, FlowBound, TAKEN_BEFORE, Unbounded, bounds};
 pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TCP, TOOL, is_word as is_class_name};
 pub use contents::{Contents, ContentsError};
 pub use digest::Digest;
@@ -75,9 +73,10 @@ pub use installation::Installation;
 pub use keys::{KEY_BYTES, Key, Keys, KeysError, check_secret};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
 pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
-pub use network::{LEVEL_NOT_REAL_TIME, NODES_MAX, Network, Route, Security, TRANSIT, TRANSIT_LOOK};
+pub use network::TRANSIT;
 pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};
+pub use plan::bounds;
 pub use principal::Principal;
 pub use program::{MissingProgram, find_program};
 pub use reader::nearest;
@@ -86,7 +85,6 @@ pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use settings::SettingsError;
 pub use tcp::{TCP_CLIENT, TCP_ROUTER, TCP_SERVER, Tcp};
-pub use tdma::{GATE, LATE, Tdma, TimeSlot, Tunnel};
 pub use time::TimeSource;
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,

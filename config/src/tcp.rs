@@ -7,12 +7,11 @@
 use crate::classes::{ClassTable, TCP};
 use crate::installation::Installation;
 use crate::module::{Lines, Module, Restart, RestartPolicy};
-use crate::network::{NODES_MAX, level};
 use crate::node::{Node, Reach};
 use crate::reader::Section;
 use crate::scheduling::{Scheduling, SchedulingRule};
-use crate::tdma::Tdma;
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, Priority, local};
+use rohrpost_network::{NODES_MAX, Tdma, level};
 use std::net::{IpAddr, SocketAddr};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;

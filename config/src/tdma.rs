@@ -1,24 +1,15 @@
-//! Time slots: who may send when, sections `[tdma]` and `[[slot]]` (seed 002, section 4).
-//!
-//! Time is divided into cycles of equal length; cycle n begins when system time is n times that length. A cycle begins with a window for
-//! each master's synchronisation; behind them lie the slots of the nodes. Who sends ends the guard before its slot does, so that
-//! clocks that differ by less than the guard never have two nodes on the wire at once.
+//! The table of time slots, sections `[tdma]` and `[[slot]]`.
 
 mod judge;
-mod room;
 
 pub(crate) use judge::judge;
 
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
+use rohrpost_network::{Tdma, TimeSlot, Tunnel};
 use std::net::Ipv4Addr;
 use std::ops::RangeInclusive;
 use std::time::Duration;
-
-/// Bounds allow for slots that are begun so late.
-pub const LATE: Duration = Duration::from_micros(50);
-/// A slot is begun so late at most; later it is left unused. What is begun after [`LATE`] may not carry all that bounds reckon with.
-pub const GATE: Duration = Duration::from_micros(100);
 
 const CYCLE: Duration = Duration::from_millis(5);
 /// Below it a Linux computer wakes up too late too often; above it a package waits for longer than it may. What is above half a second, in which nodes take each
@@ -33,181 +24,112 @@ const PERIODS: RangeInclusive<i64> = 1..=64;
 /// A network of so many bits leaves addresses for a node at least, and for all at most.
 const PREFIXES: RangeInclusive<u8> = 8..=30;
 
-/// The slot table of a system.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Tdma {
-    /// From the beginning of one cycle to that of the next.
-    pub cycle: Duration,
-    /// Window of each master's synchronisation: that of the first master begins the cycle, the others' follow in their order.
-    pub synchronisation: Duration,
-    /// The end of each slot and window in which nobody sends.
-    pub guard: Duration,
-    /// Bytes a second that every link carries, the heads of Ethernet, IP and UDP counted.
-    pub link_bytes_s: u64,
-    /// The slots, by offset, then by phase.
-    pub slots: Vec<TimeSlot>,
-    /// Addresses of the nodes for ordinary traffic, which crosses the network in their slots, behind all packages.
-    pub tunnel: Option<Tunnel>,
-    /// Line in the file.
-    pub line: usize,
-}
-
-/// A slot of a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TimeSlot {
-    /// The node, by its place in the file.
-    pub node: u8,
-    /// From the beginning of the cycle.
-    pub offset: Duration,
-    /// To its end, the guard included.
-    pub length: Duration,
-    /// It is there in each so many-th cycle, 1 or more.
-    pub period: u32,
-    /// In which of them, 0 up to the period less 1: those cycles whose number divided by the period leaves it.
-    pub phase: u32,
-    /// Line in the file.
-    pub line: usize,
-}
-
-/// An IPv4 network whose packets go from node to node in the slots.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Tunnel {
-    /// Its address: that of no node.
-    pub network: Ipv4Addr,
-    /// Bits that all its addresses share.
-    pub prefix: u8,
-}
-
-impl Tunnel {
-    /// The address of a node, by its place in the file.
-    pub fn address(&self, node: u8) -> Ipv4Addr {
-        Ipv4Addr::from_bits(self.network.to_bits() + u32::from(node) + 1)
+fn read_tunnel(item: &Item<'_>, nodes: &[Node]) -> Option<Tunnel> {
+    let text = item.text("10.78.0.0/24")?;
+    let parts = text.split_once('/');
+    let parts = parts.and_then(|(network, prefix)| Some((network.parse().ok()?, prefix.parse().ok()?)));
+    let Some((network, prefix)): Option<(Ipv4Addr, u8)> = parts.filter(|(_, prefix)| PREFIXES.contains(prefix)) else {
+        item.report(format!(
+            "`tunnel` \"{text}\" is no IPv4 network of {} to {} bits; write for example `tunnel = \"10.78.0.0/24\"`",
+            PREFIXES.start(),
+            PREFIXES.end()
+        ));
+        return None;
+    };
+    let hosts = u32::MAX >> prefix;
+    let begin = Ipv4Addr::from_bits(network.to_bits() & !hosts);
+    if begin != network {
+        item.report(format!("`tunnel` \"{text}\" is an address inside its network; write \"{begin}/{prefix}\""));
     }
-
-    fn read(item: &Item<'_>, nodes: &[Node]) -> Option<Self> {
-        let text = item.text("10.78.0.0/24")?;
-        let parts = text.split_once('/');
-        let parts = parts.and_then(|(network, prefix)| Some((network.parse().ok()?, prefix.parse().ok()?)));
-        let Some((network, prefix)): Option<(Ipv4Addr, u8)> = parts.filter(|(_, prefix)| PREFIXES.contains(prefix))
-        else {
-            item.report(format!(
-                "`tunnel` \"{text}\" is no IPv4 network of {} to {} bits; write for example `tunnel = \"10.78.0.0/24\"`",
-                PREFIXES.start(),
-                PREFIXES.end()
-            ));
-            return None;
-        };
-        let hosts = u32::MAX >> prefix;
-        let begin = Ipv4Addr::from_bits(network.to_bits() & !hosts);
-        if begin != network {
-            item.report(format!("`tunnel` \"{text}\" is an address inside its network; write \"{begin}/{prefix}\""));
-        }
-        // The last one means all of them.
-        if nodes.len() >= hosts as usize {
-            item.report(format!(
-                "`tunnel` \"{text}\" has {} addresses for {} nodes; write a larger one, such as \"10.78.0.0/24\"",
-                hosts - 1,
-                nodes.len()
-            ));
-        }
-        let is_inside = |node: &&Node| {
-            node.address.is_some_and(|address| match address {
-                std::net::IpAddr::V4(v4) => v4.to_bits() & !hosts == begin.to_bits(),
-                std::net::IpAddr::V6(_) => false,
-            })
-        };
-        if let Some(node) = nodes.iter().find(is_inside) {
-            item.report(format!(
+    // The last one means all of them.
+    if nodes.len() >= hosts as usize {
+        item.report(format!(
+            "`tunnel` \"{text}\" has {} addresses for {} nodes; write a larger one, such as \"10.78.0.0/24\"",
+            hosts - 1,
+            nodes.len()
+        ));
+    }
+    let is_inside = |node: &&Node| {
+        node.address.is_some_and(|address| match address {
+            std::net::IpAddr::V4(v4) => v4.to_bits() & !hosts == begin.to_bits(),
+            std::net::IpAddr::V6(_) => false,
+        })
+    };
+    if let Some(node) = nodes.iter().find(is_inside) {
+        item.report(format!(
                 "`tunnel` \"{text}\" holds the address of node `{}`, where the slots themselves go; write a network of its own, \
                  such as \"10.78.0.0/24\"",
                 node.name
             ));
-        }
-        Some(Self { network: begin, prefix })
     }
+    Some(Tunnel { network: begin, prefix })
 }
 
-impl Tdma {
-    /// The table of a file, if its nodes send in time slots.
-    pub(crate) fn read(file: &Section<'_>, slots: Vec<Section<'_>>, nodes: &[Node]) -> Option<Self> {
-        let mode = file.section("network", "[network]").and_then(|network| network.get("mode"));
-        let is_tdma = mode.map_or(Some(false), |item| item.choice(&[("free", false), ("tdma", true)]));
-        let section = file.section("tdma", "[tdma]");
-        // What follows from a word that is none is not worth judging.
-        if !is_tdma? {
-            for unused in section.iter().chain(&slots) {
-                unused.report("time slots go only with `mode = \"tdma\"` in [network]; write that there, or drop this");
-            }
-            return None;
+/// Lines in the file.
+pub(crate) struct TdmaLines {
+    /// Of the section.
+    table: usize,
+    /// Of its slots, in their order.
+    slots: Vec<usize>,
+}
+
+/// The table of a file, if its nodes send in time slots.
+pub(crate) fn read(file: &Section<'_>, slots: Vec<Section<'_>>, nodes: &[Node]) -> Option<(Tdma, TdmaLines)> {
+    let mode = file.section("network", "[network]").and_then(|network| network.get("mode"));
+    let is_tdma = mode.map_or(Some(false), |item| item.choice(&[("free", false), ("tdma", true)]));
+    let section = file.section("tdma", "[tdma]");
+    // What follows from a word that is none is not worth judging.
+    if !is_tdma? {
+        for unused in section.iter().chain(&slots) {
+            unused.report("time slots go only with `mode = \"tdma\"` in [network]; write that there, or drop this");
         }
-        let Some(section) = section else {
-            file.report(
+        return None;
+    }
+    let Some(section) = section else {
+        file.report(
                 "section `[tdma]` is missing; with `mode = \"tdma\"` add `[tdma]` with `cycle = \"5 ms\"` and `link = \"100 Mbit/s\"`, \
                  and a `[[slot]]` for each node",
             );
-            return None;
-        };
-        let cycle = section.required("cycle", "cycle = \"5 ms\"").and_then(|item| read_cycle(&item));
-        let link = section.required("link", "link = \"100 Mbit/s\"");
-        let link = link.and_then(|item| item.rate(LINKS, "100 Mbit/s")).unwrap_or(LINK_BITS_S);
-        let synchronisation = section.get("synchronisation").and_then(|item| item.duration_above_zero("500 us"));
-        let guard = section.get("guard").and_then(|item| item.duration_above_zero("150 us"));
-        let tunnel = section.get("tunnel").and_then(|item| Tunnel::read(&item, nodes));
-        let mut slots: Vec<_> = slots.into_iter().filter_map(|slot| TimeSlot::read(slot, nodes)).collect();
-        slots.sort_by_key(|slot| (slot.offset, slot.phase));
-        let line = section.line;
-        section.finish();
-        Some(Self {
-            cycle: cycle.unwrap_or(CYCLE),
-            synchronisation: synchronisation.unwrap_or(SYNCHRONISATION),
-            guard: guard.unwrap_or(GUARD),
-            link_bytes_s: link / 8,
-            slots,
-            tunnel,
-            line,
-        })
-    }
-
-    /// Cycles after which the table repeats itself.
-    pub fn cycles(&self) -> u64 {
-        cycles(self.slots.iter())
-    }
-
-    /// Bytes that may leave in a slot or window of a length: those that the link carries before the guard begins, the heads of Ethernet,
-    /// IP and UDP counted.
-    pub fn budget_bytes(&self, length: Duration) -> u64 {
-        let ns = length.saturating_sub(self.guard).as_nanos();
-        u64::try_from(ns * u128::from(self.link_bytes_s) / 1_000_000_000).unwrap_or(u64::MAX)
-    }
-
-    /// What must be equal at both ends of the wire.
-    pub(crate) fn lan_text(&self) -> String {
-        let slot = |slot: &TimeSlot| {
-            let (offset, length) = (slot.offset.as_nanos(), slot.length.as_nanos());
-            format!(" slot {} {offset} {length} {} {}", slot.node, slot.period, slot.phase)
-        };
-        let tunnel = self.tunnel.map_or("-".into(), |tunnel| format!("{}/{}", tunnel.network, tunnel.prefix));
-        format!(
-            "tdma cycle {} synchronisation {} guard {} link {} tunnel {tunnel}{}",
-            self.cycle.as_nanos(),
-            self.synchronisation.as_nanos(),
-            self.guard.as_nanos(),
-            self.link_bytes_s,
-            self.slots.iter().map(slot).collect::<String>()
-        )
-    }
+        return None;
+    };
+    let cycle = section.required("cycle", "cycle = \"5 ms\"").and_then(|item| read_cycle(&item));
+    let link = section.required("link", "link = \"100 Mbit/s\"");
+    let link = link.and_then(|item| item.rate(LINKS, "100 Mbit/s")).unwrap_or(LINK_BITS_S);
+    let synchronisation = section.get("synchronisation").and_then(|item| item.duration_above_zero("500 us"));
+    let guard = section.get("guard").and_then(|item| item.duration_above_zero("150 us"));
+    let tunnel = section.get("tunnel").and_then(|item| read_tunnel(&item, nodes));
+    let mut slots: Vec<_> = slots.into_iter().filter_map(|slot| read_slot(slot, nodes)).collect();
+    slots.sort_by_key(|(slot, _)| (slot.offset, slot.phase));
+    let (slots, slot_lines) = slots.into_iter().unzip();
+    let lines = TdmaLines { table: section.line, slots: slot_lines };
+    section.finish();
+    let tdma = Tdma {
+        cycle: cycle.unwrap_or(CYCLE),
+        synchronisation: synchronisation.unwrap_or(SYNCHRONISATION),
+        guard: guard.unwrap_or(GUARD),
+        link_bytes_s: link / 8,
+        slots,
+        tunnel,
+    };
+    Some((tdma, lines))
 }
 
-/// Cycles after which these slots repeat themselves.
-pub(crate) fn cycles<'s>(slots: impl Iterator<Item = &'s TimeSlot>) -> u64 {
-    slots.fold(1, |all: u64, slot| (all / common(all, slot.period.into())).saturating_mul(slot.period.into()))
+/// What must be equal at both ends of the wire.
+pub(crate) fn lan_text(tdma: &Tdma) -> String {
+    let slot = |slot: &TimeSlot| {
+        let (offset, length) = (slot.offset.as_nanos(), slot.length.as_nanos());
+        format!(" slot {} {offset} {length} {} {}", slot.node, slot.period, slot.phase)
+    };
+    let tunnel = tdma.tunnel.map_or("-".into(), |tunnel| format!("{}/{}", tunnel.network, tunnel.prefix));
+    format!(
+        "tdma cycle {} synchronisation {} guard {} link {} tunnel {tunnel}{}",
+        tdma.cycle.as_nanos(),
+        tdma.synchronisation.as_nanos(),
+        tdma.guard.as_nanos(),
+        tdma.link_bytes_s,
+        tdma.slots.iter().map(slot).collect::<String>()
+    )
 }
-
-/// Greatest common divisor.
-pub(crate) fn common(a: u64, b: u64) -> u64 {
-    if b == 0 { a } else { common(b, a % b) }
-}
-
 fn read_cycle(item: &Item<'_>) -> Option<Duration> {
     let cycle = item.duration("5 ms")?;
     if CYCLES.contains(&cycle) {
@@ -217,35 +139,28 @@ fn read_cycle(item: &Item<'_>) -> Option<Duration> {
     None
 }
 
-impl TimeSlot {
-    /// Whether it is there in a cycle.
-    pub fn is_in(&self, cycle: u64) -> bool {
-        cycle % u64::from(self.period.max(1)) == u64::from(self.phase)
-    }
-
-    fn read(section: Section<'_>, nodes: &[Node]) -> Option<Self> {
-        let node = section.required("node", "node = \"base\"").and_then(|item| read_node(&item, nodes));
-        let offset = section.required("offset", "offset = \"1 ms\"").and_then(|item| item.duration("1 ms"));
-        let length = section.required("length", "length = \"500 us\"");
-        let length = length.and_then(|item| item.duration_above_zero("500 us"));
-        let period = section.get("period").map_or(Some(1), |item| item.whole(PERIODS, 1));
-        let phase = section.get("phase").map(|item| (item.whole(0..=*PERIODS.end() - 1, 0), item));
-        if let (Some(period), Some((Some(read), item))) = (period, &phase)
-            && *read >= period
-        {
-            item.report(if period == 1 {
+fn read_slot(section: Section<'_>, nodes: &[Node]) -> Option<(TimeSlot, usize)> {
+    let node = section.required("node", "node = \"base\"").and_then(|item| read_node(&item, nodes));
+    let offset = section.required("offset", "offset = \"1 ms\"").and_then(|item| item.duration("1 ms"));
+    let length = section.required("length", "length = \"500 us\"");
+    let length = length.and_then(|item| item.duration_above_zero("500 us"));
+    let period = section.get("period").map_or(Some(1), |item| item.whole(PERIODS, 1));
+    let phase = section.get("phase").map(|item| (item.whole(0..=*PERIODS.end() - 1, 0), item));
+    if let (Some(period), Some((Some(read), item))) = (period, &phase)
+        && *read >= period
+    {
+        item.report(if period == 1 {
                 format!("`phase` {read} says in which of several cycles the slot is, but it is in each; write `period = {}` or more, or drop `phase`", read + 1)
             } else {
                 format!("`phase` is {read}, but of {period} cycles the last is {}; write 0 to {}, or a longer `period`", period - 1, period - 1)
             });
-        }
-        let line = section.line;
-        section.finish();
-        let phase = phase.map_or(Some(0), |(phase, _)| phase);
-        Some(Self { node: node?, offset: offset?, length: length?, period: period? as u32, phase: phase? as u32, line })
     }
+    let line = section.line;
+    section.finish();
+    let phase = phase.map_or(Some(0), |(phase, _)| phase);
+    let (node, offset, length) = (node?, offset?, length?);
+    Some((TimeSlot { node, offset, length, period: period? as u32, phase: phase? as u32 }, line))
 }
-
 fn read_node(item: &Item<'_>, nodes: &[Node]) -> Option<u8> {
     let text = item.text("base")?;
     let names = || nodes.iter().map(|node| node.name.as_str());

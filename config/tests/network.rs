@@ -1,9 +1,8 @@
 //! What a file of several nodes means for routers.
 
-use rohrpost_config::{
-    Digest, Installation, LEVEL_NOT_REAL_TIME, Program, ROUTER, RestartPolicy, Route, TRANSIT, TimeSource,
-};
+use rohrpost_config::{Digest, Installation, Program, ROUTER, RestartPolicy, TRANSIT, TimeSource};
 use rohrpost_mailbox::{Name, Priority};
+use rohrpost_network::{LEVEL_NOT_REAL_TIME, Route};
 use std::path::Path;
 use std::time::Duration;
 

@@ -13,6 +13,7 @@
 
 use crate::counters::{Counters, ROWS};
 use crate::hot::{Hot, ReceiverSays};
+use crate::memory::Shared;
 use crate::name::Name;
 use crate::package::{BODY_BYTES_MAX, HEAD_BYTES};
 use crate::slots::{Full, SLOTS_MAX};
@@ -205,6 +206,9 @@ pub(crate) struct Page {
     pub(crate) hot: Hot,
     pub(crate) counters: Counters,
 }
+
+// SAFETY: made of atomics alone.
+unsafe impl Shared for Page {}
 
 const _: () = {
     assert!(size_of::<Identity>() == 64 && offset_of!(Identity, max_age_ns) == 32);

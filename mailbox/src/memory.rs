@@ -19,14 +19,6 @@ pub(crate) unsafe trait Shared {}
 unsafe impl Shared for AtomicU32 {}
 // SAFETY: an atomic; all bit patterns are numbers.
 unsafe impl Shared for AtomicU64 {}
-// SAFETY: made of atomics alone.
-unsafe impl Shared for crate::layout::Page {}
-// SAFETY: made of atomics alone.
-unsafe impl Shared for crate::node::NodePage {}
-// SAFETY: made of atomics alone.
-unsafe impl Shared for crate::traffic::TrafficPage {}
-// SAFETY: made of atomics alone.
-unsafe impl Shared for crate::system_time::TimePage {}
 
 /// A shared mapping of a file's beginning, or one of several users of it in this process. Truncating the file afterwards is outside our contract: all processes of a user
 /// trust each other's memory.

@@ -21,7 +21,7 @@ use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, AllHeld, Held};
-use crate::memory::{Mapping, Use};
+use crate::memory::{Mapping, Shared, Use};
 use crate::name::Name;
 use crate::step::step;
 use crate::word::Claimant;
@@ -57,6 +57,10 @@ pub(crate) struct NodePage {
     padding: [AtomicU32; 9],
     entries: [Entry; PARTICIPANTS_MAX],
 }
+
+// SAFETY: made of atomics alone.
+unsafe impl Shared for NodePage {}
+
 const _: () = assert!(size_of::<Entry>() == 64 && size_of::<NodePage>() == 64 + PARTICIPANTS_MAX * 64);
 
 /// Why a node's directory could not be used.

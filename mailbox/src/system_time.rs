@@ -7,7 +7,7 @@
 
 use crate::clock::{monotonic_ns, realtime_ns, slept_ns, slept_ns_min};
 use crate::files::{allocate, open_shared};
-use crate::memory::{Mapping, Use};
+use crate::memory::{Mapping, Shared, Use};
 use crate::node::{Node, NodeError};
 use crate::step::step;
 use std::path::Path;
@@ -174,6 +174,10 @@ pub(crate) struct TimePage {
     watched: [AtomicU64; 6],
     records: [SharedRecord; 2],
 }
+
+// SAFETY: made of atomics alone.
+unsafe impl Shared for TimePage {}
+
 const _: () = assert!(size_of::<TimePage>() == 192 && std::mem::offset_of!(TimePage, records) == 64);
 const _: () = assert!(std::mem::offset_of!(TimePage, watched) == 16);
 const _: () = assert!(std::mem::offset_of!(SharedRecord, slept_ns) == 56);

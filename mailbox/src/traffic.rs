@@ -14,7 +14,7 @@
 
 use crate::files::{allocate, open_shared, open_to_read};
 use crate::layout::{MAGIC, VERSION};
-use crate::memory::{Mapping, Use};
+use crate::memory::{Mapping, Shared, Use};
 use crate::name::Name;
 use crate::node::{Node, NodeError};
 use crate::package::Type;
@@ -90,6 +90,10 @@ pub(crate) struct TrafficPage {
     header: Header,
     rows: [Row; FLOWS],
 }
+
+// SAFETY: made of atomics alone.
+unsafe impl Shared for TrafficPage {}
+
 const _: () = assert!(size_of::<Header>() == 64 && size_of::<Second>() == 32 && size_of::<Row>() == 256);
 const _: () = assert!(offset_of!(Row, packages) == 24 && offset_of!(Row, seconds) == 128);
 

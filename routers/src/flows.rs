@@ -8,8 +8,8 @@
 //! What `check` computes a bound for, measured by the router that sends: so one clock suffices, and packages without a stamp, commands among
 //! them, are measured as well. Where nodes send as packages come, no link is known, and the time ends with handing over.
 
+use crate::counts::{Cause, Count};
 use crate::latencies::Latencies;
-use crate::stats::{Cause, Count};
 use rohrpost_config::{Contents, Installation, Module, bounds};
 use rohrpost_mailbox::{Head, Kind, Latency, Name};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -2,15 +2,16 @@
 
 use crate::admission::Admission;
 use crate::broken::{Broken, with};
+use crate::counts::{Cause, Side};
 use crate::flows::Flow;
 use crate::frame::NodeIndex;
 use crate::inbound::{self, Datagram, Inbound};
 use crate::outbound::{Accepted, Outbound, Output, Package};
 use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::settings::{NodeSettings, Settings};
-use crate::stats::{Cause, Side, Stats};
-use rohrpost_config::{Network, Route, Security};
+use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_network::{Network, Route, Security};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 use std::time::Duration;

@@ -13,8 +13,8 @@
 
 use crate::admission::capped;
 use crate::outbound::Accepted;
-use rohrpost_config::wire::HAND_OVER;
 use rohrpost_mailbox::{HEAD_BYTES, Head, Priority};
+use rohrpost_network::HAND_OVER;
 
 /// If no slot came for so long, what waits is taken: whether its peer is there, and whether it is too old, is found in the queue. A third of
 /// the time after which packages are dropped.

@@ -15,6 +15,7 @@
 
 pub mod admission;
 pub mod broken;
+pub mod counts;
 pub mod flows;
 pub mod fragment;
 pub mod frame;

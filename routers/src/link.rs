@@ -1,9 +1,9 @@
 //! Whether a peer is there: what the receiving half finds out, and the sending half and everyone else reads.
 
 use crate::broken::broken;
+use crate::counts::Count;
 use crate::frame::{Alive, Reason};
 use crate::report::Mismatch;
-use crate::stats::Count;
 
 /// A peer to which nothing else goes is told "still there" this often.
 pub const ALIVE_EVERY_NS: u64 = 200_000_000;

@@ -1,13 +1,13 @@
 //! What the cores tell of: packages that go no further, and what happens to peers.
 
+use crate::counts::Cause;
 use crate::frame::{NodeIndex, Reason};
 use crate::security::NotOpened;
-use crate::stats::Cause;
 use rohrpost_mailbox::{Head, SendError};
 use std::net::IpAddr;
 
 /// How much of a lost package's body is there to be read: enough for what a call begins with.
-pub const BEGINNING_BYTES: usize = 256;
+pub const BEGINNING_BYTES: usize = rohrpost_network::KEPT_IN_BYTES as usize;
 
 /// Learns of each package that is lost here, once. It may answer its sender; counted it is already.
 pub trait Report {

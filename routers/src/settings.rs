@@ -3,16 +3,15 @@
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
 use crate::admission::{Admission, Way, capped};
+use crate::counts::Cause;
 use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
-use crate::stats::Cause;
 use crate::tdma::{LATE_NS, Wire};
-use rohrpost_config::{Installation, Network, Route, Security, Tdma};
+use rohrpost_config::Installation;
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Head, Name};
+use rohrpost_network::{Network, Route, Security, Tdma};
 use std::net::IpAddr;
 
-/// Levels of the queue; 0 goes first, the last takes what is not real time: see [`Network::level`].
-pub const LEVELS: usize = 32;
 /// Least that a sender may have waiting: two of the largest packages.
 pub const QUOTA_BYTES_MIN: usize = 128 * 1024;
 /// The smallest datagram that a package of any size goes into, in parts.
@@ -28,7 +27,6 @@ const _: () = {
         QUOTA_BYTES_MIN >= 2 * (BODY_BYTES_MAX + HEAD_BYTES),
         "a sender's next package fits behind the one that leaves"
     );
-    assert!(rohrpost_config::LEVEL_NOT_REAL_TIME as usize == LEVELS - 1, "configuration knows the same levels");
 };
 
 /// One router, and the network that it is on.
@@ -38,7 +36,7 @@ pub struct Settings {
     pub system: u8,
     /// Which of `nodes` it runs on.
     pub own: NodeIndex,
-    /// All nodes of the LAN, in the order of the configuration; [`NODES_MAX`](rohrpost_config::NODES_MAX) at most.
+    /// All nodes of the LAN, in the order of the configuration; [`NODES_MAX`](rohrpost_network::NODES_MAX) at most.
     pub nodes: Vec<NodeSettings>,
     /// What must be equal on both ends of a wire.
     pub digest: u64,

@@ -7,9 +7,10 @@
 pub mod counting;
 
 use counting::{CountingHeap, heap_uses};
-use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_network::{Network, Route, Security};
 use rohrpost_routers::admission::Admission;
+use rohrpost_routers::counts::Cause;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::{Datagram, Inbound};
@@ -18,7 +19,7 @@ use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
 use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::session::{ClientIndex, Table};
 use rohrpost_routers::settings::{NodeSettings, Settings};
-use rohrpost_routers::stats::{Cause, Stats};
+use rohrpost_routers::stats::Stats;
 use rohrpost_routers::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;

@@ -7,16 +7,17 @@
 mod common;
 
 use common::{PATIENCE, Pair, Side, label, module};
-use rohrpost_config::Security;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::{Kind, Label, Name, Options, Receiver, SendError, Shape, Type, local};
+use rohrpost_network::Security;
+use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::link::State;
 use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
-use rohrpost_routers::stats::{Cause, Stats};
+use rohrpost_routers::stats::Stats;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};

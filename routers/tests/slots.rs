@@ -3,8 +3,9 @@
 
 mod simulated;
 
-use rohrpost_config::{Bound, Flow, Installation, bounds};
+use rohrpost_config::{Flow, Installation, bounds};
 use rohrpost_mailbox::Name;
+use rohrpost_network::Bound;
 use rohrpost_routers::broken::Broken as Mistaken;
 use rohrpost_routers::sim::calls::{Attempt, Guard, Ruling};
 use rohrpost_routers::sim::declared::PERIOD_MIN_PERCENT;

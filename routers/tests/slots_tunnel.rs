@@ -17,8 +17,9 @@ mod common;
 use common::{
     Capture, Crossed, MASTERS, NODES, PATIENCE, Segment, Station, assert_inside, judge, label, module, table,
 };
-use rohrpost_config::{Installation, LATE, Tdma, Tunnel, bounds};
+use rohrpost_config::{Installation, bounds};
 use rohrpost_mailbox::{Receiver, Sender, TimeRecord, monotonic_ns};
+use rohrpost_network::{LATE, Tdma, Tunnel};
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use rohrpost_routers::tdma::Table;
 use std::collections::BTreeMap;
@@ -85,9 +86,7 @@ fn installation() -> Installation {
 /// The bound of each flow.
 fn bounds_ns(segment: &Segment) -> Vec<u64> {
     let installation = installation();
-    let mut tdma = installation.tdma.clone().unwrap();
-    tdma.line = 0;
-    tdma.slots.iter_mut().for_each(|slot| slot.line = 0);
+    let tdma = installation.tdma.clone().unwrap();
     assert_eq!(tdma, Tdma { tunnel: Some(TUNNEL), ..table() }, "what is computed is what runs");
     let (computed, runs) = (installation.network.unwrap(), segment.stations[0].shell().settings().network);
     assert_eq!((computed.datagram_bytes_max, computed.bulk_below), (runs.datagram_bytes_max, runs.bulk_below));
@@ -318,6 +317,6 @@ fn somebody_types_and_copies_a_file_and_declared_flows_keep_their_bounds() {
         assert!(passed(0).sent.get() > 1000 && passed(1).received.get() > 1000, "{:?} {:?}", passed(0), passed(1));
         assert_eq!(passed(2).received.get(), 0, "it is no business of the third");
         let level = segment.stations[0].shell().settings().network.level(rohrpost_mailbox::Priority(0));
-        assert_eq!(level, rohrpost_config::LEVEL_NOT_REAL_TIME);
+        assert_eq!(level, rohrpost_network::LEVEL_NOT_REAL_TIME);
     });
 }

@@ -6,8 +6,9 @@
 mod common;
 
 use common::{PATIENCE, Pair, Side, label, module, router, turns};
-use rohrpost_config::{TRANSIT, Tdma};
+use rohrpost_config::TRANSIT;
 use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
+use rohrpost_network::Tdma;
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::net::IpAddr;
 use std::process::{Child, Command, Stdio};

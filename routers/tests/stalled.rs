@@ -7,8 +7,8 @@
 mod common;
 
 use common::{PATIENCE, Side, Words, label, router};
-use rohrpost_config::Route;
 use rohrpost_mailbox::{Name, Node, Shape, monotonic_ns};
+use rohrpost_network::Route;
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use rohrpost_routers::link::State;
 use rohrpost_routers::settings::{NodeSettings, Settings};

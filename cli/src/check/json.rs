@@ -2,9 +2,10 @@
 
 use rohrpost::Name;
 use rohrpost_config::{
-    Bound, Errors, FlowBound, Installation, MailboxSpec, MissingProgram, Module, Network, Program, Reach,
-    RestartPolicy, Scheduling, Start, Tdma, TimeSource, bounds,
+    Errors, Installation, MailboxSpec, MissingProgram, Module, Program, Reach, RestartPolicy, Scheduling, Start,
+    TimeSource, bounds,
 };
+use rohrpost_network::{Bound, FlowBound, Network, Tdma};
 use serde_json::{Value, json};
 use std::time::Duration;
 

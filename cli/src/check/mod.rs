@@ -2,7 +2,8 @@
 
 mod json;
 
-use super::{Failure, daemons, say};
+use super::daemons;
+use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost_config::{Errors, Flow, Installation, MissingProgram, TimeSource, explain};
 use std::collections::BTreeMap;

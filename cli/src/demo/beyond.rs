@@ -1,8 +1,8 @@
 //! What went through the TCP router in the demo, as its clients have counted; and what it cost that it died.
 
-use crate::Failure;
 use crate::summary::class_name;
 use crate::table::{table, time};
+use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{BeyondLink, BeyondState, ClassPassed, TcpInterface};
 use rohrpost::macro_support::{append, from_bytes};

@@ -2,8 +2,9 @@
 //! where it was, and messages name the file that it was made from.
 
 use super::{Arguments, GUI, Joined};
+use crate::check;
 use crate::keys::certificates::{self, Which};
-use crate::{Failure, check};
+use crate::terminal::Failure;
 use rohrpost_config::{Installation, Keys, Program};
 use rohrpost_routers::security::random;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! What tells the time on the bridge, where that is sealed: the demo has the keys, and so reads what each node reads that does not know who lives.
 
-use crate::Failure;
 use crate::router::keys;
+use crate::terminal::Failure;
 use rohrpost_config::Installation;
 use rohrpost_routers::frame::FrameHead;
 use rohrpost_routers::security::{Acquaintances, Opening, Port, TAG_BYTES, Who};

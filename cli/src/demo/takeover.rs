@@ -5,8 +5,8 @@
 use super::ears::Ears;
 use super::lives::{Death, Lives};
 use super::reigns::{Reign, Reigns};
-use crate::Failure;
 use crate::table::time;
+use crate::terminal::Failure;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::lab::Capture;

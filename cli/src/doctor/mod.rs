@@ -8,7 +8,7 @@ mod place;
 mod rights;
 mod security;
 
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use machine::{Machine, Needs};
 use rohrpost::launch::choose_node;
 use security::Protection;

@@ -3,7 +3,8 @@
 use super::machine::{Machine, Needs};
 use super::{Finding, State};
 use crate::keys::certificates;
-use rohrpost_config::{Installation, Keys, Security};
+use rohrpost_config::{Installation, Keys};
+use rohrpost_network::Security;
 use std::path::PathBuf;
 
 /// What a configuration says of security, and what is here of it.

@@ -9,7 +9,7 @@ use super::target::{Running, Target};
 use super::units::{Stop, bytes, seconds};
 use super::vocabulary::{Vocabulary, answered};
 use super::watch::Tracks;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost::output::plain;
 use rohrpost::survey::{Scope, Standing, Survey, is_hop};

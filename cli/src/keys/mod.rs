@@ -3,7 +3,7 @@
 pub(super) mod certificates;
 
 use super::check::load;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use certificates::Which;
 use clap::{Args, Subcommand};
 use rohrpost_config::{Installation, Key, Keys};

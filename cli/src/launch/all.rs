@@ -9,8 +9,8 @@
 //! The nodes start at once, as computers that are switched on together do, and are stopped one after the other, the last first. If this
 //! command dies, the kernel tells each launch to stop; when the last process of a node has ended, its namespace is gone.
 
-use super::Failure;
 use crate::speech::Speech;
+use crate::terminal::Failure;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::{Pid, getppid};
 use rohrpost::launch::{Event, events};

@@ -1,8 +1,9 @@
 //! Which lines are shown. The collector knows nothing of it: it hands out pages, and the tool chooses.
 
+use super::super::call;
 use super::super::target::Running;
-use super::super::{Failure, call};
 use super::Arguments;
+use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::output::OutputLine;

@@ -1,9 +1,10 @@
 //! From which level on modules speak: listed, and set while they run.
 
+use super::super::call;
 use super::super::table::table;
 use super::super::target::Running;
-use super::super::{Failure, call, complain, say};
 use super::{Arguments, filter};
+use crate::terminal::{Failure, complain, say};
 use rohrpost::common::OutputLevel;
 use rohrpost::{Name, ToolLink};
 use rohrpost_config::Module;

@@ -4,9 +4,9 @@
 //! the least urgent priority there is, instead of sending a package for each line; nothing has to be renewed; and a reader
 //! that is slow or stopped misses nothing that the collector still keeps, and sees what it missed.
 
-use super::super::Failure;
 use super::super::target::Running;
 use super::{LINES_FROM, told};
+use crate::terminal::Failure;
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::output::OutputLine;
 use rohrpost::{CallError, Name, ToolLink};

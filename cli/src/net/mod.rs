@@ -5,7 +5,7 @@ mod show;
 
 use super::round::{Round, Rounds};
 use super::vocabulary::Vocabulary;
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use rohrpost::interfaces::{
     BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, Links, RouterInterface, SlotState, TcpInterface,
 };

@@ -2,7 +2,7 @@
 
 mod name;
 
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use name::ModuleName;
 use std::fs;
 use std::path::{Path, PathBuf};

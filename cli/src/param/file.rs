@@ -1,6 +1,6 @@
 //! The file that `param save` writes: TOML that people read, and that loads again.
 
-use super::Failure;
+use crate::terminal::Failure;
 use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, toml_text};
 use rohrpost_config::{Installation, Saved};

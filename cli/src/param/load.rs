@@ -1,7 +1,8 @@
 //! `param load`.
 
 use super::set::{set, told};
-use super::{Failure, Session, complain, find, say};
+use super::{Session, find};
+use crate::terminal::{Failure, complain, say};
 use rohrpost::Name;
 use rohrpost::parameter::from_file;
 use rohrpost::value::Value;

@@ -7,7 +7,7 @@ mod set;
 mod show;
 
 use super::target::{Running, Target};
-use super::{Failure, complain, say};
+use crate::terminal::{Failure, complain};
 use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, Refusal};
 use rohrpost::{CallError, Fault, Name, ToolLink};

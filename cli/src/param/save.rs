@@ -1,7 +1,8 @@
 //! `param save`.
 
 use super::file::Contents;
-use super::{Failure, Session, complain, no_parameters, say};
+use super::{Session, no_parameters};
+use crate::terminal::{Failure, complain, say};
 use std::path::Path;
 use std::process::ExitCode;
 

@@ -1,6 +1,7 @@
 //! `param set`.
 
-use super::{Failure, Session, find, say};
+use super::{Session, find};
+use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost::common::{Change, SetParameters};
 use rohrpost::output::plain;

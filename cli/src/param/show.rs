@@ -1,7 +1,8 @@
 //! `param list` and `param get`.
 
 use super::super::table::table;
-use super::{Failure, Session, complain, find, no_parameters, say};
+use super::{Session, find, no_parameters};
+use crate::terminal::{Failure, complain, say};
 use rohrpost::parameter::{Parameter, value_text};
 use rohrpost::value::decode;
 use std::process::ExitCode;

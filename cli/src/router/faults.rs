@@ -3,9 +3,9 @@
 use rohrpost::Fault;
 use rohrpost_config::Installation;
 use rohrpost_modules::call::CallEnvelope;
+use rohrpost_routers::counts::Cause;
 use rohrpost_routers::report::BEGINNING_BYTES;
 use rohrpost_routers::shell::{Faults, Undelivered, difference};
-use rohrpost_routers::stats::Cause;
 
 const _: () = assert!(BEGINNING_BYTES >= CallEnvelope::BYTES, "the answer needs the command's envelope");
 

@@ -3,9 +3,9 @@
 use rohrpost::interfaces::{CarriedLoss, FlowState, FlowStates};
 use rohrpost_config::ClassTable;
 use rohrpost_mailbox::Name;
+use rohrpost_routers::counts::Cause;
 use rohrpost_routers::flows::{Flow, FlowCounts};
 use rohrpost_routers::shell::Shell;
-use rohrpost_routers::stats::Cause;
 use std::time::Duration;
 
 /// How it stands now.

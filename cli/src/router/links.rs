@@ -4,12 +4,13 @@ use rohrpost::interfaces::{
     Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink, Rejected, SocketFailure,
 };
 use rohrpost_mailbox::{Class, Latency, Priority, monotonic_ns};
+use rohrpost_network::LEVELS;
+use rohrpost_routers::counts::{Cause, ClassCounts, Count, PeerReceived, PeerSent};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::link::State;
 use rohrpost_routers::security::{Port, Rejection};
-use rohrpost_routers::settings::LEVELS;
 use rohrpost_routers::shell::{Failure, Shell, difference};
-use rohrpost_routers::stats::{Cause, ClassCounts, Count, PeerReceived, PeerSent, PeerStats, Stats};
+use rohrpost_routers::stats::{PeerStats, Stats};
 use std::collections::BTreeMap;
 use std::time::Duration;
 

@@ -7,7 +7,7 @@ pub(crate) mod keys;
 mod links;
 mod slots;
 
-use super::Failure;
+use crate::terminal::Failure;
 use rohrpost::interfaces::{Router, RouterInterface};
 use rohrpost::{Context, Module, ModuleError, Start};
 use rohrpost_modules::runtime::{exit, kept, run_started};

@@ -3,8 +3,8 @@
 mod client;
 mod server;
 
-use super::Failure;
 use super::router::NoSettings;
+use crate::terminal::Failure;
 use rohrpost::interfaces::{CarriedLoss, ClassPassed};
 use rohrpost::{ModuleError, Start};
 use rohrpost_config::{Installation, Tcp};

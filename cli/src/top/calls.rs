@@ -50,7 +50,7 @@ pub(super) struct Calls {
 
 impl Calls {
     /// Takes part as a tool.
-    pub(super) fn join(running: &Running) -> Result<Self, super::Failure> {
+    pub(super) fn join(running: &Running) -> Result<Self, crate::terminal::Failure> {
         Ok(Self { tool: running.join(PATIENCE)?, under_way: Vec::new(), looks: Vec::new() })
     }
 

@@ -2,7 +2,6 @@
 
 use super::super::sight::Silence;
 use super::super::target::Running;
-use super::Failure;
 use super::app::{Action, App, Screen};
 use super::calls::{Answer, Calls};
 use super::details;
@@ -12,6 +11,7 @@ use super::output::Output;
 use super::palette::Palette;
 use super::sample::{self, Said, Seen};
 use super::terminal::{Opened, keyboard};
+use crate::terminal::Failure;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyEventKind};
 use rohrpost::Name;

@@ -24,7 +24,7 @@ mod tests;
 mod text;
 
 use super::target::{Running, Target};
-use super::{Failure, say};
+use crate::terminal::{Failure, say};
 use model::Model;
 use rohrpost::Name;
 use rohrpost::survey::Scope;

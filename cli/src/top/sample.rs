@@ -1,10 +1,10 @@
 //! One look at a node, and at those others that showed themselves: it waits for nobody.
 
-use super::super::Failure;
 use super::super::sight::Silence;
 use super::super::summary::module_lines;
 use super::super::target::Running;
 use super::model::{Sample, TimeNow};
+use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::survey::{Scope, Standing, Survey};
 use rohrpost_mailbox::SystemClock;

@@ -1,6 +1,6 @@
 //! The terminal while it is ours: opened, read, and given back as it was.
 
-use crate::Failure;
+use crate::terminal::Failure;
 use ratatui::DefaultTerminal;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event::{self, Event};

@@ -1,9 +1,9 @@
 //! What time slots mean: the cycle drawn, the slots, and how late each flow can be.
 
 use super::{Page, timeline};
-use crate::bounds::{Bound, bounds};
-use crate::tdma::{GATE, LATE, Tdma, TimeSlot};
+use crate::plan::bounds;
 use crate::units::{duration_decimal, duration_text, rate_text};
+use rohrpost_network::{Bound, GATE, LATE, Tdma, TimeSlot, round_up};
 use std::time::Duration;
 
 /// Below it some slots are begun too late for their successors; see the book's chapter.
@@ -131,5 +131,5 @@ fn there(slot: &TimeSlot) -> String {
 
 /// Up to ten microseconds.
 fn round(duration: Duration) -> String {
-    duration_decimal(Duration::from_micros(duration.as_nanos().div_ceil(10_000) as u64 * 10))
+    duration_decimal(round_up(duration))
 }

@@ -8,8 +8,8 @@
 //! ```
 
 use crate::node::Node;
-use crate::tdma::Tdma;
 use crate::units::duration_decimal;
+use rohrpost_network::Tdma;
 use std::time::Duration;
 
 /// Cells of a row.
@@ -117,7 +117,7 @@ fn step(cycle: Duration) -> Duration {
 mod tests {
     use super::*;
     use crate::node::Reach;
-    use crate::tdma::TimeSlot;
+    use rohrpost_network::TimeSlot;
 
     #[test]
     fn whatever_the_cycle_is_each_window_is_seen_and_a_row_fits() {
@@ -125,11 +125,11 @@ mod tests {
             let cycle = Duration::from_micros(cycle_us);
             let slot = |node: u8| {
                 let (offset, length) = (cycle * (2 + u32::from(node)) / 8, cycle / 100);
-                TimeSlot { node, offset, length, period: 1 + u32::from(node), phase: 0, line: 0 }
+                TimeSlot { node, offset, length, period: 1 + u32::from(node), phase: 0 }
             };
             let (synchronisation, guard) = (cycle / 100, cycle / 200);
             let slots: Vec<_> = (0..6).map(slot).collect();
-            let tdma = Tdma { cycle, synchronisation, guard, link_bytes_s: 12_500_000, slots, tunnel: None, line: 0 };
+            let tdma = Tdma { cycle, synchronisation, guard, link_bytes_s: 12_500_000, slots, tunnel: None };
             let node = |index: u8| Node {
                 name: format!("node-{index}"),
                 reach: Reach::Lan,
@@ -156,7 +156,7 @@ mod tests {
         let (numbers, ticks) = scale(ms(8));
         assert_eq!(numbers, "0       1 ms    2 ms    3 ms    4 ms    5 ms    6 ms    7 ms 8 ms");
         assert_eq!(ticks, format!("{}|", "|       ".repeat(8)));
-        let slots = vec![TimeSlot { node: 0, offset: ms(2), length: ms(2), period: 1, phase: 0, line: 0 }];
+        let slots = vec![TimeSlot { node: 0, offset: ms(2), length: ms(2), period: 1, phase: 0 }];
         let tdma = Tdma {
             cycle: ms(8),
             synchronisation: ms(1),
@@ -164,7 +164,6 @@ mod tests {
             link_bytes_s: 12_500_000,
             slots,
             tunnel: None,
-            line: 0,
         };
         let mut row = Row::new(&tdma);
         row.window(ms(2), ms(2), SENDS);

@@ -6,12 +6,12 @@
 mod flows;
 mod places;
 
-use super::room::{ARRIVES_WITHIN, round_up};
-use super::{GUARD, LATE, Tdma, TimeSlot};
+use super::{GUARD, TdmaLines};
 use crate::installation::Installation;
+use crate::plan::plan;
 use crate::reader::Reader;
 use crate::units::duration_decimal;
-use crate::wire::{Link, RATE_MAX_PER};
+use rohrpost_network::{ARRIVES_WITHIN, LATE, Plan, RATE_MAX_PER, Tdma, TimeSlot, round_up};
 use std::time::Duration;
 
 /// Clocks of two Linux computers that ask each other all the time are known to half of it.
@@ -22,10 +22,10 @@ const SLOT_WITHIN: Duration = Duration::from_millis(500);
 const CYCLES_MAX: u64 = 64;
 
 /// Judges the table, then whether every flow keeps its deadline with it.
-pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
-    let (Some(tdma), Some(network)) = (&installation.tdma, &installation.network) else { return };
-    let link = Link::new(tdma, network, installation.lan_nodes());
-    let mut judge = Judge { installation, tdma, mended: tdma.clone(), link, reader };
+pub(crate) fn judge(installation: &Installation, lines: &TdmaLines, reader: &Reader<'_>) {
+    let Some(tdma) = &installation.tdma else { return };
+    let Some(plan) = plan(installation, tdma) else { return };
+    let mut judge = Judge { installation, tdma, lines, mended: tdma.clone(), plan, reader };
     judge.cycle();
     judge.guard();
     judge.synchronisation();
@@ -51,34 +51,39 @@ pub(crate) fn judge(installation: &Installation, reader: &Reader<'_>) {
 struct Judge<'a> {
     installation: &'a Installation,
     tdma: &'a Tdma,
+    lines: &'a TdmaLines,
     /// What becomes of it if all that was said is done: its slots are in the same order.
     mended: Tdma,
-    link: Link,
+    plan: Plan,
     reader: &'a Reader<'a>,
 }
 
 impl<'a> Judge<'a> {
     fn report(&self, slot: usize, message: impl std::fmt::Display) {
-        let slot = &self.tdma.slots[slot];
-        let at = duration_decimal(slot.offset);
-        let node = &self.installation.nodes[usize::from(slot.node)].name;
-        self.reader.report(slot.line, format!("[[slot]] of `{node}` at {at} {message}"));
+        let TimeSlot { node, offset, .. } = self.tdma.slots[slot];
+        let (at, node) = (duration_decimal(offset), self.node_name(node));
+        self.reader.report(self.lines.slots[slot], format!("[[slot]] of `{node}` at {at} {message}"));
     }
 
     fn report_table(&self, message: impl std::fmt::Display) {
-        self.reader.report(self.tdma.line, format!("[tdma]: {message}"));
+        self.reader.report(self.lines.table, format!("[tdma]: {message}"));
     }
 
     fn whose(&self, slot: usize) -> String {
-        self.tdma.whose(&self.tdma.slots[slot], &self.installation.nodes)
+        let (TimeSlot { node, offset, .. }, line) = (self.tdma.slots[slot], self.lines.slots[slot]);
+        format!("that of `{}` at {} (line {line})", self.node_name(node), duration_decimal(offset))
     }
 
-    fn masters(&self) -> &'a [u8] {
-        self.installation.time.masters()
+    fn node_name(&self, node: u8) -> &'a str {
+        &self.installation.nodes[usize::from(node)].name
+    }
+
+    fn masters(&self) -> usize {
+        self.plan.link.masters()
     }
 
     fn length_min(&self) -> Duration {
-        self.mended.length_min(self.installation, &self.link)
+        self.mended.length_min(&self.plan.link)
     }
 
     /// No slot comes oftener than once in a cycle.
@@ -96,7 +101,7 @@ impl<'a> Judge<'a> {
         let guard = self.mended.guard;
         // From a node to a switch and on. What the node takes before that is not in it: of eight frames the quickest counts, and from the call
         // to the wire that takes some microseconds, not the 20 that bounds are computed with.
-        let way = Duration::from_nanos(2 * self.link.time_wire_ns());
+        let way = Duration::from_nanos(2 * self.plan.link.time_wire_ns());
         let least = round_up(GUARD_MIN.max(way * ARRIVES_WITHIN));
         if guard >= least {
             return self.guard_leaves_room(least);
@@ -136,12 +141,8 @@ impl<'a> Judge<'a> {
         self.mended.guard = right;
     }
 
-    fn others(&self) -> usize {
-        self.installation.lan_nodes().len() - 1
-    }
-
     fn synchronisation_min(&self) -> Duration {
-        let frames = Duration::from_nanos(2 * self.others() as u64 * self.link.time_ns());
+        let frames = Duration::from_nanos(2 * self.plan.link.others() as u64 * self.plan.link.time_ns());
         round_up(self.mended.guard + LATE + frames)
     }
 
@@ -152,7 +153,7 @@ impl<'a> Judge<'a> {
                 "`synchronisation` {} has no room for a warm-up and a Sync to each of {} other nodes before its guard; write \
                  `synchronisation = \"{}\"` or more",
                 duration_decimal(self.mended.synchronisation),
-                self.others(),
+                self.plan.link.others(),
                 duration_decimal(needed)
             ));
             self.mended.synchronisation = needed;
@@ -162,7 +163,7 @@ impl<'a> Judge<'a> {
             return;
         }
         let each = duration_decimal(synchronisation);
-        let (windows, or_fewer) = match self.masters().len() {
+        let (windows, or_fewer) = match self.masters() {
             1 => (format!("the synchronisation window of the master, {each}, leaves"), ""),
             masters => (
                 format!("the synchronisation windows of {masters} masters, {each} each, leave"),
@@ -170,7 +171,7 @@ impl<'a> Judge<'a> {
             ),
         };
         let shorter = Tdma { synchronisation: needed, ..self.mended.clone() };
-        let has_room = shorter.windows_end(self.masters()) + shorter.length_min(self.installation, &self.link) <= cycle;
+        let has_room = shorter.windows_end(self.masters()) + shorter.length_min(&self.plan.link) <= cycle;
         let or_shorter = if has_room {
             self.mended = shorter;
             format!("`synchronisation = \"{}\"`, or ", duration_decimal(needed))
@@ -216,7 +217,7 @@ impl<'a> Judge<'a> {
             let periods = powers_below(slot.period).filter(|period| cycle * *period <= SLOT_WITHIN);
             let right = if let Some(oftener) = self.oftener(index, periods) {
                 self.mended.slots[index] = oftener;
-                format!("write {}", oftener.period_text(&slot))
+                format!("write {}", period_text(&oftener, &slot))
             } else {
                 "write a shorter `cycle`, or a shorter `period` and another `offset`".into()
             };
@@ -241,7 +242,7 @@ impl<'a> Judge<'a> {
             Some((index, *slot, self.oftener(index, periods)?))
         });
         if let Some((index, slot, oftener)) = tries.min_by_key(|(_, slot, oftener)| slot.period - oftener.period) {
-            let (period, right) = (slot.period, oftener.period_text(&slot));
+            let (period, right) = (slot.period, period_text(&oftener, &slot));
             self.report(index, format!("has `period = {period}`, with which all slots {why}; write {right}"));
             self.mended.slots[index] = oftener;
         } else {
@@ -257,6 +258,12 @@ impl<'a> Judge<'a> {
         let mut tries = periods.map(|period| self.mended.slots[index].with_period(period));
         tries.find(|slot| others.has_room(slot, self.masters()))
     }
+}
+
+/// How to write the period of a slot, and its phase if that is not what it was.
+fn period_text(slot: &TimeSlot, was: &TimeSlot) -> String {
+    let phase = if slot.phase == was.phase { String::new() } else { format!(" and `phase = {}`", slot.phase) };
+    format!("`period = {}`{phase}", slot.period)
 }
 
 /// Periods that are powers of two: of any of them the longest is a multiple of all.

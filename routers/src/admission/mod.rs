@@ -19,9 +19,10 @@ pub(crate) use packet::tests::v4;
 
 use crate::broken::broken;
 use crate::frame::NodeIndex;
-use crate::{session, stats};
-use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER, Tunnel};
+use crate::{counts, session};
+use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER};
 use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
+use rohrpost_network::Tunnel;
 
 /// Of a router of the LAN: takes IP packets from the same mailbox of other nodes.
 pub(crate) const TUNNEL: u8 = 4;
@@ -73,7 +74,7 @@ pub enum Refused {
     NotAllowed,
 }
 
-impl From<Refused> for stats::Cause {
+impl From<Refused> for counts::Cause {
     fn from(why: Refused) -> Self {
         match why {
             Refused::ForeignName => Self::ForeignName,

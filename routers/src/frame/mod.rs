@@ -16,29 +16,12 @@
 
 use crate::broken::broken;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
+pub use rohrpost_network::{ALIVE_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES as HEAD_BYTES, REFUSAL_BYTES};
 
-/// Bytes before what depends on the kind.
-pub const HEAD_BYTES: usize = 36;
 /// The version of this format; the first four bytes, the check and a refusal mean the same in all of them.
 pub const VERSION: u8 = 1;
-/// Bytes of a fragment's own head, the package's head included.
-pub const FRAGMENT_HEAD_BYTES: usize = 32;
 /// Parts of a package, at most: one of 64 KiB in the smallest datagrams has fewer.
 pub const PARTS_MAX: u16 = 256;
-/// Bytes of what an alive datagram says.
-pub const ALIVE_BYTES: usize = 24;
-/// Bytes of what a refusal says.
-pub const REFUSAL_BYTES: usize = 16;
-
-// Who computes how late packages can be counts on these sizes.
-const _: () = {
-    assert!(HEAD_BYTES == rohrpost_config::wire::FRAME_HEAD_BYTES);
-    assert!(FRAGMENT_HEAD_BYTES == rohrpost_config::wire::FRAGMENT_HEAD_BYTES);
-    assert!(ALIVE_BYTES == rohrpost_config::wire::ALIVE_BYTES);
-    assert!(REFUSAL_BYTES == rohrpost_config::wire::REFUSAL_BYTES);
-    assert!(crate::time::message::MESSAGE_BYTES == rohrpost_config::wire::TIME_BYTES);
-};
-
 const MAGIC: [u8; 2] = *b"Rp";
 /// A million datagrams a second reach it after nine years; so a sequence and a place in its datagram fit in 64 bits.
 pub const SEQUENCE_MAX: u64 = (1 << 48) - 1;

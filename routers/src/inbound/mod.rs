@@ -16,13 +16,13 @@ pub use window::{REORDER_MAX, WINDOW};
 
 use crate::admission::capped;
 use crate::broken::broken;
+use crate::counts::Cause;
 use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, Reason, VERSION};
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
-use crate::stats::{Cause, Stats};
+use crate::stats::Stats;
 use order::position;
-use peer::{Peer, Way};
-use refusing::Refusing;
+use peer::{Peer, Refusing, Way};
 use rohrpost_mailbox::Head;
 use std::net::IpAddr;
 use std::sync::Arc;

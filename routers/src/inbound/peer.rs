@@ -2,15 +2,16 @@
 
 use super::doubt::Doubt;
 use super::order::{Order, sequence_of};
-use super::refusing::Refusing;
 use super::window::{Arrival, WINDOW, Window};
 use crate::broken::broken;
+use crate::counts::Cause;
 use crate::fragment::{Change, Reassembly};
 use crate::frame::{Alive, FrameHead, NodeIndex, Reason};
 use crate::link::{REFUSED_FOR_NS, SILENT_AFTER_NS, State};
 use crate::report::{Deliver, Event, Mismatch, NotDelivered};
-use crate::stats::{Cause, PeerStats, Stats};
+use crate::stats::{PeerStats, Stats};
 use rohrpost_mailbox::Head;
+use std::net::IpAddr;
 
 /// Lives of a peer that are known to be over.
 const OLD_KEPT: usize = 8;
@@ -37,6 +38,18 @@ pub(super) struct Peer {
     pub(super) reassembly: Reassembly,
     pub(super) refusing: Refusing,
     told: Told,
+}
+
+/// Refusals to one address.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Refusing {
+    /// To whom and why, if it is still to be said.
+    pub(super) due: Option<(IpAddr, Reason)>,
+    /// Not before this time again, ns.
+    pub(super) not_before_ns: u64,
+    pub(super) told: Option<(IpAddr, Mismatch)>,
+    pub(super) told_ns: u64,
+    pub(super) last_ns: u64,
 }
 
 /// A life that is over.

@@ -11,18 +11,6 @@ use std::net::IpAddr;
 /// After so long without another, a refusal is over; the next is told anew.
 const OVER_NS: u64 = 5_000_000_000;
 
-/// Refusals to one address.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Refusing {
-    /// To whom and why, if it is still to be said.
-    due: Option<(IpAddr, Reason)>,
-    /// Not before this time again, ns.
-    not_before_ns: u64,
-    told: Option<(IpAddr, Mismatch)>,
-    told_ns: u64,
-    last_ns: u64,
-}
-
 impl Inbound {
     pub(crate) fn peer_at(&self, source: IpAddr) -> Option<NodeIndex> {
         self.settings.node_at(source).filter(|node| *node != self.settings.own)

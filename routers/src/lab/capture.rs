@@ -44,15 +44,21 @@ pub struct Capture {
     frame: Box<[u8]>,
 }
 
-impl Capture {
-    pub(super) fn new(lab: &Lab) -> Result<Self, LabError> {
+impl Lab {
+    /// Begins to watch what crosses the bridge.
+    ///
+    /// # Errors
+    /// When the system does not allow it.
+    pub fn capture(&self) -> Result<Capture, LabError> {
         let socket = {
-            let _inside = lab.enter_bridge()?;
+            let _inside = self.enter_bridge()?;
             open().map_err(|error| LabError::Device("watch the bridge".into(), error))?
         };
-        Ok(Self { socket, ahead_ns: realtime_ns() - monotonic_ns(), frame: vec![0; FRAME_BYTES].into() })
+        Ok(Capture { socket, ahead_ns: realtime_ns() - monotonic_ns(), frame: vec![0; FRAME_BYTES].into() })
     }
+}
 
+impl Capture {
     /// Hands out each UDP datagram that has crossed since. Never waits.
     pub fn drain(&mut self, mut seen: impl FnMut(Crossing<'_>)) {
         let ahead_ns = self.ahead_ns;

@@ -13,13 +13,16 @@
 
 mod beyond;
 mod capture;
+mod error;
 mod namespace;
 pub mod stalls;
 
 pub use capture::{Capture, Crossing};
+pub use error::LabError;
 pub use namespace::{Inside, become_able};
 
 use crate::netlink::{Device, End};
+use error::RUNS_WITHIN;
 use namespace::Namespace;
 use std::io;
 use std::net::IpAddr;
@@ -34,8 +37,6 @@ const LOOPBACK: Device = 1;
 const LAN: Device = 2;
 const BRIDGE: Device = 2;
 const FIRST_PORT: Device = 3;
-/// The kernel notices within a second that a link works.
-const RUNS_WITHIN: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(2);
 
 /// A node of a lab.
@@ -45,46 +46,6 @@ pub struct NodeSpec {
     pub name: String,
     /// Its address; those of all nodes are of one kind.
     pub address: IpAddr,
-}
-
-/// Why a lab cannot be, or cannot do something.
-#[derive(Debug, thiserror::Error)]
-pub enum LabError {
-    /// The system lets us make no namespaces.
-    #[error(
-        "network namespaces cannot be made here ({0}); run it as root, or let users make namespaces: \
-         sysctl -w user.max_user_namespaces=10000 user.max_net_namespaces=10000 kernel.apparmor_restrict_unprivileged_userns=0; in a container, start it with --privileged"
-    )]
-    NotAllowed(io::Error),
-    /// See [`become_able`].
-    #[error("a user namespace must be entered before there is a second thread; call `become_able` first of all")]
-    Threads,
-    /// A namespace.
-    #[error("{0}: {1}")]
-    Namespace(&'static str, io::Error),
-    /// A device, an address.
-    #[error("lab: cannot {0}: {1}{hint}", hint = hint(.1))]
-    Device(String, io::Error),
-    /// No node of this name.
-    #[error("the lab has no node `{0}`; its nodes are {1}")]
-    NoNode(String, String),
-    /// The kernel never said that it carries packets.
-    #[error("lab: the link of node `{0}` does not work after {RUNS_WITHIN:?}")]
-    NoCarrier(String),
-    /// A program.
-    #[error("cannot start {0}: {1}")]
-    Start(String, io::Error),
-}
-
-/// What would help.
-fn hint(error: &io::Error) -> &'static str {
-    match error.kind() {
-        io::ErrorKind::Unsupported => "; the kernel needs its modules `bridge` and `veth`: modprobe bridge veth",
-        _ if error.raw_os_error() == Some(nix::libc::EAFNOSUPPORT) => {
-            "; this kernel does not have this kind of address"
-        }
-        _ => "",
-    }
 }
 
 /// Nodes in namespaces. Dropping it, and ending all that runs in it, removes everything.
@@ -158,14 +119,6 @@ impl Lab {
     /// When the system does not allow it.
     pub fn enter_bridge(&self) -> Result<Inside, LabError> {
         self.hub.enter()
-    }
-
-    /// Begins to watch what crosses the bridge.
-    ///
-    /// # Errors
-    /// When the system does not allow it.
-    pub fn capture(&self) -> Result<Capture, LabError> {
-        Capture::new(self)
     }
 
     /// Starts a program on a node. Its parent is this thread: what it asks to be told of its parent's death, it is told of this thread's.

@@ -2,12 +2,12 @@
 
 use super::{DIRECT_HEAD_BYTES, Outbound, Package, Peer, is_stale};
 use crate::broken::broken;
+use crate::counts::Cause;
 use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
 use crate::queue::Place;
 use crate::report::Report;
 use crate::settings::Settings;
-use crate::stats::Cause;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 
 /// Where nothing is sealed, the first datagram to a peer is doubted: if nothing else goes to it within this time, it is told once more.

@@ -9,14 +9,16 @@
 
 use crate::admission::capped;
 use crate::broken::broken;
+use crate::counts::Cause;
 use crate::frame::{self, Fragment, Kind, NodeIndex};
 use crate::link::State;
 use crate::queue::{Place, Queue, Waiting};
 use crate::report::Report;
 use crate::security::Acquaintances;
-use crate::settings::{LEVELS, Settings};
-use crate::stats::{Cause, Stats};
+use crate::settings::Settings;
+use crate::stats::Stats;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 mod datagram;

@@ -13,8 +13,8 @@ use crate::broken::broken;
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
 use crate::queue::Waiting;
 use crate::report::Report;
-use crate::settings::LEVELS;
 use rohrpost_mailbox::Priority;
+use rohrpost_network::LEVELS;
 
 impl Outbound {
     /// What leaves next in a time slot: for whom, and how many bytes of the buffer; none when nothing is left that may. `room_bytes` is

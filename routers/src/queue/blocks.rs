@@ -1,10 +1,7 @@
 //! Memory in blocks of one size: a body is a chain of them, written once and read once, front to back.
 
-use crate::report::BEGINNING_BYTES;
-
 /// Bytes of a block: what is told of a lost package lies in its first.
-pub(super) const BLOCK_BYTES: usize = BEGINNING_BYTES;
-const _: () = assert!(BLOCK_BYTES as u64 == rohrpost_config::wire::KEPT_IN_BYTES);
+pub(super) const BLOCK_BYTES: usize = rohrpost_network::KEPT_IN_BYTES as usize;
 const NONE: u32 = u32::MAX;
 
 /// All blocks.

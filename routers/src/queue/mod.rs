@@ -19,12 +19,12 @@ mod shares;
 
 use crate::broken::broken;
 use crate::frame::NodeIndex;
-use crate::settings::LEVELS;
 use blocks::{BLOCK_BYTES, Blocks, Chain};
 use hints::Hints;
 use list::{List, Lists};
-use rohrpost_config::NODES_MAX;
 use rohrpost_mailbox::{Head, Kind, Options};
+use rohrpost_network::LEVELS;
+use rohrpost_network::NODES_MAX;
 pub use shares::Share;
 use shares::Shares;
 

@@ -2,7 +2,7 @@
 
 use super::hello::Hello;
 use super::keys::{Binding, End, KeyRing, Purpose};
-use super::seal::{self, Seal, TAG_BYTES};
+use super::seal::{self, Seal};
 use super::tally::Rejections;
 use super::{HELLO_BYTES, HELLO_DATAGRAM_BYTES};
 use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
@@ -283,8 +283,7 @@ impl Acquaintances {
 }
 
 const _: () = {
-    assert!(HELLO_DATAGRAM_BYTES == HEAD_BYTES + HELLO_BYTES + TAG_BYTES);
-    assert!(rohrpost_config::NODES_MAX <= 64, "peers are the bits of a word");
+    assert!(rohrpost_network::NODES_MAX <= 64, "peers are the bits of a word");
 };
 
 /// A life that one thread writes and others read, whole. Who reads while it is written gets nothing, and goes on with what it had.

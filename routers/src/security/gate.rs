@@ -3,7 +3,8 @@
 
 use super::acquaintances::{Acquaintances, Port};
 use super::greeter::Greeter;
-use super::opening::{Greeting, NotOpened, Opened, Opening, Rejection};
+use super::opening::{Greeting, Opened, Opening};
+use super::rejection::{NotOpened, Rejection};
 use super::tally::Tally;
 use crate::frame::{self, BadFrame, FrameHead, NodeIndex};
 use crate::inbound::{Came, Inbound};

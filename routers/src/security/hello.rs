@@ -7,8 +7,7 @@
 //!  last word    0          b       I do
 //! ```
 
-/// Bytes of it.
-pub const HELLO_BYTES: usize = 32;
+pub use rohrpost_network::HELLO_BYTES;
 
 /// "This life of mine asks whether you live", the answer to that, or the last word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

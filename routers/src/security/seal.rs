@@ -2,9 +2,7 @@
 
 use crate::frame::{self, HEAD_BYTES};
 use ring::aead::{Aad, LessSafeKey, NONCE_LEN, Nonce};
-
-/// Bytes behind what is sealed.
-pub const TAG_BYTES: usize = 16;
+pub use rohrpost_network::TAG_BYTES;
 
 /// ChaCha20-Poly1305: as quick on a board without instructions for AES, and without tables that caches tell of.
 pub(super) struct Seal(LessSafeKey);

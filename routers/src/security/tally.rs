@@ -1,8 +1,8 @@
 //! What was not taken, counted by cause; told once a second at most.
 
-use super::opening::Rejection;
+use super::rejection::Rejection;
+use crate::counts::Count;
 use crate::frame::NodeIndex;
-use crate::stats::Count;
 use std::sync::Arc;
 
 /// Of each node something is told so often at most, ns; of all addresses that no node has together, too.

@@ -1,7 +1,7 @@
 //! What one end of sessions counts: every package comes, and passes, is replaced by a newer one, or is lost with a cause.
 
+use crate::counts::{self, Count};
 use crate::report::NotDelivered;
-use crate::stats::{self, Count};
 use rohrpost_mailbox::Priority;
 
 /// Why a package was lost at one end of a session.
@@ -74,18 +74,18 @@ impl Cause {
     }
 
     /// What the sender of a command is told, in the words of a router on the LAN. None: nothing, since who is told may not be who sent it.
-    pub const fn told(self) -> Option<stats::Cause> {
+    pub const fn told(self) -> Option<counts::Cause> {
         Some(match self {
-            Self::NoRoute | Self::Hops => stats::Cause::NoRoute,
-            Self::Full | Self::Share => stats::Cause::Quota,
-            Self::Stale => stats::Cause::Stale,
-            Self::Gone | Self::Offline => stats::Cause::Silent,
+            Self::NoRoute | Self::Hops => counts::Cause::NoRoute,
+            Self::Full | Self::Share => counts::Cause::Quota,
+            Self::Stale => counts::Cause::Stale,
+            Self::Gone | Self::Offline => counts::Cause::Silent,
             Self::Foreign => return None,
-            Self::NoMailbox => stats::Cause::NoMailbox,
-            Self::MailboxFull => stats::Cause::MailboxFull,
-            Self::TooLarge => stats::Cause::TooLarge,
-            Self::NotAllowed => stats::Cause::NotAllowed,
-            Self::RoutersOwn => stats::Cause::RoutersOwn,
+            Self::NoMailbox => counts::Cause::NoMailbox,
+            Self::MailboxFull => counts::Cause::MailboxFull,
+            Self::TooLarge => counts::Cause::TooLarge,
+            Self::NotAllowed => counts::Cause::NotAllowed,
+            Self::RoutersOwn => counts::Cause::RoutersOwn,
         })
     }
 }

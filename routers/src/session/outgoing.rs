@@ -13,8 +13,8 @@ use super::counts::Cause;
 use super::frame::{Carried, HEAD_BYTES, Message};
 use crate::broken::broken;
 use crate::queue::{Place, Queue, Share, Waiting, counts_newest};
-use crate::settings::LEVELS;
 use rohrpost_mailbox::Head;
+use rohrpost_network::LEVELS;
 
 /// Bytes that are made ready at a time, at most: what is more important than they are waits for no more. One frame may exceed it.
 pub const BATCH_BYTES: usize = 16 * 1024;

@@ -1,11 +1,12 @@
 //! The answers that senders of undeliverable commands get: so they need not wait for their timeout, and learn why.
 
 use super::ways::Ways;
+use crate::counts::Cause;
 use crate::frame::NodeIndex;
 use crate::link::State;
 use crate::report::Mismatch;
 use crate::settings::Settings;
-use crate::stats::{Cause, Stats};
+use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Kind, Name, Options, Participant, Type, monotonic_ns};
 use std::sync::Arc;
 

@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use crate::frame::{FrameHead, HEAD_BYTES};
     use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-    use rohrpost_config::NODES_MAX;
+    use rohrpost_network::NODES_MAX;
     use std::net::{Ipv4Addr, Ipv6Addr, UdpSocket};
     use std::time::Duration;
 

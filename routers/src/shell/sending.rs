@@ -3,10 +3,11 @@
 use super::answers::Answers;
 use super::failure::Failure;
 use super::wire::Wire;
+use crate::counts::Cause;
 use crate::frame::NodeIndex;
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
 use crate::report::Report;
-use crate::stats::{Cause, Stats};
+use crate::stats::Stats;
 use rohrpost_mailbox::{Head, monotonic_ns};
 use std::io::IoSlice;
 use std::sync::Arc;

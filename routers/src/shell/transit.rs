@@ -1,7 +1,8 @@
 //! The router's mailbox: its name, its shape, and the names for which packages go there.
 
-use rohrpost_config::{Route, TRANSIT};
+use rohrpost_config::TRANSIT;
 use rohrpost_mailbox::{Name, Shape, local};
+use rohrpost_network::Route;
 
 /// The ranges of names that lie on other nodes, as the mailboxes of a node want them; neighbours become one.
 pub(super) fn ranges(routes: &[Route]) -> Vec<(Name, Name)> {

@@ -10,15 +10,15 @@
 use super::threads::Shared;
 use super::ways::Ways;
 use crate::admission::{Addresses, Admission, PACKET, PACKET_PRIORITY, TUNNEL};
+use crate::counts::Count;
 use crate::frame::NodeIndex;
 use crate::netlink::Netlink;
 use crate::outbound::DIRECT_HEAD_BYTES;
 use crate::settings::{QUOTA_BYTES_MIN, Settings};
-use crate::stats::Count;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use rohrpost_config::Tunnel;
-use rohrpost_config::wire::KEPT_IN_BYTES;
 use rohrpost_mailbox::{CreateError, Head, Name, Participant, Receiver, Shape, sys};
+use rohrpost_network::KEPT_IN_BYTES;
+use rohrpost_network::Tunnel;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::net::IpAddr;

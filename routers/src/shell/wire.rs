@@ -14,9 +14,9 @@ use crate::frame::NodeIndex;
 use crate::impair::{self, Impairment};
 use crate::security::{Sealing, TAG_BYTES};
 use crate::settings::Settings;
-use rohrpost_config::Tdma;
-use rohrpost_config::wire::HAND_OVER;
 use rohrpost_mailbox::monotonic_ns;
+use rohrpost_network::HAND_OVER;
+use rohrpost_network::Tdma;
 use std::io::IoSlice;
 use std::sync::Arc;
 

@@ -12,9 +12,9 @@ use super::table::Table;
 use super::times::Times;
 use super::wire::Wire;
 use crate::frame::NodeIndex;
-use crate::settings::LEVELS;
 use crate::time::Term;
 use rohrpost_mailbox::{Head, Name, Priority, local};
+use rohrpost_network::LEVELS;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 

@@ -4,8 +4,8 @@ use super::chance::Chance;
 use super::divided::Divisions;
 use super::plan::{DRAIN_NS, Flow, MS, Plan, S};
 use super::slots::{AROUND_BYTES, node_bytes_s};
-use rohrpost_config::wire::HAND_OVER;
 use rohrpost_mailbox::{HEAD_BYTES, Name, local};
+use rohrpost_network::HAND_OVER;
 
 /// By then all nodes have system time.
 const BEGIN_NS: u64 = 3 * S / 2;

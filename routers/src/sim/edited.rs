@@ -4,7 +4,7 @@ use super::chance::Chance;
 use super::plan::{Fault, MS, Plan, Planned, S, US};
 use super::slots::Slots;
 use crate::frame::NodeIndex;
-use rohrpost_config::TimeSlot;
+use rohrpost_network::TimeSlot;
 use std::time::Duration;
 
 /// Edited files of a network.

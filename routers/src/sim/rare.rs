@@ -3,7 +3,7 @@
 use super::chance::Chance;
 use super::plan::{Fault, MS, Plan, Planned, S};
 use super::slots::node_bytes_s;
-use rohrpost_config::TimeSlot;
+use rohrpost_network::TimeSlot;
 
 /// From one slot of a node to its next.
 const RARE_NS: u64 = 500 * MS;

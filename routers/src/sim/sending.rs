@@ -4,12 +4,12 @@ use super::book::{Book, Promise, Way};
 use super::clock::Now;
 use super::plan::{MS, Shape};
 use super::table::Table;
+use crate::counts::Cause;
 use crate::frame::Frame;
 use crate::intake::MAKING_NS;
 use crate::outbound::WAIT_MAX_NS;
-use crate::settings::LEVELS;
-use crate::stats::Cause;
 use rohrpost_mailbox::{Head, Name};
+use rohrpost_network::LEVELS;
 use std::collections::BTreeSet;
 
 /// Packages that one life of a router has to account for.

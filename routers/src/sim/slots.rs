@@ -9,8 +9,8 @@ use crate::frame::NodeIndex;
 use crate::security::TAG_BYTES;
 use crate::tdma::GATE_NS;
 use crate::time::{JOINING_SYNCS, TIME_BYTES, Term};
-use rohrpost_config::wire::HAND_OVER;
-use rohrpost_config::{Tdma, TimeSlot};
+use rohrpost_network::HAND_OVER;
+use rohrpost_network::{Tdma, TimeSlot};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -244,7 +244,7 @@ fn table(plan: &Plan, link_bytes_s: u64, chance: &mut Chance) -> Tdma {
         let sends_ns = frames_in_slot * time_ns + datagram_ns * chance.between(1, 4) + chance.between(60, 120) * US;
         let (offset, length) = (Duration::from_nanos(begin_ns), Duration::from_nanos(guard_ns + sends_ns));
         let period = turns.len() as u32;
-        let slot = |(phase, node): (u32, &u8)| TimeSlot { node: *node, offset, length, period, phase, line: 0 };
+        let slot = |(phase, node): (u32, &u8)| TimeSlot { node: *node, offset, length, period, phase };
         slots.extend((0..).zip(&turns).map(slot));
         end_ns = begin_ns + guard_ns + sends_ns;
     }
@@ -256,7 +256,6 @@ fn table(plan: &Plan, link_bytes_s: u64, chance: &mut Chance) -> Tdma {
         link_bytes_s,
         slots,
         tunnel: None,
-        line: 0,
     }
 }
 

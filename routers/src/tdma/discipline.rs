@@ -3,7 +3,7 @@
 use super::GATE_NS;
 use super::lead::Lead;
 use super::permit::{Carries, Permit};
-use super::table::{Kind, Table, Window};
+use super::table::{Kind, Table, UNPROVEN_CYCLES, Window};
 use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::{Clock, JOINING_SYNCS, Reckoning, Role, Stamp, SyncCounts, TIME_BYTES, Unsteady};
@@ -134,9 +134,6 @@ pub struct Counts {
     /// What was sent and heard of synchronisation.
     pub syncs: SyncCounts,
 }
-
-/// By the time of who has not shown that it lives a hello leaves in one of so many cycles: that time may be any.
-pub const UNPROVEN_CYCLES: u64 = 4;
 
 /// Says when this node sends. Holds no clock: that is asked each time.
 #[derive(Debug)]

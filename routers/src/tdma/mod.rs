@@ -13,7 +13,7 @@
 //!
 //! # What is assumed
 //! That frames are sent in the order and at the time in which they are handed over, save for the *lead*, which is measured; that
-//! [`Tdma::link_bytes_s`](rohrpost_config::Tdma::link_bytes_s) is true of all links; and of coarse time that the quickest of
+//! [`Tdma::link_bytes_s`](rohrpost_network::Tdma::link_bytes_s) is true of all links; and of coarse time that the quickest of
 //! the last eight Syncs took no longer than half of the guard.
 //!
 //! A bound is about the time of the master that a node follows. For the few cycles in which a new master is measured, some nodes may still go
@@ -35,12 +35,12 @@ pub mod table;
 mod tests;
 pub mod wire;
 
-pub use discipline::{Counts, Discipline, Next, Planned, Silent, UNPROVEN_CYCLES, Verdict};
+pub use discipline::{Counts, Discipline, Next, Planned, Silent, Verdict};
 pub use permit::{Carries, Permit};
-pub use table::{Kind, Owner, Table, Window};
+pub use table::{Kind, Owner, Table, UNPROVEN_CYCLES, Window};
 pub use wire::Wire;
 
 /// Bounds reckon with slots that are begun so much after their beginning.
-pub const LATE_NS: u64 = rohrpost_config::LATE.as_nanos() as u64;
+pub const LATE_NS: u64 = rohrpost_network::LATE.as_nanos() as u64;
 /// A slot whose wake-up comes so much after its beginning is not used.
-pub const GATE_NS: u64 = rohrpost_config::GATE.as_nanos() as u64;
+pub const GATE_NS: u64 = rohrpost_network::GATE.as_nanos() as u64;

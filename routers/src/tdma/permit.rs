@@ -5,7 +5,7 @@ use super::table::{Kind, Window};
 use super::wire::Wire;
 use crate::broken::broken;
 use crate::time::Allowed;
-use rohrpost_config::wire::HAND_OVER;
+use rohrpost_network::HAND_OVER;
 
 /// What a window may be used for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -9,14 +9,16 @@
 //! A *window* is what one node may send in, without a pause: that of its synchronisation, or a slot. Here it ends where its guard begins.
 //! The owner of the table has seen to it that windows do not overlap (`rohrpost check`).
 
-use super::discipline::UNPROVEN_CYCLES;
 use super::wire::Wire;
 use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::InSlots;
-use rohrpost_config::Tdma;
-use rohrpost_config::wire::TimeShare;
+use rohrpost_network::Tdma;
+use rohrpost_network::TimeShare;
 use std::time::Duration;
+
+/// By the time of who has not shown that it lives a hello leaves in one of so many cycles: that time may be any.
+pub const UNPROVEN_CYCLES: u64 = 4;
 
 /// What a window is for.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]

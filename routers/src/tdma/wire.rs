@@ -1,17 +1,10 @@
 //! What datagrams take of a link.
 
-use crate::time::TIME_BYTES;
-use rohrpost_config::Tdma;
-use rohrpost_config::wire::{self, ETHERNET_BYTES};
+use rohrpost_network::{ETHERNET_BYTES, Tdma};
 
 /// The smallest packet that Ethernet carries; a smaller one is filled up.
 pub const PACKET_BYTES_MIN: usize = 46;
 const SECOND_NS: u128 = 1_000_000_000;
-
-const _: () = assert!(
-    wire::FRAME_HEAD_BYTES + wire::TIME_BYTES == TIME_BYTES,
-    "bounds are computed with the datagrams that clocks send"
-);
 
 /// A link, and what stands before each datagram on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,7 +1,5 @@
 //! Mistakes that can be switched on, to see that the tests and the simulation notice them.
 
-use super::Clock;
-
 /// A mistake.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Broken {
@@ -32,23 +30,4 @@ impl Broken {
         Self::OldSamples,
         Self::Stubborn,
     ];
-}
-
-impl Clock {
-    /// Makes this mistake from now on.
-    #[cfg(any(test, feature = "broken-variants"))]
-    pub fn break_it(&mut self, broken: Broken) {
-        self.broken = Some(broken);
-    }
-
-    #[cfg(any(test, feature = "broken-variants"))]
-    pub(super) fn is(&self, broken: Broken) -> bool {
-        self.broken == Some(broken)
-    }
-
-    #[cfg(not(any(test, feature = "broken-variants")))]
-    #[allow(clippy::unused_self, reason = "the same as with mistakes")]
-    pub(super) const fn is(&self, _: Broken) -> bool {
-        false
-    }
 }

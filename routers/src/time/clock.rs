@@ -1,6 +1,7 @@
 //! A node's part in keeping time: what the thread with the socket hands it and asks of it.
 
 mod master;
+mod mistaken;
 mod other_tables;
 mod overhearing;
 mod slave;

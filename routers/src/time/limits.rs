@@ -1,5 +1,7 @@
 //! What bounds assume of the clocks of computers, in one place. Who keeps them is watched: see `steadiness`.
 
+use rohrpost_network::RATE_MAX_PER;
+
 /// What a computer's clock does at most.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ClockLimits {
@@ -20,7 +22,7 @@ pub struct ClockLimits {
 
 /// They are assumed of all.
 pub const LIMITS: ClockLimits = ClockLimits {
-    rate_ppb: 250_000,
+    rate_ppb: 1_000_000_000 / RATE_MAX_PER as i64,
     wander_ppb_s: 500,
     slewed_ppb: 200_000,
     slewed_change_ppb: 30_000,
@@ -28,8 +30,5 @@ pub const LIMITS: ClockLimits = ClockLimits {
     slept_ns: 5_000_000,
 };
 
-// Who judges tables of slots counts on it.
-const _: () = {
-    assert!(LIMITS.rate_ppb * rohrpost_config::wire::RATE_MAX_PER as i64 == 1_000_000_000);
+const _: () =
     assert!(LIMITS.slewed_ppb < LIMITS.rate_ppb, "what is allowed for good is a part of what clocks may be off");
-};

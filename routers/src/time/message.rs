@@ -14,9 +14,8 @@
 
 use super::Term;
 use crate::frame::{BadFrame, Kind};
+pub use rohrpost_network::TIME_BYTES as MESSAGE_BYTES;
 
-/// Bytes behind the frame's head.
-pub const MESSAGE_BYTES: usize = 72;
 /// Times lie before the year 2262, so that differences of two fit in 64 bits.
 const TIME_MAX_NS: u64 = i64::MAX as u64;
 

@@ -86,10 +86,10 @@ pub use types::{Exchange, Ignored, InSlots, Reading, Role, SentId, Step, SyncCou
 /// The bound of a node that does not know the time.
 pub use rohrpost_mailbox::ERROR_UNKNOWN_NS as UNSYNCHRONISED_NS;
 
-use crate::frame::HEAD_BYTES;
+use rohrpost_network::{BEND_MAX_PER, FRAME_HEAD_BYTES};
 
 /// Bytes of each datagram of time.
-pub const TIME_BYTES: usize = HEAD_BYTES + message::MESSAGE_BYTES;
+pub const TIME_BYTES: usize = FRAME_HEAD_BYTES + rohrpost_network::TIME_BYTES;
 /// See [`ClockLimits::rate_ppb`].
 pub const RATE_MAX_PPB: i64 = LIMITS.rate_ppb;
 /// See [`ClockLimits::wander_ppb_s`].
@@ -97,9 +97,7 @@ pub const WANDER_PPB_S: i64 = LIMITS.wander_ppb_s;
 /// From so far on a node steps instead of slewing, which is a new epoch for all.
 pub const STEP_MIN_NS: u64 = 5_000_000;
 /// Pace may differ so much from the rate while slewing, ns a second: 5 ms take 5 s.
-pub const SLEW_MAX_PPB: i64 = 1_000_000;
-// Who computes bounds counts on both.
-const _: () = assert!(SLEW_MAX_PPB * rohrpost_config::wire::BEND_MAX_PER as i64 == 1_000_000_000);
+pub const SLEW_MAX_PPB: i64 = 1_000_000_000 / BEND_MAX_PER as i64;
 /// Silence of a master, in half intervals, until the first of the others takes over.
 pub const TAKEOVER_HALF_INTERVALS: u64 = 7;
 

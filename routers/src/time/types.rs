@@ -128,7 +128,7 @@ pub struct Exchange {
     pub by_kernel: bool,
 }
 
-/// What a clock in time slots has to know of them; see [`TimeShare`](rohrpost_config::wire::TimeShare).
+/// What a clock in time slots has to know of them; see [`TimeShare`](rohrpost_network::TimeShare).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct InSlots {
     /// A warm-up goes before each Sync.

@@ -1,7 +1,7 @@
 //! Two nodes in one process, each with its router, at addresses of the loopback.
 
-use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
+use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
@@ -57,14 +57,8 @@ pub(crate) struct Side {
 #[allow(dead_code, reason = "each test uses a part")]
 pub(crate) fn turns() -> Tdma {
     let us = Duration::from_micros;
-    let slot = |node: u8| TimeSlot {
-        node,
-        offset: us(1000 + 2000 * u64::from(node)),
-        length: us(2000),
-        period: 1,
-        phase: 0,
-        line: 0,
-    };
+    let slot =
+        |node: u8| TimeSlot { node, offset: us(1000 + 2000 * u64::from(node)), length: us(2000), period: 1, phase: 0 };
     Tdma {
         cycle: us(5000),
         synchronisation: us(1000),
@@ -72,7 +66,6 @@ pub(crate) fn turns() -> Tdma {
         link_bytes_s: 125_000_000,
         slots: vec![slot(0), slot(1)],
         tunnel: None,
-        line: 0,
     }
 }
 

@@ -7,11 +7,11 @@ pub(crate) mod process;
 pub(crate) mod relay;
 pub(crate) mod talk;
 
-use rohrpost_config::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
 use rohrpost_mailbox::{
     HEAD_BYTES, Head, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, TimeRecord, Type,
     monotonic_ns, realtime_ns,
 };
+use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::frame::{Alive, FrameHead, Kind};
 use rohrpost_routers::impair;
@@ -39,14 +39,8 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 /// Slots of 1 ms in a cycle of 10 ms; guards are wide, since all nodes share the processors of one computer with its other work.
 pub(crate) fn table() -> Tdma {
     let us = Duration::from_micros;
-    let slot = |node: u8| TimeSlot {
-        node,
-        offset: us(3000 + 2000 * u64::from(node)),
-        length: us(1000),
-        period: 1,
-        phase: 0,
-        line: 0,
-    };
+    let slot =
+        |node: u8| TimeSlot { node, offset: us(3000 + 2000 * u64::from(node)), length: us(1000), period: 1, phase: 0 };
     Tdma {
         cycle: us(10_000),
         synchronisation: us(1000),
@@ -54,7 +48,6 @@ pub(crate) fn table() -> Tdma {
         link_bytes_s: 125_000_000,
         slots: (0..NODES).map(slot).collect(),
         tunnel: None,
-        line: 0,
     }
 }
 

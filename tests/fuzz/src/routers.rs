@@ -3,16 +3,17 @@
 
 use crate::frames::checked;
 use crate::split::Bytes;
-use rohrpost_config::{Network, Route, Security};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
+use rohrpost_network::{Network, Route, Security};
 use rohrpost_routers::admission::Admission;
+use rohrpost_routers::counts::{Cause, Side};
 use rohrpost_routers::fragment::PARTIAL_MAX;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
 use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
 use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
 use rohrpost_routers::settings::{NodeSettings, Settings};
-use rohrpost_routers::stats::{Cause, Side, Stats};
+use rohrpost_routers::stats::Stats;
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
 

@@ -1,21 +1,20 @@
 //! Whether every flow keeps its deadline with a table, and what waits has room.
 
-use super::{Judge, round_up};
-use crate::bounds::{self, FlowBound, Unbounded};
+use super::{Judge, period_text};
 use crate::flow::Flow;
-use crate::network::{TRANSIT, TRANSIT_LOOK};
+use crate::network::TRANSIT;
 use crate::units::{duration_decimal, size_text};
-use crate::wire::KEPT_IN_BYTES;
+use rohrpost_network::{FlowBound, KEPT_IN_BYTES, Remedy, TAKEN_BEFORE, TRANSIT_LOOK, Unbounded, round_up};
 use std::time::Duration;
 
 impl Judge<'_> {
     /// No flow publishes so quickly that a package could not even be sure of a slot that begins when the next one comes.
     pub(super) fn periods_of_flows(&self) {
         let node = |name| self.installation.node_of(name);
-        let is_too_quick = |flow: &Flow| flow.period < bounds::TAKEN_BEFORE && node(flow.from) != node(flow.to);
+        let is_too_quick = |flow: &Flow| flow.period < TAKEN_BEFORE && node(flow.from) != node(flow.to);
         let flows = self.installation.flows.iter().enumerate();
         for (index, flow) in flows.filter(|(_, flow)| is_too_quick(flow)) {
-            let right = bounds::slower(self.installation, self.tdma, index, is_too_quick).map_or_else(
+            let right = self.plan.slower(self.tdma, index, |other| other.period < TAKEN_BEFORE).map_or_else(
                 || "a longer `period`".into(),
                 |period| format!("`period = \"{}\"`", duration_decimal(period)),
             );
@@ -26,7 +25,7 @@ impl Judge<'_> {
                 text(flow.from),
                 text(flow.to),
                 duration_decimal(flow.period),
-                duration_decimal(bounds::TAKEN_BEFORE),
+                duration_decimal(TAKEN_BEFORE),
                 duration_decimal(self.tdma.cycle)
             );
             self.reader.report(flow.line, message);
@@ -35,7 +34,7 @@ impl Judge<'_> {
 
     /// Each flow keeps its deadline.
     pub(super) fn flows(&self) {
-        for bound in bounds::bounds(self.installation) {
+        for bound in self.plan.bounds(self.tdma) {
             let flow = &self.installation.flows[bound.flow];
             let deadline = duration_decimal(flow.deadline);
             let why = match bound.latency {
@@ -50,7 +49,7 @@ impl Judge<'_> {
                 Err(Unbounded::NotRealTime) => {
                     "give the module that sends or subscribes a class from `bulk-below` of [network] up".into()
                 }
-                _ => bounds::remedy(self.installation, self.tdma, bound.flow),
+                _ => self.remedy(bound.flow),
             };
             let text = |name| self.installation.classes.format(name);
             let what = format!("[[flow]] from `{}` to `{}`", text(flow.from), text(flow.to));
@@ -58,10 +57,40 @@ impl Judge<'_> {
         }
     }
 
+    /// What to write so that a flow keeps its deadline.
+    fn remedy(&self, flow: usize) -> String {
+        match self.plan.remedy(self.tdma, flow) {
+            Remedy::Longer(slot, longer) => {
+                let by = duration_decimal(longer.length - self.tdma.slots[slot].length);
+                let (whose, length) = (self.whose(slot), duration_decimal(longer.length));
+                format!("lengthen {whose} by {by}: `length = \"{length}\"`")
+            }
+            Remedy::Oftener(slot, oftener) => {
+                let period = period_text(&oftener, &self.tdma.slots[slot]);
+                format!("let {} come oftener: {period}", self.whose(slot))
+            }
+            Remedy::Another(slot) => {
+                let (offset, length) = (duration_decimal(slot.offset), duration_decimal(slot.length));
+                let node = self.node_name(slot.node);
+                format!("add a [[slot]]: `node = \"{node}\"`, `offset = \"{offset}\"`, `length = \"{length}\"`")
+            }
+            Remedy::Later(deadline) => {
+                format!("no change of one slot suffices; allow `deadline = \"{}\"`", duration_decimal(deadline))
+            }
+            Remedy::Slower(period) => {
+                let period = period.map(duration_decimal).map_or_else(
+                    || "a longer `period`".into(),
+                    |period| format!("`period = \"{period}\"` and a `deadline` no shorter"),
+                );
+                format!("no change of one slot suffices; write a smaller `size`, or {period}, or let others send less")
+            }
+        }
+    }
+
     /// Of each flow one package may wait: it is there before the next. All those of a module have room, since what gives way has no bound.
     pub(super) fn quotas(&self) {
         let quota = self.installation.network.map_or(usize::MAX, |network| network.quota_bytes) as u64;
-        let flows = bounds::bounds(self.installation).into_iter().map(|bound| &self.installation.flows[bound.flow]);
+        let flows = self.plan.bounds(self.tdma).into_iter().map(|bound| &self.installation.flows[bound.flow]);
         let flows: Vec<_> = flows.collect();
         for module in &self.installation.modules {
             let own = || flows.iter().filter(|flow| module.names().any(|name| name == flow.from));
@@ -83,7 +112,7 @@ impl Judge<'_> {
     /// Of the flows of a node as many packages may wait for its slots at once as the mailbox of its router holds: either all that can be
     /// under way, or, since the router takes all when more than half of the mailbox is full, what comes between two looks at it.
     pub(super) fn mailboxes(&self) {
-        let bounds = bounds::bounds(self.installation);
+        let bounds = self.plan.bounds(self.tdma);
         for (index, node) in (0..).zip(self.installation.lan_nodes()) {
             let is_own = |bound: &&FlowBound| {
                 let from = self.installation.flows[bound.flow].from;

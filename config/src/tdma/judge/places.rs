@@ -1,8 +1,8 @@
 //! Where slots are and how long: each lies in the cycle, behind synchronisation, and alone, and each node has one.
 
 use super::Judge;
-use crate::tdma::TimeSlot;
 use crate::units::duration_decimal;
+use rohrpost_network::TimeSlot;
 use std::time::Duration;
 
 impl Judge<'_> {
@@ -37,7 +37,7 @@ impl Judge<'_> {
                 let right = self.moved_or_shorter(index);
                 self.report(index, format!("begins when the cycle of {} is over; {right}", duration_decimal(cycle)));
             } else if slot.offset < begin && begin < cycle {
-                let masters = self.masters().len();
+                let masters = self.masters();
                 let windows = if masters == 1 {
                     "the synchronisation window of the master, which ends".into()
                 } else {
@@ -85,11 +85,14 @@ impl Judge<'_> {
     pub(super) fn nodes(&mut self) {
         let has_one = |index: u8| self.tdma.slots.iter().any(|slot| slot.node == index);
         for (node, index) in self.installation.lan_nodes().iter().zip(0..).filter(|(_, index)| !has_one(*index)) {
-            let master = if self.masters().contains(&index) { ", although it may be master of time" } else { "" };
+            let master = if self.installation.time.masters().contains(&index) {
+                ", although it may be master of time"
+            } else {
+                ""
+            };
             let length = self.length_min();
             let needed = duration_decimal(length);
-            let slot =
-                TimeSlot { node: index, offset: Duration::ZERO, length, period: 1, phase: 0, line: self.tdma.line };
+            let slot = TimeSlot { node: index, offset: Duration::ZERO, length, period: 1, phase: 0 };
             let right = match self.mended.nearest_room(&slot, self.masters()) {
                 Some(offset) => {
                     self.mended.slots.push(TimeSlot { offset, ..slot });

@@ -1,10 +1,10 @@
 //! Peers that begin, fall silent, are started anew, or do not hear us.
 
 use super::*;
+use crate::counts::Cause;
 use crate::harness::address;
 use crate::link::State;
 use crate::report::Event;
-use crate::stats::Cause;
 
 fn data(from: NodeIndex, to: NodeIndex) -> Head {
     head(module(50, to), module(200, from), 90)

@@ -143,7 +143,7 @@ fn check_whole() {
     base.take(START, 1, &parts[0]);
     base.take(START, 1, &arm.send(START, large, b"newer", true).unwrap().1);
     parts[1..].iter().for_each(|part| base.take(START, 1, part));
-    assert_eq!(base.log.causes(), [crate::stats::Cause::Late]);
+    assert_eq!(base.log.causes(), [crate::counts::Cause::Late]);
     base.assert_balanced();
 }
 

@@ -1,13 +1,14 @@
 //! Whose names come from whom, and who may command whom.
 
 use crate::admission::{Access, Admission, PACKET, v4};
+use crate::counts::Cause;
 use crate::frame::{Fragment, FrameHead, Kind};
 use crate::harness::{End, START, address, head, module};
 use crate::inbound::Came;
 use crate::link::State;
-use crate::stats::Cause;
-use rohrpost_config::{self as config, Security, Tunnel};
+use rohrpost_config::{self as config};
 use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
+use rohrpost_network::{Security, Tunnel};
 use std::net::Ipv4Addr;
 
 /// A datagram of node 1 with one package: its head, and what follows.

@@ -1,9 +1,9 @@
 //! Two routers and a wire that loses, copies and reorders.
 
 use super::*;
+use crate::counts::Cause;
 use crate::harness::Log;
 use crate::report::NotDelivered;
-use crate::stats::Cause;
 use rohrpost_mailbox::Name;
 use std::collections::HashMap;
 

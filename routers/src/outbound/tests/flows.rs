@@ -2,11 +2,11 @@
 
 use super::slot::table;
 use super::to;
+use crate::counts::Cause;
 use crate::flows::FlowCounts;
 use crate::harness::{ENVELOPE, End, MS, START, flow, module};
 use crate::outbound::{DIRECT_HEAD_BYTES, WAIT_MAX_NS};
 use crate::settings::Settings;
-use crate::stats::Cause;
 use std::time::Duration;
 
 /// Of module 200 to module 50 of node 1: 10 ms, of which 5 are sure.

@@ -1,10 +1,10 @@
 use super::*;
 use crate::broken::{Broken, with};
+use crate::counts::Cause;
 use crate::frame::{Alive, Frame};
 use crate::harness::{ENVELOPE, End, MS, S, START, head, module};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
 use crate::report::Mismatch;
-use crate::stats::Cause;
 use proptest::prelude::*;
 use rohrpost_mailbox::Type;
 

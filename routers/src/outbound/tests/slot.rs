@@ -1,14 +1,14 @@
 //! What leaves in a time slot.
 
 use super::{ids, to};
+use crate::counts::Cause;
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
 use crate::harness::{End, MS, START};
 use crate::link::ALIVE_EVERY_NS;
 use crate::outbound::{DIRECT_HEAD_BYTES, WAIT_MAX_NS};
 use crate::settings::Settings;
-use crate::stats::Cause;
-use rohrpost_config::{Tdma, TimeSlot};
 use rohrpost_mailbox::Priority;
+use rohrpost_network::{Tdma, TimeSlot};
 use std::time::Duration;
 
 /// Slots of node 0 of these lengths, µs, on a wire of 100 Mbit/s.
@@ -19,7 +19,6 @@ pub(super) fn table(lengths_us: &[u64]) -> Tdma {
         length: Duration::from_micros(*length),
         period: 1,
         phase: 0,
-        line: 0,
     };
     Tdma {
         cycle: Duration::from_millis(10),
@@ -28,7 +27,6 @@ pub(super) fn table(lengths_us: &[u64]) -> Tdma {
         link_bytes_s: 12_500_000,
         slots: (0..).zip(lengths_us).map(slot).collect(),
         tunnel: None,
-        line: 0,
     }
 }
 

@@ -7,7 +7,7 @@ use crate::inbound::Came;
 use crate::inbound::TICK_EVERY_NS;
 use crate::link::State;
 use crate::report::{Event, Mismatch};
-use rohrpost_config::Security;
+use rohrpost_network::Security;
 
 struct Router {
     gate: Gate,

@@ -1,8 +1,9 @@
 //! Hello, welcome and refusal: what both ends say of themselves.
 
 use super::fields::Fields;
-use super::{BadFrame, MAGIC, TimeAnswer, VERSION};
+use super::{BadFrame, TimeAnswer, VERSION};
 
+const MAGIC: [u8; 4] = *b"RpTc";
 /// Bytes of a name that people read, at most.
 pub const NAME_BYTES_MAX: usize = 64;
 

@@ -11,11 +11,13 @@
 //! All fields of ours are little-endian; the head of a package is in the order that its own options tell. Each frame is checked once,
 //! as a whole; then no accessor can fail.
 
+mod bad;
 mod carried;
 mod fields;
 mod meeting;
 mod ranges;
 
+pub use bad::{BadFrame, VERSION};
 pub use carried::{Carried, TimeAnswer};
 pub use meeting::{Hello, NAME_BYTES_MAX, Reason, Refusal, Welcome};
 pub use ranges::{Objection, RANGES_MAX, Range, Ranges, Verdict};
@@ -25,8 +27,6 @@ use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES as PACKAGE_HEAD_BYTES};
 
 /// Bytes before what depends on the kind.
 pub const HEAD_BYTES: usize = 8;
-/// The version of this format; the head, the first eight bytes of a hello, and a refusal mean the same in all of them.
-pub const VERSION: u8 = 1;
 /// Bytes behind a frame's head, at most: the largest package, and when it was published.
 pub const LENGTH_MAX: usize = PUBLISHED_BYTES + PACKAGE_HEAD_BYTES + BODY_BYTES_MAX;
 /// The same of who has not said hello.
@@ -35,7 +35,6 @@ pub const GREETING_LENGTH_MAX: usize = 256;
 pub const HOPS_MAX: u8 = 8;
 
 pub(super) const PUBLISHED_BYTES: usize = 8;
-const MAGIC: [u8; 4] = *b"RpTc";
 
 /// What a frame is.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -70,26 +69,6 @@ impl Kind {
         Self::Ask,
         Self::Answer,
     ];
-}
-
-/// Why bytes are no frame of ours; nothing that follows them can be read.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum BadFrame {
-    /// The stream does not begin as one of ours.
-    #[error("no session of Rohrpost; is this the port of its TCP router?")]
-    Foreign,
-    /// TLS (RFC 8446, 5.1), where nothing is sealed.
-    #[error("it speaks TLS; write the same `security` in [tcp] at both ends")]
-    Tls,
-    /// Another version of the format.
-    #[error("session format {theirs}, ours is {VERSION}; run the same version of Rohrpost at both ends", theirs = .0)]
-    Version(u8),
-    /// More than a frame of its kind may have.
-    #[error("a frame of {0} bytes is too long")]
-    TooLong(u32),
-    /// Wrong in itself.
-    #[error("damaged: {0}")]
-    Damaged(&'static str),
 }
 
 /// What each frame begins with.

@@ -1,7 +1,7 @@
 //! What time alone brings about: who is silent, stands still or takes too long; and what waited in vain.
 
 use super::member::{Member, State};
-use super::registering::WORK_SHARE;
+use super::work::WORK_SHARE;
 use super::{Event, Host, Server};
 use crate::broken::broken;
 use crate::session::counts::Cause;

@@ -1,8 +1,8 @@
 //! One connection, as the server knows it.
 
 use super::principal::{Principal, PrincipalId};
-use super::registering::Registrations;
 use super::rights::Rights;
+use super::work::Registrations;
 use crate::session::frame::{Hello, Reason, Verdict};
 use crate::session::outgoing::Outgoing;
 use crate::session::splitter::Splitter;

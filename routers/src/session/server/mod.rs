@@ -15,6 +15,7 @@ mod places;
 mod principal;
 mod registering;
 mod rights;
+mod work;
 
 pub use member::State;
 pub use places::Crowded;
@@ -29,9 +30,9 @@ use super::{Answers, LOOK_EVERY_NS};
 use member::{Member, RoundTrip};
 use places::Places;
 use principal::Principal;
-use registering::Registering;
 use rohrpost_mailbox::TimeRecord;
 use std::collections::VecDeque;
+use work::Registering;
 
 /// What the server knows before the first client.
 #[derive(Clone, Debug)]

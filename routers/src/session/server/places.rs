@@ -9,7 +9,7 @@
 use super::crowd::Crowd;
 use super::member::{Member, State};
 use super::principal::{Principal, Principals};
-use super::registering::WORK_SHARE;
+use super::work::WORK_SHARE;
 use super::{Host, Server};
 use crate::broken::broken;
 use crate::session::ClientIndex;

@@ -6,65 +6,14 @@
 //!            └─ else it waits; a later one takes its place ──▲ at each look, in turn
 //! ```
 
+use super::work::{RANGES_SHARE, REGISTER_EVERY_NS, WORK_MAX, WORK_OF_ONE, Waiting};
 use super::{Event, Host, Server};
 use crate::broken::broken;
-use crate::session::frame::{Objection, RANGES_MAX, Range, Ranges, Reason, Verdict};
+use crate::session::ClientIndex;
+use crate::session::frame::{Objection, Range, Ranges, Reason, Verdict};
 use crate::session::server::member::{Judged, Member};
 use crate::session::table::ENTRIES_MAX;
-use crate::session::{ClientIndex, LOOK_EVERY_NS};
 use rohrpost_mailbox::Name;
-
-/// Of one client's registrations one is looked at in so long.
-const REGISTER_EVERY_NS: u64 = LOOK_EVERY_NS;
-/// Ranges that registrations may bring and replace from one look to the next: a fifth of the thread's time.
-const WORK_MAX: usize = ENTRIES_MAX;
-/// Of these, for one principal: others have their turn beside it.
-pub(super) const WORK_SHARE: usize = WORK_MAX / 8;
-/// What a registration costs besides its ranges, in ranges.
-const WORK_OF_ONE: usize = 16;
-/// Ranges that one principal may have in the table.
-pub(super) const RANGES_SHARE: usize = ENTRIES_MAX / 8;
-const _: () = assert!(2 * RANGES_MAX + WORK_OF_ONE <= WORK_SHARE, "each registration has its turn some time");
-const _: () = assert!(RANGES_MAX <= RANGES_SHARE, "a client that is alone in its share has as many as it may say");
-
-/// What registering costs all others, and what was spared them.
-#[derive(Debug)]
-pub(super) struct Registering {
-    /// Ranges that may still be gone through before the next look.
-    left: usize,
-    /// Whose turn is the first at the next look.
-    first: u16,
-    /// Registrations that a later one of the same client took the place of.
-    pub(super) overtaken: u64,
-}
-
-impl Default for Registering {
-    fn default() -> Self {
-        Self { left: WORK_MAX, first: 0, overtaken: 0 }
-    }
-}
-
-/// Of one client.
-#[derive(Debug, Default)]
-pub(super) struct Registrations {
-    /// The next one is not looked at before, ns.
-    next_ns: u64,
-    waiting: Option<Waiting>,
-    /// Ranges that it hosts.
-    pub(super) ranges: usize,
-}
-
-#[derive(Debug)]
-struct Waiting {
-    number: u32,
-    ranges: Vec<Range>,
-}
-
-impl Registrations {
-    pub(super) fn bytes(&self) -> usize {
-        self.waiting.as_ref().map_or(0, |waiting| waiting.ranges.capacity() * size_of::<Range>())
-    }
-}
 
 impl Server {
     /// Whether a name is to be a client's: its registration waits for its turn, it may host the name, and nobody else does.

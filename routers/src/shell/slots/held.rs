@@ -1,8 +1,8 @@
 //! A datagram that was made for a slot and missed it.
 
 use crate::frame::{Fragment, FrameHead, Kind, NodeIndex};
-use rohrpost_config::{LEVEL_NOT_REAL_TIME, Network};
 use rohrpost_mailbox::Head;
+use rohrpost_network::{LEVEL_NOT_REAL_TIME, Network};
 
 /// It waits for another slot at most so long.
 const HELD_NS_MAX: u64 = 100_000_000;

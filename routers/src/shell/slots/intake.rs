@@ -88,9 +88,9 @@ impl<R: Report, B: Fn() -> u64> Transit for Hands<'_, R, B> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::counts::Cause;
     use crate::harness::{End, S, module};
     use crate::intake::{FEW, LEFT_NS_MIN, MAKING_NS, TAKING_NS, UNTAKEN_NS_MAX};
-    use crate::stats::Cause;
     use rohrpost_mailbox::{HEAD_BYTES, Label, Name, Node, Participant, Sender, Shape, Type};
 
     /// A package of this body takes 50 bytes of a slot.

@@ -1,10 +1,10 @@
 //! What waits for a slot besides time and packages: refusals where nothing is sealed, else hellos.
 
 use super::super::socket::InSocket;
-use super::{Answer, REFUSAL_BYTES, speech};
+use super::speech;
 use crate::frame::{NodeIndex, Reason};
 use crate::inbound::write_refusal;
-use crate::security::{HELLO_SLOT_BYTES, Waiting};
+use crate::security::{HELLO_SLOT_BYTES, Said, Waiting};
 use crate::settings::Settings;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -12,6 +12,19 @@ use std::sync::mpsc::Receiver;
 
 /// Whoever has no number here is refused so often at most.
 const REFUSE_EVERY_NS: u64 = 50_000_000;
+
+/// Room for the longest refusal.
+pub(in crate::shell) const REFUSAL_BYTES: usize = 128;
+/// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a second later.
+pub(in crate::shell) const ANSWERS: usize = 32;
+
+/// What the thread that receives wants to have sent.
+pub(in crate::shell) enum Answer {
+    /// Where nothing is sealed: to whom another configuration or version is refused.
+    Refusal { to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES] },
+    /// Where all is sealed.
+    Hello { said: Said, datagram: [u8; REFUSAL_BYTES] },
+}
 
 /// In the hands of the thread that sends.
 pub(in crate::shell) struct Line {

@@ -19,7 +19,7 @@ mod line;
 mod speech;
 mod state;
 
-pub use granted::Granted;
+pub use granted::{Granted, spin_ns};
 pub use state::{Snapshot, State, Used, WINDOWS};
 
 use super::answers::Answers;
@@ -31,24 +31,18 @@ use super::wire::Wire;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::intake::{MAKING_NS, QUIET_NS};
 use crate::outbound::Outbound;
-use crate::security::Said;
 use crate::stats::Stats;
 use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Permit, Planned, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
+use granted::SPIN_NS_MAX;
 use held::Held;
 use intake::Intake;
-pub(super) use line::Line;
-use rohrpost_config::{Network, TRANSIT_LOOK};
+pub(super) use line::{ANSWERS, Answer, Line, REFUSAL_BYTES};
 use rohrpost_mailbox::{Name, monotonic_ns};
-use std::net::IpAddr;
+use rohrpost_network::{Network, TRANSIT_LOOK};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// It wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it wakes
-/// up 50 µs late on average, and to read takes 30 µs.
-const SPIN_NS_MAX: u64 = 150_000;
-/// Of the cycle, at most this part for each window: short cycles leave less time for it.
-const SPIN_CYCLES: u64 = 20;
 /// Syncs that came since it woke up are looked for so long before the call: to read one takes some microseconds.
 const LAST_LOOK_NS: u64 = 50_000;
 /// Whether the mailbox is full is looked at this often: half of it has room for a burst of 32 packages.
@@ -64,24 +58,6 @@ const _: () = assert!(
 const LOOK_BURST: usize = 16;
 /// To see to what waits takes less than this, unless much does.
 const TIDY_NS: u64 = 250_000;
-/// Room for the longest refusal.
-pub(super) const REFUSAL_BYTES: usize = 128;
-/// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a second later.
-pub(super) const ANSWERS: usize = 32;
-
-/// How long before the call the thread that sends in time slots is to wake up, ns; then it spins.
-pub fn spin_ns(cycle_ns: u64) -> u64 {
-    SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)
-}
-
-/// What the thread that receives wants to have sent.
-pub(super) enum Answer {
-    /// Where nothing is sealed: to whom another configuration or version is refused.
-    Refusal { to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES] },
-    /// Where all is sealed.
-    Hello { said: Said, datagram: [u8; REFUSAL_BYTES] },
-}
-
 /// Whose thread it is.
 #[derive(Clone, Copy)]
 pub(super) struct Own {

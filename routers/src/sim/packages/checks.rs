@@ -1,13 +1,13 @@
 //! What must hold of a router's packages at any moment: accounts, bounds, what it says of its peers, and that all is well again.
 
 use super::{Packages, STILL_NS};
+use crate::counts::Side;
 use crate::fragment::PARTIAL_MAX;
 use crate::frame::NodeIndex;
 use crate::inbound::TICK_EVERY_NS;
 use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 use crate::sim::book::Promise;
 use crate::sim::station::Io;
-use crate::stats::Side;
 
 /// So long after a datagram came what went before it, and is missing, is counted as lost: at the third tick.
 const SETTLED_NS: u64 = 3 * TICK_EVERY_NS + STILL_NS;

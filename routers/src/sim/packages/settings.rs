@@ -4,8 +4,8 @@ use crate::admission::Admission;
 use crate::frame::NodeIndex;
 use crate::settings::{NodeSettings, Settings};
 use crate::sim::plan::{Plan, SYSTEM};
-use rohrpost_config::{Network, Route, Security, Tunnel};
 use rohrpost_mailbox::{Class, Name};
+use rohrpost_network::{Network, Route, Security, Tunnel};
 use std::net::{IpAddr, Ipv4Addr};
 
 /// Of a configuration.

@@ -1,12 +1,12 @@
 //! What the cores of packages tell of, written into the book: losses, deliveries, events.
 
+use crate::counts::Cause;
 use crate::frame::NodeIndex;
 use crate::inbound::SOCKET_MAX_NS;
 use crate::report::{Deliver, Event, NotDelivered, Report};
 use crate::sim::book::Promise;
 use crate::sim::host::Closed;
 use crate::sim::station::Io;
-use crate::stats::Cause;
 use rohrpost_mailbox::{Head, Kind, Options};
 
 /// A datagram that came.

@@ -15,6 +15,7 @@ use crate::frame::NodeIndex;
 use crate::inbound::REFUSE_EVERY_NS;
 use crate::link::REFUSED_FOR_NS;
 use rohrpost_mailbox::Name;
+use rohrpost_network::NODES_MAX;
 
 /// Microseconds, milliseconds and seconds in ns.
 pub const US: u64 = 1_000;
@@ -23,8 +24,6 @@ pub const MS: u64 = 1_000_000;
 /// See [`US`].
 pub const S: u64 = 1_000_000_000;
 
-/// Nodes at most.
-pub const NODES_MAX: usize = 64;
 /// System of all nodes.
 pub const SYSTEM: u8 = 1;
 /// So long after the last fault everything must be as if there had been none: every call answered, nothing lost. A datagram that went

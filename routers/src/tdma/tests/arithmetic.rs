@@ -4,8 +4,8 @@ use super::world::{CYCLE, HEADS, MASTERS, MS, US, table, tdma};
 use crate::tdma::{Kind, Table, Window};
 use crate::time::Reckoning;
 use proptest::prelude::*;
-use rohrpost_config::{Tdma, TimeSlot};
 use rohrpost_mailbox::{TimeRecord, TimeSource};
+use rohrpost_network::{Tdma, TimeSlot};
 use std::time::Duration;
 
 const NODES: u8 = 4;
@@ -22,7 +22,7 @@ fn any_tdma() -> impl Strategy<Value = (Tdma, Vec<u8>)> {
                 at_us += gap_us;
                 let (offset, length) = (Duration::from_micros(at_us), Duration::from_micros(length_us));
                 for (phase, node) in (0..period).zip(owners) {
-                    slots.extend(node.map(|node| TimeSlot { node, offset, length, period, phase, line: 0 }));
+                    slots.extend(node.map(|node| TimeSlot { node, offset, length, period, phase }));
                 }
                 at_us += length_us;
             }
@@ -33,7 +33,6 @@ fn any_tdma() -> impl Strategy<Value = (Tdma, Vec<u8>)> {
                 link_bytes_s: 12_500_000,
                 slots,
                 tunnel: None,
-                line: 0,
             };
             (tdma, masters)
         },

@@ -8,8 +8,8 @@ use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Planned, Silent, Tabl
 use crate::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rohrpost_config::{Tdma, TimeSlot};
 use rohrpost_mailbox::TimeRecord;
+use rohrpost_network::{Tdma, TimeSlot};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -30,7 +30,6 @@ pub(super) fn tdma() -> Tdma {
         length: Duration::from_micros(length_us),
         period,
         phase,
-        line: 0,
     };
     Tdma {
         cycle: Duration::from_nanos(CYCLE),
@@ -44,7 +43,6 @@ pub(super) fn tdma() -> Tdma {
             slot(2, 3_000, 400, 3, 1),
         ],
         tunnel: None,
-        line: 0,
     }
 }
 

@@ -1,33 +1,12 @@
-//! What packages take of a link: the sizes that routers write and that bounds are computed with.
+//! What packages and the routers' own datagrams take of a link.
 
-use crate::network::{Network, Security};
-use crate::node::Node;
-use crate::tdma::{LATE, Tdma};
+use crate::setup::{Network, Security};
+use crate::sizes::{
+    ALIVE_BYTES, ETHERNET_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES, HAND_OVER, HELLO_BYTES, REFUSAL_BYTES,
+    TIME_BYTES,
+};
+use crate::table::{LATE, Tdma};
 use rohrpost_mailbox::HEAD_BYTES as PACKAGE_HEAD_BYTES;
-use std::time::Duration;
-
-/// What Ethernet adds to each packet: preamble 8, head 14, check 4, gap 12.
-pub const ETHERNET_BYTES: usize = 8 + 14 + 4 + 12;
-/// Before what a datagram of routers says.
-pub const FRAME_HEAD_BYTES: usize = 36;
-/// Before the bytes of a part of a package, the package's head included.
-pub const FRAGMENT_HEAD_BYTES: usize = 32;
-/// What a datagram of time says.
-pub const TIME_BYTES: usize = 72;
-/// What a datagram says that only says "still there".
-pub const ALIVE_BYTES: usize = 24;
-/// What a datagram says that refuses others.
-pub const REFUSAL_BYTES: usize = 16;
-/// What a datagram says by which nodes that seal get to know each other.
-pub const HELLO_BYTES: usize = 32;
-/// A router keeps the body of a package that waits in pieces of so many bytes.
-pub const KEPT_IN_BYTES: u64 = 256;
-/// A clock that was not compared with another yet is off by one, at most, in so long.
-pub const RATE_MAX_PER: u32 = 4000;
-/// System time is bent by one, at most, in so long, and the clock by which it is measured runs meanwhile as far off as [`RATE_MAX_PER`] says.
-pub const BEND_MAX_PER: u32 = 1000;
-/// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
-pub const HAND_OVER: Duration = Duration::from_micros(20);
 
 /// What of time goes in the windows of a system with time slots: the rule by which clocks send, and bounds are computed.
 ///
@@ -48,8 +27,8 @@ pub struct TimeShare {
 impl TimeShare {
     /// `heads_bytes`: what is around each datagram, see [`Network::around_bytes`].
     pub fn new(tdma: &Tdma, heads_bytes: usize, nodes: usize, masters: usize) -> Self {
-        let link = Link { bytes_s: tdma.link_bytes_s.max(1), heads_bytes, datagram_bytes_max: 0, answer_bytes: 0 };
-        link.time_share(tdma, nodes, masters)
+        let bytes_s = tdma.link_bytes_s.max(1);
+        Link { bytes_s, heads_bytes, datagram_bytes_max: 0, answer_bytes: 0, nodes, masters }.time_share(tdma)
     }
 }
 
@@ -60,80 +39,93 @@ fn answer_bytes(security: Security) -> usize {
     }
 }
 
-/// The link of a system with time slots.
+/// The link of a system with time slots, and how many are at it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Link {
+pub struct Link {
     bytes_s: u64,
     heads_bytes: usize,
     datagram_bytes_max: usize,
     /// Of what goes once in a slot to whoever is not known: a refusal, or a hello.
     answer_bytes: usize,
+    nodes: usize,
+    masters: usize,
 }
 
 impl Link {
-    pub(crate) fn new(tdma: &Tdma, network: &Network, nodes: &[Node]) -> Self {
-        let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
+    /// `nodes` are on the LAN, of which some may be `masters` of time.
+    pub fn new(tdma: &Tdma, network: &Network, is_v6: bool, nodes: usize, masters: usize) -> Self {
         Self {
             bytes_s: tdma.link_bytes_s.max(1),
             heads_bytes: Network::around_bytes(is_v6, network.security),
             datagram_bytes_max: network.datagram_bytes_max,
             answer_bytes: answer_bytes(network.security),
+            nodes,
+            masters,
         }
     }
 
+    /// Nodes besides the own one.
+    pub fn others(&self) -> usize {
+        self.nodes.saturating_sub(1)
+    }
+
+    /// Nodes that may be master of time.
+    pub fn masters(&self) -> usize {
+        self.masters
+    }
+
     /// How long the wire carries a datagram, ns.
-    pub(crate) fn wire_ns(&self, datagram_bytes: usize) -> u64 {
+    pub fn wire_ns(&self, datagram_bytes: usize) -> u64 {
         let bytes = (datagram_bytes + self.heads_bytes + ETHERNET_BYTES) as u64;
         (bytes * 1_000_000_000).div_ceil(self.bytes_s)
     }
 
     /// How long a datagram keeps a slot busy, ns.
-    pub(crate) fn takes_ns(&self, datagram_bytes: usize) -> u64 {
+    pub fn takes_ns(&self, datagram_bytes: usize) -> u64 {
         self.wire_ns(datagram_bytes).max(HAND_OVER.as_nanos() as u64)
     }
 
     /// The same of the largest datagram.
-    pub(crate) fn largest_ns(&self) -> u64 {
+    pub fn largest_ns(&self) -> u64 {
         self.takes_ns(self.datagram_bytes_max)
     }
 
     /// The same of a datagram of time.
-    pub(crate) fn time_ns(&self) -> u64 {
+    pub fn time_ns(&self) -> u64 {
         self.takes_ns(FRAME_HEAD_BYTES + TIME_BYTES)
     }
 
     /// How long the wire carries one, ns.
-    pub(crate) fn time_wire_ns(&self) -> u64 {
+    pub fn time_wire_ns(&self) -> u64 {
         self.wire_ns(FRAME_HEAD_BYTES + TIME_BYTES)
     }
 
     /// How long one that says "still there" keeps a slot busy, ns.
-    pub(crate) fn alive_ns(&self) -> u64 {
+    pub fn alive_ns(&self) -> u64 {
         self.takes_ns(FRAME_HEAD_BYTES + ALIVE_BYTES)
     }
 
     /// What of time goes where.
-    fn time_share(&self, tdma: &Tdma, nodes: usize, masters: usize) -> TimeShare {
-        let others = nodes.saturating_sub(1);
+    fn time_share(&self, tdma: &Tdma) -> TimeShare {
+        let others = self.others();
         let sends_ns = tdma.synchronisation.saturating_sub(tdma.guard + LATE).as_nanos() as u64;
         let frames = (sends_ns / self.time_ns()) as usize;
         let replies_in_synchronisation = frames >= 3 * others;
         let replies = if replies_in_synchronisation { 0 } else { others };
-        let frames_in_slot = replies.max(2).max(masters);
+        let frames_in_slot = replies.max(2).max(self.masters);
         TimeShare { warm_ups: frames >= 2 * others, replies_in_synchronisation, frames_in_slot }
     }
 
     /// What routers say to each other in a slot at most, before any package, ns: frames of time, one to each other node that says "still
     /// there", and a refusal or a hello.
-    pub(crate) fn said_ns(&self, tdma: &Tdma, nodes: usize, masters: usize) -> u64 {
-        let others = nodes.saturating_sub(1);
+    pub fn said_ns(&self, tdma: &Tdma) -> u64 {
         let answer_ns = self.takes_ns(FRAME_HEAD_BYTES + self.answer_bytes);
-        let frames = self.time_share(tdma, nodes, masters).frames_in_slot;
-        frames as u64 * self.time_ns() + others as u64 * self.alive_ns() + answer_ns
+        let frames = self.time_share(tdma).frames_in_slot;
+        frames as u64 * self.time_ns() + self.others() as u64 * self.alive_ns() + answer_ns
     }
 
     /// What the datagrams of a package take, none of them shared with another package.
-    pub(crate) fn package(&self, body_bytes: usize) -> Parcel {
+    pub fn package(&self, body_bytes: usize) -> Parcel {
         let whole = FRAME_HEAD_BYTES + PACKAGE_HEAD_BYTES + body_bytes;
         if whole <= self.datagram_bytes_max {
             let takes_ns = self.takes_ns(whole);
@@ -160,19 +152,19 @@ impl Link {
 
 /// What a package takes of slots, in ns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Parcel {
+pub struct Parcel {
     /// Number of its datagrams.
-    pub(crate) datagrams: u64,
+    pub datagrams: u64,
     /// All of them.
-    pub(crate) takes_ns: u64,
+    pub takes_ns: u64,
     /// The largest of them.
-    pub(crate) largest_ns: u64,
+    pub largest_ns: u64,
     /// Of the last one, what is its own.
-    pub(crate) end_ns: u64,
+    pub end_ns: u64,
     /// The last one with all that may be in it.
-    pub(crate) last_ns: u64,
+    pub last_ns: u64,
     /// The last one from a switch to the receiver.
-    pub(crate) forward_ns: u64,
+    pub forward_ns: u64,
 }
 
 #[cfg(test)]
@@ -182,7 +174,14 @@ mod tests {
     fn link(security: Security) -> Link {
         let around = Network::around_bytes(false, security);
         let datagram_bytes_max = 1500 - around;
-        Link { bytes_s: 1_000_000, heads_bytes: around, datagram_bytes_max, answer_bytes: answer_bytes(security) }
+        Link {
+            bytes_s: 1_000_000,
+            heads_bytes: around,
+            datagram_bytes_max,
+            answer_bytes: answer_bytes(security),
+            nodes: 2,
+            masters: 1,
+        }
     }
 
     #[test]

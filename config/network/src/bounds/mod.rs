@@ -5,23 +5,20 @@
 //! replies included), no slot is left out, nothing is lost, and every slot begins at most [`LATE`] late. What a process takes to wake up and to read is not in it.
 
 mod mistakes;
-mod remedy;
 mod response;
 #[cfg(test)]
 mod simulation;
 #[cfg(test)]
 mod tests;
 
-use crate::flow::Flow;
-use crate::installation::Installation;
-use crate::network::LEVEL_NOT_REAL_TIME;
-use crate::tdma::{LATE, Tdma, TimeSlot, cycles};
-use crate::wire::{BEND_MAX_PER, Link, RATE_MAX_PER};
+use crate::link::Link;
+use crate::plan::{Plan, PlannedFlow};
+use crate::setup::LEVEL_NOT_REAL_TIME;
+use crate::sizes::{BEND_MAX_PER, RATE_MAX_PER};
+use crate::table::{LATE, Tdma, TimeSlot, cycles};
 use response::{Ahead, Never, Stream, Supply, Window};
 use rohrpost_mailbox::Priority;
 use std::time::Duration;
-
-pub(crate) use remedy::{remedy, slower};
 
 /// What is published less than this before a slot begins may have to wait for the next one.
 pub const TAKEN_BEFORE: Duration = Duration::from_micros(100);
@@ -31,7 +28,7 @@ const LONGEST: Duration = Duration::from_millis(1500);
 /// How late a flow's packages can be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlowBound {
-    /// The flow, by its place in [`Installation::flows`].
+    /// The flow, by its place in [`Plan::flows`].
     pub flow: usize,
     /// The level on which it waits in its node's router, see [`Network::level`](crate::Network::level).
     pub level: u8,
@@ -88,40 +85,34 @@ pub enum Unbounded {
     TooLong,
 }
 
-/// The bounds of all flows between different nodes of the LAN, in their order in the file; none if nodes send as packages come.
-pub fn bounds(installation: &Installation) -> Vec<FlowBound> {
-    let Some(tdma) = &installation.tdma else { return Vec::new() };
-    (0..installation.flows.len()).filter_map(|flow| bound(installation, tdma, flow)).collect()
+impl Plan {
+    /// The bounds of all flows between nodes with this table, in their order.
+    pub fn bounds(&self, tdma: &Tdma) -> Vec<FlowBound> {
+        (0..self.flows.len()).filter_map(|flow| self.bound(tdma, flow)).collect()
+    }
+
+    /// The bound of a flow with this table.
+    pub(crate) fn bound(&self, tdma: &Tdma, flow: usize) -> Option<FlowBound> {
+        let own = self.flows[flow]?;
+        let level = self.network.level(own.least);
+        let latency = if level == LEVEL_NOT_REAL_TIME {
+            Err(Unbounded::NotRealTime)
+        } else {
+            let all = self.flows.iter().enumerate().filter(|(index, _)| *index != flow);
+            let others = all.filter_map(|(_, other)| {
+                let other = other.as_ref()?;
+                let ahead = other.ahead_of(&own, |priority| self.network.level(priority))?;
+                Some((other.stream(&self.link), ahead))
+            });
+            let others: Vec<_> = others.collect();
+            worst(tdma, &self.link, &own, &others)
+        };
+        Some(FlowBound { flow, level, latency })
+    }
 }
 
-/// The bound of a flow with this table.
-fn bound(installation: &Installation, tdma: &Tdma, flow: usize) -> Option<FlowBound> {
-    let network = installation.network.as_ref()?;
-    let own = Sent::new(installation, &installation.flows[flow])?;
-    let link = Link::new(tdma, network, installation.lan_nodes());
-    let level = network.level(own.least);
-    let latency = if level == LEVEL_NOT_REAL_TIME {
-        Err(Unbounded::NotRealTime)
-    } else {
-        let all = installation.flows.iter().enumerate().filter(|(index, _)| *index != flow);
-        let others = all.filter_map(|(_, flow)| Sent::new(installation, flow)).filter_map(|other| {
-            let ahead = other.ahead_of(&own, |priority| network.level(priority))?;
-            Some((other.stream(&link), ahead))
-        });
-        let others: Vec<_> = others.collect();
-        worst(installation, tdma, &link, &own, &others)
-    };
-    Some(FlowBound { flow, level, latency })
-}
-
-fn worst(
-    installation: &Installation,
-    tdma: &Tdma,
-    link: &Link,
-    own: &Sent<'_>,
-    others: &[(Stream, Ahead)],
-) -> Result<Bound, Unbounded> {
-    let supply = supply(installation, tdma, link, own.node);
+fn worst(tdma: &Tdma, link: &Link, own: &PlannedFlow, others: &[(Stream, Ahead)]) -> Result<Bound, Unbounded> {
+    let supply = supply(tdma, link, own.node);
     if supply.windows.is_empty() {
         return Err(Unbounded::TooShort);
     }
@@ -134,7 +125,7 @@ fn worst(
         },
         Never::Late => Unbounded::TooLong,
     })?;
-    let parcel = link.package(own.flow.size as usize);
+    let parcel = link.package(own.size as usize);
     Ok(Bound {
         latency: Duration::from_nanos(worst.latency_ns + parcel.forward_ns),
         slot: supply.windows[worst.window].slot,
@@ -150,7 +141,7 @@ fn worst(
 }
 
 /// What the slots of a node have room for.
-fn supply(installation: &Installation, tdma: &Tdma, link: &Link, node: u8) -> Supply {
+fn supply(tdma: &Tdma, link: &Link, node: u8) -> Supply {
     let is_own = |slot: &&TimeSlot| slot.node == node;
     let cycles = cycles(tdma.slots.iter().filter(is_own));
     let own = tdma.slots.iter().enumerate().filter(|(_, slot)| is_own(slot));
@@ -166,39 +157,18 @@ fn supply(installation: &Installation, tdma: &Tdma, link: &Link, node: u8) -> Su
     Supply {
         windows: windows.collect(),
         repeats_ns: cycles * ns(tdma.cycle),
-        said_ns: link.said_ns(tdma, installation.lan_nodes().len(), installation.time.masters().len()),
+        said_ns: link.said_ns(tdma),
         taken_before_ns: ns(TAKEN_BEFORE),
         late_ns: ns(LATE),
         bends_ns_s: (1_000_000_000 / BEND_MAX_PER + 1_000_000_000 / RATE_MAX_PER).into(),
     }
 }
 
-/// A flow from one node to another, as its router sees it.
-struct Sent<'f> {
-    flow: &'f Flow,
-    node: u8,
-    peer: u8,
-    /// Its priority: the sender's if it is commands, that of the receiver's request if it is data; both if it may be either.
-    least: Priority,
-    most: Priority,
-}
-
-impl<'f> Sent<'f> {
-    /// None if both ends are on one node, or one is not on the LAN.
-    fn new(installation: &Installation, flow: &'f Flow) -> Option<Self> {
-        let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
-        let (node, peer) = (installation.lan_index(&from.node)?, installation.lan_index(&to.node)?);
-        let commands = to.names().any(|name| from.calls.contains(&name)).then(|| from.name.class().priority());
-        let data = from.names().any(|name| to.calls.contains(&name)).then(|| to.name.class().priority());
-        let (commands, data) = (commands.or(data)?, data.or(commands)?);
-        let (least, most) = if commands.outranks(data) { (data, commands) } else { (commands, data) };
-        (node != peer).then_some(Self { flow, node, peer, least, most })
-    }
-
+impl PlannedFlow {
     fn stream(&self, link: &Link) -> Stream {
-        let parcel = link.package(self.flow.size as usize);
+        let parcel = link.package(self.size as usize);
         Stream {
-            period_ns: ns(self.flow.period).max(1),
+            period_ns: ns(self.period).max(1),
             takes_ns: parcel.takes_ns,
             datagrams: parcel.datagrams,
             largest_ns: parcel.largest_ns,

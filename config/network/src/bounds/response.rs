@@ -56,7 +56,7 @@ pub(crate) struct Window {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stream {
     pub(crate) period_ns: u64,
-    /// What one takes, see [`Parcel`](crate::wire::Parcel).
+    /// What one takes, see [`Parcel`](crate::Parcel).
     pub(crate) takes_ns: u64,
     pub(crate) datagrams: u64,
     pub(crate) largest_ns: u64,

@@ -1,42 +1,33 @@
 //! What a slot table has room for.
 
-use super::{LATE, Tdma, TimeSlot, common};
-use crate::installation::Installation;
-use crate::node::Node;
-use crate::units::duration_decimal;
-use crate::wire::{Link, RATE_MAX_PER};
+use crate::link::Link;
+use crate::sizes::RATE_MAX_PER;
+use crate::table::{LATE, Tdma, TimeSlot, common};
 use std::time::Duration;
 
 /// A node that joins takes frames of time to arrive within half of the guard: this part of it for the links, as much for the computers. It is off
 /// by as much at most, earlier or later.
-pub(super) const ARRIVES_WITHIN: u32 = 4;
+pub const ARRIVES_WITHIN: u32 = 4;
 
 /// Up to ten microseconds, as people write.
-pub(super) fn round_up(duration: Duration) -> Duration {
+pub fn round_up(duration: Duration) -> Duration {
     Duration::from_micros(duration.as_nanos().div_ceil(10_000) as u64 * 10)
 }
 
 impl Tdma {
-    /// A slot as messages name it.
-    pub(crate) fn whose(&self, slot: &TimeSlot, nodes: &[Node]) -> String {
-        let node = nodes.get(usize::from(slot.node)).map_or("?", |node| node.name.as_str());
-        format!("that of `{node}` at {} (line {})", duration_decimal(slot.offset), slot.line)
-    }
-
     /// What a slot needs at least: its guard, what routers say to each other, and a largest datagram.
-    pub(crate) fn length_min(&self, installation: &Installation, link: &Link) -> Duration {
-        let said_ns = link.said_ns(self, installation.lan_nodes().len(), installation.time.masters().len());
-        round_up(self.guard + LATE + Duration::from_nanos(said_ns + link.largest_ns()))
+    pub fn length_min(&self, link: &Link) -> Duration {
+        round_up(self.guard + LATE + Duration::from_nanos(link.said_ns(self) + link.largest_ns()))
     }
 
     /// When the synchronisation windows end.
-    pub(crate) fn windows_end(&self, masters: &[u8]) -> Duration {
-        self.synchronisation * masters.len() as u32
+    pub fn windows_end(&self, masters: usize) -> Duration {
+        self.synchronisation * masters as u32
     }
 
     /// Where a slot ends at the latest. Who joins knows the time by a Sync alone, so that it may be off by a quarter of the guard, and by what its
     /// clock has drifted since: it must be sure to half of the guard until its slot ends, or it never asks for more.
-    pub(super) fn joined_end_max(&self) -> Duration {
+    pub fn joined_end_max(&self) -> Duration {
         self.guard * (RATE_MAX_PER / ARRIVES_WITHIN)
     }
 
@@ -45,20 +36,21 @@ impl Tdma {
     }
 
     /// The same table with another slot in place of one.
-    pub(crate) fn with(&self, index: usize, slot: TimeSlot) -> Self {
+    pub fn with(&self, index: usize, slot: TimeSlot) -> Self {
         let mut tdma = self.clone();
         tdma.slots[index] = slot;
         tdma
     }
 
-    pub(super) fn without(&self, index: usize) -> Self {
+    /// The same table without one of its slots.
+    pub fn without(&self, index: usize) -> Self {
         let mut tdma = self.clone();
         tdma.slots.remove(index);
         tdma
     }
 
     /// Slots that are there at the same time, the one that begins first before the other.
-    pub(crate) fn collisions(&self) -> Vec<(usize, usize)> {
+    pub fn collisions(&self) -> Vec<(usize, usize)> {
         let slots = self.slots.iter().enumerate();
         let pairs = slots.flat_map(|(first, a)| {
             let later = self.slots.iter().enumerate().skip(first + 1);
@@ -68,14 +60,14 @@ impl Tdma {
     }
 
     /// How long a slot may be, at most.
-    pub(crate) fn free_behind(&self, slot: &TimeSlot) -> Duration {
+    pub fn free_behind(&self, slot: &TimeSlot) -> Duration {
         let next = self.slots.iter().filter(|next| next.offset > slot.offset && next.meets(slot));
         let end = next.map(|next| next.offset).chain([self.end_max()]).min().unwrap_or_default();
         end.saturating_sub(slot.offset)
     }
 
     /// What a slot may take that is nobody's in any cycle: where it begins, and for how long.
-    pub(crate) fn gaps(&self, masters: &[u8]) -> Vec<(Duration, Duration)> {
+    pub fn gaps(&self, masters: usize) -> Vec<(Duration, Duration)> {
         let mut free_from = self.windows_end(masters);
         let mut gaps = Vec::new();
         let end_max = self.end_max();
@@ -90,13 +82,13 @@ impl Tdma {
     }
 
     /// Whether one slot more is behind synchronisation, in the cycle, over soon enough for who joins, and alone.
-    pub(super) fn has_room(&self, slot: &TimeSlot, masters: &[u8]) -> bool {
+    pub fn has_room(&self, slot: &TimeSlot, masters: usize) -> bool {
         let is_inside = slot.offset >= self.windows_end(masters) && slot.end() <= self.end_max();
         is_inside && !self.slots.iter().any(|other| other.collides(slot))
     }
 
     /// Where one slot more has room, as near as possible to where it would like to be: right behind something, or right before it.
-    pub(super) fn nearest_room(&self, slot: &TimeSlot, masters: &[u8]) -> Option<Duration> {
+    pub fn nearest_room(&self, slot: &TimeSlot, masters: usize) -> Option<Duration> {
         let behind = self.slots.iter().map(TimeSlot::end).chain([self.windows_end(masters)]);
         let before = self.slots.iter().map(|other| other.offset).chain([self.end_max()]);
         let before = before.filter_map(|begin| begin.checked_sub(slot.length));
@@ -106,19 +98,14 @@ impl Tdma {
 }
 
 impl TimeSlot {
-    pub(super) fn end(&self) -> Duration {
+    /// Where its guard ends.
+    pub fn end(&self) -> Duration {
         self.offset + self.length
     }
 
     /// The same slot in each so many-th cycle.
-    pub(crate) fn with_period(&self, period: u32) -> Self {
+    pub fn with_period(&self, period: u32) -> Self {
         Self { period, phase: self.phase % period, ..*self }
-    }
-
-    /// How to write its period, and its phase if that is not what it was.
-    pub(crate) fn period_text(&self, was: &Self) -> String {
-        let phase = if self.phase == was.phase { String::new() } else { format!(" and `phase = {}`", self.phase) };
-        format!("`period = {}`{phase}", self.period)
     }
 
     /// Whether there are cycles with both.
@@ -128,7 +115,7 @@ impl TimeSlot {
     }
 
     /// Whether both are there at once.
-    pub(super) fn collides(&self, other: &Self) -> bool {
+    pub fn collides(&self, other: &Self) -> bool {
         self.meets(other) && self.offset < other.end() && other.offset < self.end()
     }
 }

@@ -1,0 +1,144 @@
+//! The smallest change of a slot table by which a flow keeps its deadline.
+
+use crate::plan::{Plan, PlannedFlow};
+use crate::table::{Tdma, TimeSlot};
+use std::time::Duration;
+
+/// Slots are changed in such steps.
+const STEP: Duration = Duration::from_micros(10);
+/// So many cycles as a period are tried.
+const CYCLES_MAX: u32 = 64;
+
+/// By what a flow keeps its deadline. Slots are told by their places in [`Tdma::slots`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Remedy {
+    /// A slot of its node that is longer.
+    Longer(usize, TimeSlot),
+    /// A slot of its node that comes oftener.
+    Oftener(usize, TimeSlot),
+    /// One slot more.
+    Another(TimeSlot),
+    /// No change of one slot suffices; a deadline so late does.
+    Later(Duration),
+    /// Nor does that; if there is one, the period with which it does.
+    Slower(Option<Duration>),
+}
+
+impl Plan {
+    /// What to change so that a flow keeps its deadline: found by trying, and tried.
+    pub fn remedy(&self, tdma: &Tdma, flow: usize) -> Remedy {
+        let search = Search { plan: self, tdma, flow };
+        let change = search.longer().or_else(|| search.oftener()).or_else(|| search.another().map(Remedy::Another));
+        let later = || {
+            let period = self.flows[flow]?.period;
+            search.latency(tdma).map(round_up).filter(|bound| *bound <= period).map(Remedy::Later)
+        };
+        change.or_else(later).unwrap_or_else(|| Remedy::Slower(self.slower(tdma, flow, |_| false)))
+    }
+
+    /// The fewest cycles that a flow keeps as its period and deadline, if these others become as slow: found by trying.
+    pub fn slower(&self, tdma: &Tdma, flow: usize, others: impl Fn(&PlannedFlow) -> bool) -> Option<Duration> {
+        let own = self.flows[flow]?;
+        let holds = |period: &Duration| {
+            let mut slower = self.clone();
+            for (index, other) in slower.flows.iter_mut().enumerate() {
+                if let Some(other) = other.as_mut().filter(|other| index == flow || others(other)) {
+                    (other.period, other.deadline) = (*period, *period);
+                }
+            }
+            Search { plan: &slower, tdma, flow }.keeps(tdma)
+        };
+        (1..=CYCLES_MAX).map(|cycles| tdma.cycle * cycles).filter(|period| *period > own.period).find(holds)
+    }
+}
+
+/// Up to a tenth of a millisecond.
+fn round_up(duration: Duration) -> Duration {
+    const TENTH_NS: u64 = 100_000;
+    Duration::from_nanos((duration.as_nanos() as u64).div_ceil(TENTH_NS) * TENTH_NS)
+}
+
+struct Search<'a> {
+    plan: &'a Plan,
+    tdma: &'a Tdma,
+    flow: usize,
+}
+
+impl<'a> Search<'a> {
+    fn latency(&self, tdma: &Tdma) -> Option<Duration> {
+        self.plan.bound(tdma, self.flow)?.latency.ok().map(|bound| bound.latency)
+    }
+
+    fn keeps(&self, tdma: &Tdma) -> bool {
+        let deadline = self.plan.flows[self.flow].map(|flow| flow.deadline);
+        self.latency(tdma).zip(deadline).is_some_and(|(latency, deadline)| latency <= deadline)
+    }
+
+    /// Slots of the node that sends.
+    fn own(&self) -> impl Iterator<Item = (usize, &'a TimeSlot)> {
+        let node = self.plan.flows[self.flow].map(|flow| flow.node);
+        self.tdma.slots.iter().enumerate().filter(move |(_, slot)| Some(slot.node) == node)
+    }
+
+    /// The slot that has to grow least.
+    fn longer(&self) -> Option<Remedy> {
+        let tries = self.own().filter_map(|(index, slot)| {
+            let free = self.tdma.free_behind(slot).saturating_sub(slot.length);
+            let steps = (free.as_nanos() / STEP.as_nanos()) as u32;
+            let longer = |steps: u32| TimeSlot { length: slot.length + STEP * steps, ..*slot };
+            let suffices = |steps| self.keeps(&self.tdma.with(index, longer(steps)));
+            least(steps, suffices).map(|steps| (steps, Remedy::Longer(index, longer(steps))))
+        });
+        tries.min_by_key(|(steps, _)| *steps).map(|(_, remedy)| remedy)
+    }
+
+    /// The slot that has to come oftener, with its longest period.
+    fn oftener(&self) -> Option<Remedy> {
+        let mut tries = self.own().flat_map(|(index, slot)| {
+            let shorter = (1..slot.period).rev().filter(|period| slot.period.is_multiple_of(*period));
+            shorter.map(move |period| (index, slot.with_period(period)))
+        });
+        let suffices = |(index, oftener): &(usize, TimeSlot)| {
+            let tdma = self.tdma.with(*index, *oftener);
+            tdma.collisions().is_empty() && self.keeps(&tdma)
+        };
+        tries.find(suffices).map(|(index, oftener)| Remedy::Oftener(index, oftener))
+    }
+
+    /// A slot where there is none yet.
+    fn another(&self) -> Option<TimeSlot> {
+        let (_, model) = self.own().next()?;
+        let link = &self.plan.link;
+        let length_min = self.tdma.length_min(link);
+        let tries = self.tdma.gaps(link.masters()).into_iter().filter_map(|(offset, free)| {
+            let length = |steps: u32| length_min + STEP * (steps - 1);
+            let slot = |steps: u32| TimeSlot { offset, length: length(steps), period: 1, phase: 0, ..*model };
+            let suffices = |steps| {
+                let mut tdma = self.tdma.clone();
+                tdma.slots.push(slot(steps));
+                tdma.slots.sort_by_key(|slot| (slot.offset, slot.phase));
+                self.keeps(&tdma)
+            };
+            let longer = free.checked_sub(length_min)?;
+            least((longer.as_nanos() / STEP.as_nanos()) as u32 + 1, suffices).map(slot)
+        });
+        tries.min_by_key(|slot| slot.length)
+    }
+}
+
+/// The least number from 1 to `most` that suffices, if more does not harm; whatever it gives does suffice.
+fn least(most: u32, suffices: impl Fn(u32) -> bool) -> Option<u32> {
+    if most == 0 || !suffices(most) {
+        return None;
+    }
+    let (mut below, mut enough) = (0, most);
+    while enough - below > 1 {
+        let middle = below.midpoint(enough);
+        if suffices(middle) {
+            enough = middle;
+        } else {
+            below = middle;
+        }
+    }
+    Some(enough)
+}

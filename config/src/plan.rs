@@ -1,0 +1,32 @@
+//! What an installation asks of its time slots, as the analysis of the network takes it.
+
+use crate::flow::Flow;
+use crate::installation::Installation;
+use rohrpost_network::{FlowBound, Link, Plan, PlannedFlow, Tdma};
+
+/// The bounds of all flows between different nodes of the LAN, by their places in [`Installation::flows`]; none if nodes send as packages come.
+pub fn bounds(installation: &Installation) -> Vec<FlowBound> {
+    let tdma = installation.tdma.as_ref();
+    tdma.and_then(|tdma| Some(plan(installation, tdma)?.bounds(tdma))).unwrap_or_default()
+}
+
+/// What its nodes and modules ask of a table.
+pub(crate) fn plan(installation: &Installation, tdma: &Tdma) -> Option<Plan> {
+    let (nodes, network) = (installation.lan_nodes(), installation.network?);
+    let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
+    let link = Link::new(tdma, &network, is_v6, nodes.len(), installation.time.masters().len());
+    let flows = installation.flows.iter().map(|flow| planned(installation, flow)).collect();
+    Some(Plan { link, network, flows })
+}
+
+/// None if both ends are on one node, or one is not on the LAN.
+fn planned(installation: &Installation, flow: &Flow) -> Option<PlannedFlow> {
+    let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
+    let (node, peer) = (installation.lan_index(&from.node)?, installation.lan_index(&to.node)?);
+    let commands = to.names().any(|name| from.calls.contains(&name)).then(|| from.name.class().priority());
+    let data = from.names().any(|name| to.calls.contains(&name)).then(|| to.name.class().priority());
+    let (commands, data) = (commands.or(data)?, data.or(commands)?);
+    let (least, most) = if commands.outranks(data) { (data, commands) } else { (commands, data) };
+    let Flow { size, period, deadline, .. } = *flow;
+    (node != peer).then_some(PlannedFlow { node, peer, size, period, deadline, least, most })
+}

@@ -1,0 +1,238 @@
+//! Counts, packages by class, losses by cause, and datagrams: the parts of what a router counts ([`stats`](crate::stats)).
+//!
+//! One thread writes each counter (`out`: the one that sends; `inn`: the one that receives), any thread reads: so a count is a load
+//! and a store, no locked instruction. Accounts balance, by class:
+//!
+//! ```text
+//! out.packages  =  out.passed + out.lost, all causes  + those that wait
+//! inn.packages  =  inn.passed + inn.lost, all causes  + those of which only parts have come
+//! ```
+
+use rohrpost_mailbox::Priority;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Why a package was lost in a router.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[repr(usize)]
+pub enum Cause {
+    /// Outgoing: no node has its mailbox.
+    NoRoute,
+    /// Outgoing: its sender had more waiting than its quota, and this was the least important and newest.
+    Quota,
+    /// It was under way for too long.
+    Stale,
+    /// Outgoing: nothing is heard of the node.
+    Silent,
+    /// Outgoing: the node is heard, but does not hear us.
+    Unheard,
+    /// Outgoing: the node and we refuse each other.
+    Refused,
+    /// Outgoing: the socket did not take it.
+    Socket,
+    /// Incoming: a newer one of the same sender, receiver and priority had been delivered.
+    Late,
+    /// Incoming: parts of it never came.
+    Incomplete,
+    /// Incoming: nobody has its mailbox open.
+    NoMailbox,
+    /// Incoming: its mailbox was full.
+    MailboxFull,
+    /// Incoming: its mailbox has smaller slots.
+    TooLarge,
+    /// Incoming: the node that sent it does not have its sender.
+    ForeignName,
+    /// Incoming: a command of a class that may not command this one.
+    NotAllowed,
+    /// Incoming: from or for a mailbox by which routers carry packages.
+    RoutersOwn,
+    /// Incoming: no IP packet from the tunnel's address of the node that sent it to ours.
+    BadPacket,
+}
+
+impl Cause {
+    /// All, in their order.
+    pub const ALL: [Self; 16] = [
+        Self::NoRoute,
+        Self::Quota,
+        Self::Stale,
+        Self::Silent,
+        Self::Unheard,
+        Self::Refused,
+        Self::Socket,
+        Self::Late,
+        Self::Incomplete,
+        Self::NoMailbox,
+        Self::MailboxFull,
+        Self::TooLarge,
+        Self::ForeignName,
+        Self::NotAllowed,
+        Self::RoutersOwn,
+        Self::BadPacket,
+    ];
+
+    /// A word for people and programs.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::NoRoute => "no-route",
+            Self::Quota => "quota",
+            Self::Stale => "stale",
+            Self::Silent => "silent",
+            Self::Unheard => "unheard",
+            Self::Refused => "refused",
+            Self::Socket => "socket",
+            Self::Late => "late",
+            Self::Incomplete => "incomplete",
+            Self::NoMailbox => "no-mailbox",
+            Self::MailboxFull => "mailbox-full",
+            Self::TooLarge => "too-large",
+            Self::ForeignName => "foreign-name",
+            Self::NotAllowed => "not-allowed",
+            Self::RoutersOwn => "routers-own",
+            Self::BadPacket => "bad-packet",
+        }
+    }
+}
+
+/// A count that one thread writes and any reads.
+#[derive(Default, Debug)]
+pub struct Count(AtomicU64);
+
+impl Count {
+    /// As it stands.
+    pub fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn add(&self, more: u64) {
+        self.set(self.get().wrapping_add(more));
+    }
+
+    pub(crate) fn take_back(&self, fewer: u64) {
+        self.set(self.get().wrapping_sub(fewer));
+    }
+
+    pub(crate) fn set(&self, value: u64) {
+        self.0.store(value, Ordering::Relaxed);
+    }
+}
+
+/// What passed in one direction, and what did not.
+#[derive(Debug)]
+pub struct Side {
+    classes: Box<[ClassCounts]>,
+}
+
+/// Of one class.
+#[derive(Default, Debug)]
+pub struct ClassCounts {
+    /// Packages: taken from this node's senders; or come from other nodes, with those of which only parts came.
+    pub packages: Count,
+    /// Of these, sent; or delivered.
+    pub passed: Count,
+    /// Bytes of the bodies of those that passed.
+    pub body_bytes: Count,
+    lost: [Count; Cause::ALL.len()],
+}
+
+impl ClassCounts {
+    /// Packages lost for a cause.
+    pub fn lost(&self, cause: Cause) -> u64 {
+        self.lost[cause as usize].get()
+    }
+
+    /// Packages lost for any.
+    pub fn lost_in_all(&self) -> u64 {
+        self.lost.iter().map(Count::get).sum()
+    }
+}
+
+impl Side {
+    pub(crate) fn new() -> Self {
+        Self { classes: (0..=u8::MAX).map(|_| ClassCounts::default()).collect() }
+    }
+
+    /// What a class did: of the packages that went with its priority.
+    pub fn class(&self, priority: Priority) -> &ClassCounts {
+        &self.classes[usize::from(priority.0)]
+    }
+
+    /// All classes that did something, the most urgent first.
+    pub fn classes(&self) -> impl Iterator<Item = (Priority, &ClassCounts)> {
+        let all = self.classes.iter().enumerate().rev();
+        all.filter(|(_, class)| class.packages.get() > 0).map(|(index, class)| (Priority(index as u8), class))
+    }
+
+    pub(crate) fn came(&self, priority: Priority) {
+        self.class(priority).packages.add(1);
+    }
+
+    pub(crate) fn passed(&self, priority: Priority, body_bytes: u16) {
+        let class = self.class(priority);
+        class.passed.add(1);
+        class.body_bytes.add(body_bytes.into());
+    }
+
+    /// What was said to have passed did not.
+    pub(crate) fn came_back(&self, priority: Priority, body_bytes: u16) {
+        let class = self.class(priority);
+        class.passed.take_back(1);
+        class.body_bytes.take_back(body_bytes.into());
+    }
+
+    pub(crate) fn lost(&self, priority: Priority, cause: Cause) {
+        self.class(priority).lost[cause as usize].add(1);
+    }
+}
+
+/// Datagrams to one peer.
+#[derive(Default, Debug)]
+#[repr(align(64))]
+pub struct PeerSent {
+    /// Datagrams, alive ones included: the sequence that comes next.
+    pub datagrams: Count,
+    /// Their bytes, as UDP's payload.
+    pub bytes: Count,
+    /// Packages sent whole or with their last part.
+    pub packages: Count,
+    /// Parts of packages.
+    pub fragments: Count,
+    /// Datagrams that the socket did not take; they are among `datagrams`.
+    pub unsent: Count,
+}
+
+/// Datagrams from one peer.
+#[derive(Default, Debug)]
+#[repr(align(64))]
+pub struct PeerReceived {
+    /// Datagrams taken.
+    pub datagrams: Count,
+    /// Their bytes, as UDP's payload.
+    pub bytes: Count,
+    /// Packages that came whole, or with their last part.
+    pub packages: Count,
+    /// Parts of packages.
+    pub fragments: Count,
+    /// Datagrams given up as lost on the wire.
+    pub lost: Count,
+    /// Datagrams given up, which then came nevertheless, and were taken.
+    pub returned: Count,
+    /// Datagrams that came before, or so late that it cannot be told; dropped.
+    pub copies: Count,
+    /// Datagrams of an earlier life of the peer, or of one that is doubted; dropped.
+    pub old: Count,
+    /// Datagrams that came after later ones; taken.
+    pub overtaken: Count,
+    /// Datagrams with its address that are wrong in themselves; dropped.
+    pub damaged: Count,
+    /// Datagrams of another version or digest, or of an address that is not its; dropped.
+    pub refused: Count,
+    /// Lives of it that were heard, without the first.
+    pub restarts: Count,
+}
+
+impl PeerReceived {
+    /// Datagrams lost on the wire, as far as is known.
+    pub fn missing(&self) -> u64 {
+        self.lost.get().saturating_sub(self.returned.get())
+    }
+}
