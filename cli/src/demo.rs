@@ -114,7 +114,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let node = choose_node(&installation, None)?.name.clone();
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
     let speech = Speech::begin()?;
-    let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?)?;
+    let resolved = crate::resolved::of_node(&installation, &node);
+    let mut launch = Launch::begin(installation, &node, std::env::current_exe()?, events()?, &resolved)?;
     let outcome = watch(arguments, long, &mut launch, &speech);
     let summary = summary(&mut launch);
     let code = end(launch, &speech);

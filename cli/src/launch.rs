@@ -89,8 +89,10 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let node = choose_node(&installation, arguments.node.as_deref())?.name.clone();
     let mut manager = Manager::from_environment(|warning| speech.complain(warning));
     manager.starting(&node);
+    let resolved = crate::resolved::of_node(&installation, &node);
     let sockets = sockets::of(installation.clone(), node.clone());
-    let mut launch = Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, sockets)?;
+    let mut launch =
+        Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, &resolved, sockets)?;
     manager.ready(&launch);
     let mut view = View::new(arguments.quiet, speech);
     view.began(&launch, &node);

@@ -31,6 +31,7 @@ mod new;
 mod param;
 mod ping;
 mod published;
+mod resolved;
 mod round;
 mod router;
 mod run;

@@ -69,7 +69,7 @@ impl Module for Wheels {
     }
 
     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if data.read(&self.own).is_some() {
+        if data.read(&self.own)?.is_some() {
             RECEIVED.fetch_add(1, Ordering::Relaxed);
         }
         Ok(())

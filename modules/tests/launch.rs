@@ -136,7 +136,7 @@ fn script(folder: &Path) -> PathBuf {
 impl Ground {
     fn begin(&mut self) -> Result<Launch, LaunchError> {
         let program = std::env::current_exe().unwrap();
-        Launch::begin(self.installation.clone(), "main", program, self.events.take().unwrap())
+        Launch::begin(self.installation.clone(), "main", program, self.events.take().unwrap(), b"{}")
     }
 
     fn node(&self) -> PathBuf {

@@ -26,6 +26,31 @@ fn modules_start_in_order_stop_in_reverse_and_leave_nothing() {
 }
 
 #[test]
+fn what_a_configuration_resolved_to_lies_beside_the_mailboxes() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "optional = true")]);
+    let read = std::fs::read_to_string(robot.node.path().join("node.json")).unwrap();
+    let resolved: serde_json::Value = serde_json::from_str(&read).unwrap();
+    assert_eq!((&resolved["format"], &resolved["node"]), (&1.into(), &"main".into()));
+    assert_eq!(resolved["layout"], rohrpost_mailbox::LAYOUT_VERSION);
+    assert_eq!(resolved["launch"]["number"], robot.installation.launch_of(&robot.installation.nodes[0]).raw());
+    assert_eq!(resolved["routes"], serde_json::json!([]), "there is one node");
+    let modules = resolved["installation"]["nodes"][0]["modules"].as_array().unwrap();
+    let told: Vec<_> =
+        modules.iter().map(|module| (module["name"].as_str().unwrap(), module["number"].clone())).collect();
+    let names = ["output.0", "probe.0"];
+    assert_eq!(told, names.map(|name| (name, robot.name(name).raw().into())));
+    assert_eq!((&modules[0]["optional"], &modules[1]["optional"]), (&false.into(), &true.into()));
+    // What is there by the name is a mailbox.
+    let mailbox = format!("{:08x}.mbx", modules[1]["number"].as_u64().unwrap());
+    assert!(robot.node.path().join(mailbox).exists());
+    let checked = place.say(&["check", "test.toml", "--json"]).json();
+    assert_eq!(checked["installation"], resolved["installation"], "`check` says the same");
+    launch.stop();
+    place.assert_empty();
+}
+
+#[test]
 fn a_module_that_is_to_wait_stays_off_until_it_is_switched_on() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "start = \"off\""), &probe("probe.1", "", "")]);

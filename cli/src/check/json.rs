@@ -1,13 +1,8 @@
-//! What `check` says, for programs. Durations are in milliseconds, sizes in bytes.
+//! What `check` says, for programs.
 
-use rohrpost::Name;
-use rohrpost_config::{
-    Errors, Installation, MailboxSpec, MissingProgram, Module, Program, Reach, RestartPolicy, Scheduling, Start,
-    TimeSource, bounds,
-};
-use rohrpost_network::{Bound, FlowBound, Network, Tdma};
+use crate::resolved;
+use rohrpost_config::{Errors, Installation, MissingProgram};
 use serde_json::{Value, json};
-use std::time::Duration;
 
 /// A file with mistakes.
 pub(super) fn errors(errors: &Errors) -> Value {
@@ -18,164 +13,22 @@ pub(super) fn errors(errors: &Errors) -> Value {
     json!({ "file": file, "right": false, "errors": problems })
 }
 
-/// A file that is right, as `explain` tells it.
-pub(super) fn installation(installation: &Installation, only: Option<&str>, missing: &[MissingProgram]) -> Value {
-    let Installation { name, path, system, classes, output, .. } = installation;
-    let text = |name: Name| classes.format(name);
-    let class_entries = classes.iter().map(|entry| {
-        let scheduling = scheduling(installation.scheduling(entry.class));
-        json!({ "id": entry.class.0, "name": entry.name, "text": entry.text, "scheduling": scheduling })
+/// A file that is right, as `explain` tells it. `notes`: what people are told besides.
+pub(super) fn installation(
+    installation: &Installation,
+    only: Option<&str>,
+    missing: &[MissingProgram],
+    notes: &[String],
+) -> Value {
+    let missing = missing.iter().map(|program| {
+        let module = installation.classes.format(program.module);
+        json!({ "module": module, "optional": program.optional, "message": program.message })
     });
-    let nodes = installation.nodes.iter().filter(|node| only.is_none_or(|name| name == node.name)).map(|node| {
-        let modules: Vec<Value> = installation.modules_on(&node.name).map(|it| module(installation, it)).collect();
-        let network = match node.reach {
-            Reach::Lan => "lan",
-            Reach::Tcp => "tcp",
-        };
-        json!({
-            "name": node.name, "network": network, "address": node.address, "mode": format!("{:04o}", node.mode),
-            "tools": [node.tools.start(), node.tools.end()], "modules": modules,
-        })
-    });
-    let levels = output.levels.iter().map(|(module, level)| (text(*module), level.as_str().into()));
-    let show = installation.gui.show.iter();
-    let show = show.map(|show| json!({ "from": text(show.from), "data": show.data, "rate_hz": show.rate }));
-    let bounds = bounds(installation);
-    let flows = installation.flows.iter().enumerate().map(|(index, flow)| {
-        let bound = bounds.iter().find(|bound| bound.flow == index);
-        json!({
-            "from": text(flow.from), "to": text(flow.to), "carries": flow.carries.map(|carries| carries.to_string()),
-            "size": flow.size, "period_ms": ms(flow.period), "deadline_ms": ms(flow.deadline), "at_worst": bound.map(at_worst),
-        })
-    });
-    let notes = missing.iter().map(
-        |program| json!({ "module": text(program.module), "optional": program.optional, "message": program.message }),
-    );
     json!({
-        "file": path.display().to_string(),
+        "file": installation.path.display().to_string(),
         "right": true,
-        "installation": {
-            "name": name,
-            "system": { "id": system.id, "name": system.name },
-            "time": time(installation),
-            "network": installation.network.map(|it| network(installation, it)),
-            "tdma": installation.tdma.as_ref().map(|tdma| self::tdma(installation, tdma)),
-            "digest": installation.digest().to_string(),
-            "parameters": installation.parameters,
-            "classes": class_entries.collect::<Vec<_>>(),
-            "nodes": nodes.collect::<Vec<_>>(),
-            "output": {
-                "level": output.level.as_str(), "levels": levels.collect::<serde_json::Map<_, _>>(),
-                "ring": output.ring, "file": output.file,
-            },
-            "gui": show.collect::<Vec<_>>(),
-            "flows": flows.collect::<Vec<_>>(),
-        },
-        "missing_programs": notes.collect::<Vec<_>>(),
+        "installation": resolved::of(installation, only),
+        "missing_programs": missing.collect::<Vec<_>>(),
+        "notes": notes,
     })
-}
-
-fn module(installation: &Installation, module: &Module) -> Value {
-    let text = |name: &Name| installation.classes.format(*name);
-    let calls = module.calls.iter().map(|to| {
-        let although = module.although.iter().find(|(name, _)| name == to).map(|(_, why)| why);
-        json!({ "to": text(to), "although": although })
-    });
-    let runs = match &module.program {
-        Program::Builtin(name) => json!({ "builtin": name }),
-        Program::Command(words) => json!({ "program": words }),
-    };
-    let policy = match module.restart.policy {
-        RestartPolicy::Never => "never",
-        RestartPolicy::OnFailure => "on-failure",
-        RestartPolicy::Always => "always",
-    };
-    let mailboxes = module.mailboxes.each().into_iter().map(|(key, spec)| (key.into(), mailbox(spec)));
-    json!({
-        "name": text(&module.name),
-        "line": module.line,
-        "priority": module.name.class().0,
-        "scheduling": scheduling(installation.scheduling(module.name.class())),
-        "faces": module.faces.iter().map(text).collect::<Vec<_>>(),
-        "runs": runs,
-        "optional": module.optional,
-        "on": module.start == Start::On,
-        "calls": calls.collect::<Vec<_>>(),
-        "settings": module.settings,
-        "restart": {
-            "policy": policy, "backoff_ms": ms(module.restart.backoff), "at_most": module.restart.at_most,
-            "within_ms": ms(module.restart.within),
-        },
-        "ready_within_ms": ms(module.ready_within),
-        "stop_within_ms": ms(module.stop_within),
-        "mailboxes": mailboxes.collect::<serde_json::Map<_, _>>(),
-    })
-}
-
-fn mailbox(spec: &MailboxSpec) -> Value {
-    json!({
-        "slots": spec.slots, "size": spec.size, "full": spec.full.name(), "max_age_ms": spec.max_age.map(ms),
-        "claims": spec.claims, "memory": spec.memory(),
-    })
-}
-
-fn scheduling(scheduling: Scheduling) -> Value {
-    match scheduling {
-        Scheduling::Fifo { priority } => json!({ "fifo": priority }),
-        Scheduling::Normal { nice } => json!({ "nice": nice }),
-    }
-}
-
-/// `rest_port`: null where there are time slots.
-fn network(installation: &Installation, network: Network) -> Value {
-    json!({
-        "security": network.security.as_str(), "port": network.port, "time_port": network.time_port(),
-        "rest_port": installation.rest_port(), "mtu": network.mtu, "datagram_bytes_max": network.datagram_bytes_max,
-        "rate_bytes_s": network.rate_bytes_s, "quota_bytes": network.quota_bytes, "bulk_below": network.bulk_below,
-    })
-}
-
-fn tdma(installation: &Installation, tdma: &Tdma) -> Value {
-    let slots = tdma.slots.iter().map(|slot| {
-        json!({
-            "node": installation.nodes.get(usize::from(slot.node)).map(|node| &node.name), "offset_ms": ms(slot.offset),
-            "length_ms": ms(slot.length), "period": slot.period, "phase": slot.phase,
-            "bytes": tdma.budget_bytes(slot.length),
-        })
-    });
-    json!({
-        "cycle_ms": ms(tdma.cycle), "synchronisation_ms": ms(tdma.synchronisation), "guard_ms": ms(tdma.guard),
-        "link_bytes_s": tdma.link_bytes_s, "cycles": tdma.cycles(),
-        "tunnel": tdma.tunnel.map(|tunnel| format!("{}/{}", tunnel.network, tunnel.prefix)),
-        "slots": slots.collect::<Vec<_>>(),
-    })
-}
-
-/// The worst case of a flow between nodes: its latency and what that consists of, or why there is none.
-fn at_worst(bound: &FlowBound) -> Value {
-    match &bound.latency {
-        Err(why) => json!({ "level": bound.level, "latency_ms": null, "why": why.to_string() }),
-        Ok(Bound { latency, slot, waits, slots, others, own_earlier, said, own, datagrams, forward }) => json!({
-            "level": bound.level, "latency_ms": ms(*latency), "slot": slot, "waits_ms": ms(*waits), "slots": slots,
-            "others_ms": ms(*others), "own_earlier": own_earlier, "said_ms": ms(*said), "own_ms": ms(*own),
-            "datagrams": datagrams, "forward_ms": ms(*forward),
-        }),
-    }
-}
-
-fn time(installation: &Installation) -> Value {
-    match &installation.time {
-        TimeSource::Local => json!({ "source": "local" }),
-        TimeSource::Master { masters, interval } => {
-            let nodes = masters.iter().filter_map(|index| installation.nodes.get(usize::from(*index)));
-            let masters: Vec<&str> = nodes.map(|node| node.name.as_str()).collect();
-            json!({ "source": "master", "masters": masters, "interval_ms": ms(*interval) })
-        }
-        TimeSource::Simulation { speed } => json!({ "source": "simulation", "speed": speed }),
-        TimeSource::Log => json!({ "source": "log" }),
-    }
-}
-
-fn ms(duration: Duration) -> f64 {
-    duration.as_secs_f64() * 1e3
 }

@@ -62,28 +62,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         rohrpost::launch::choose_node(&installation, only)?;
     }
     let missing = missing_programs(&installation, only)?;
+    let mut notes = told_apart_by_size(&installation);
+    notes.extend(daemons_here(&installation, Path::new("/proc")));
     if arguments.json {
-        say(json::installation(&installation, only, &missing));
+        say(json::installation(&installation, only, &missing, &notes));
         return Ok(ExitCode::SUCCESS);
     }
     say(explain(&installation, only).trim_end());
-    for program in missing {
-        say(format_args!("note: {program}"));
-    }
-    for note in told_apart_by_size(&installation) {
+    for note in missing.iter().map(ToString::to_string).chain(notes) {
         say(format_args!("note: {note}"));
     }
-    if let TimeSource::Master { .. } = installation.time {
-        for daemon in daemons::running(Path::new("/proc")) {
-            say(format_args!(
-                "note: {} runs on this computer; if that is a node, end it: {}; {}",
-                daemon.name,
-                daemon.ends,
-                daemons::WHY
-            ));
-        }
-    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Time daemons that run on this computer, where a common time is told.
+fn daemons_here(installation: &Installation, processes: &Path) -> Vec<String> {
+    if !matches!(installation.time, TimeSource::Master { .. }) {
+        return Vec::new();
+    }
+    let told = daemons::running(processes).into_iter().map(|daemon| {
+        let (name, ends, why) = (daemon.name, daemon.ends, daemons::WHY);
+        format!("{name} runs on this computer; if that is a node, end it: {ends}; {why}")
+    });
+    told.collect()
 }
 
 /// Flows between the same modules of two nodes of which the file does not say what they carry: routers go by the size of each package.

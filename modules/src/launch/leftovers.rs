@@ -14,6 +14,8 @@ pub(super) const KILL_TIME: Duration = Duration::from_secs(5);
 
 /// File in a node's directory that tells tools which configuration runs: its path, then the node's name.
 pub const CONFIG_FILE: &str = "config";
+/// What it resolved to, for programs: a file of the node's directory.
+const RESOLVED_FILE: &str = "node.json";
 
 /// Ends modules of this node that still live though no launch watches them, and removes mailboxes that nobody owns.
 pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str) -> Result<Vec<String>, LaunchError> {
@@ -78,9 +80,20 @@ pub(super) fn remove_mailboxes(node: &Node, module: &Module) -> Result<(), NodeE
     result
 }
 
-/// Says in the node's directory which configuration runs.
-pub(super) fn note_config(node: &Node, installation: &Installation, node_name: &str) -> Result<(), NodeError> {
+/// Says in the node's directory which configuration runs, and what it resolved to. Each file appears whole.
+pub(super) fn note_config(
+    node: &Node,
+    installation: &Installation,
+    node_name: &str,
+    resolved: &[u8],
+) -> Result<(), NodeError> {
     let path = installation.path.canonicalize().unwrap_or_else(|_| installation.path.clone());
-    let file = node.path().join(CONFIG_FILE);
-    fs::write(&file, format!("{}\n{node_name}\n", path.display())).map_err(|error| NodeError::Io(file, error))
+    let config = format!("{}\n{node_name}\n", path.display());
+    for (name, bytes) in [(CONFIG_FILE, config.as_bytes()), (RESOLVED_FILE, resolved)] {
+        let file = node.path().join(name);
+        let unfinished = file.with_extension("new");
+        let written = fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, &file));
+        written.map_err(|error| NodeError::Io(file, error))?;
+    }
+    Ok(())
 }

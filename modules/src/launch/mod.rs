@@ -115,7 +115,8 @@ pub fn choose_node<'a>(installation: &'a Installation, name: Option<&str>) -> Re
 impl Launch {
     /// Makes the node and starts its modules one after the other, each when the one before is ready; then switches them on.
     /// The collector of output is switched on as soon as it is ready.
-    /// `executable` is the `rohrpost` command, which holds the built-in modules.
+    /// `executable` is the `rohrpost` command, which holds the built-in modules; `resolved` is laid beside the mailboxes as `node.json`: what the
+    /// configuration resolved to, for programs.
     ///
     /// # Errors
     /// When the node runs already, a program is missing, or a module does not become ready. Then nothing is left running.
@@ -124,8 +125,9 @@ impl Launch {
         node_name: &str,
         executable: PathBuf,
         events: Receiver<Event>,
+        resolved: &[u8],
     ) -> Result<Self, LaunchError> {
-        Self::begin_keeping(installation, node_name, executable, events, |_| Vec::new())
+        Self::begin_keeping(installation, node_name, executable, events, resolved, |_| Vec::new())
     }
 
     /// The same, and it keeps what `keep` gives for a module: sockets, say. Each process of that module has them
@@ -138,6 +140,7 @@ impl Launch {
         node_name: &str,
         executable: PathBuf,
         events: Receiver<Event>,
+        resolved: &[u8],
         keep: impl Fn(&Module) -> Vec<OwnedFd>,
     ) -> Result<Self, LaunchError> {
         let usual_nice = program::hurry();
@@ -152,7 +155,7 @@ impl Launch {
         let mut notes = leftovers::end(&node, &installation, node_name)?;
         notes.extend(missing.iter().map(ToString::to_string));
         let time = begin_time(&node, &installation, node_name)?;
-        leftovers::note_config(&node, &installation, node_name)?;
+        leftovers::note_config(&node, &installation, node_name, resolved)?;
         let tool = ToolLink::join_as_launch(&installation, &node, node_name, PATIENCE)?;
         let counter = Counter::open(&tool.link, &installation).map_err(ClientError::from)?;
         let bell = Bell::listen(events, tool.link.participant())?;
