@@ -2,7 +2,7 @@
 
 use super::target::{Running, Target};
 use super::{Failure, say};
-use rohrpost::launch::{ChildState, ControlError, Phase};
+use rohrpost::launcher::{ChildState, ControlError, Phase};
 use rohrpost::mailbox::{ModuleState, Name};
 use rohrpost::output::plain;
 use rohrpost::survey::Scope;

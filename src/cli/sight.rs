@@ -8,7 +8,7 @@ use rohrpost::common::GET_DATA;
 use rohrpost::config::Installation;
 use rohrpost::description::Description;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
-use rohrpost::launch::{Look, launcher_of};
+use rohrpost::launcher::{Look, launcher_of};
 use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::mailbox::{InspectError, Name, SendError, realtime_ns};
 use rohrpost::output::{iso, plain};
