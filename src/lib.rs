@@ -65,7 +65,7 @@ pub use rohrpost_modules::runtime::{
     describe, find_other_versions, find_running,
 };
 pub use rohrpost_modules::{
-    Module, ModuleError, choice, common, data, description, interface, interfaces, launch, output, parameter,
+    Module, ModuleError, choice, common, data, description, interface, interfaces, launch, launcher, output, parameter,
     parameters, run, survey, types, value,
 };
 

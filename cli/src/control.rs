@@ -2,7 +2,7 @@
 
 use super::target::{Running, Target};
 use crate::terminal::{Failure, say};
-use rohrpost::launch::{ChildState, ControlError, Phase};
+use rohrpost::launcher::{ChildState, ControlError, Phase};
 use rohrpost::output::plain;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, ToolLink};

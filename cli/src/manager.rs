@@ -3,7 +3,8 @@
 //! The protocol is sd_notify(3): lines in a datagram. The crate for it waits when the manager does not read, and knows no
 //! abstract socket; launch must never wait, and containers have such sockets.
 
-use rohrpost::launch::{Launch, Phase};
+use rohrpost::launch::Launch;
+use rohrpost::launcher::Phase;
 use std::collections::VecDeque;
 use std::ffi::OsStr;
 use std::io::{self, ErrorKind};

@@ -7,7 +7,7 @@ use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
 use rohrpost::description::Description;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
-use rohrpost::launch::{Look, launcher_of};
+use rohrpost::launcher::{Look, launcher_of};
 use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::output::{iso, plain};
 use rohrpost::serde::de::DeserializeOwned;

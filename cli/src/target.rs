@@ -3,7 +3,8 @@
 use super::sight::Sight;
 use crate::terminal::Failure;
 use clap::Args;
-use rohrpost::launch::{choose_node, launcher_of};
+use rohrpost::launch::choose_node;
+use rohrpost::launcher::launcher_of;
 use rohrpost::output::plain;
 use rohrpost::survey::node_of;
 use rohrpost::{Fault, ToolLink};

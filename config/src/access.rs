@@ -1,10 +1,8 @@
 //! Who may command whom, section `[access]`: by class.
 
 use crate::classes::ClassTable;
-use crate::installation::Installation;
-use crate::module::{Lines, Module};
-use crate::reader::{Item, Reader, Section};
-use rohrpost_mailbox::{Class, Name};
+use crate::reader::{Item, Section};
+use rohrpost_mailbox::Class;
 
 /// Which classes may command the modules of a class. Of a class without such a rule all may.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,7 +17,7 @@ pub struct Access {
 
 impl Access {
     /// Whether it keeps modules of a class from commanding those of another.
-    fn refuses(&self, caller: Class, called: Class) -> bool {
+    pub(crate) fn refuses(&self, caller: Class, called: Class) -> bool {
         self.class == called && !self.callers.contains(&caller)
     }
 
@@ -44,60 +42,10 @@ impl Access {
     }
 }
 
-impl Installation {
-    /// The rule of `[access]` that keeps whoever has this name from commanding the other one, if there is one. Launch commands all that runs on
-    /// its node: it switches modules on and off, whoever else may.
-    pub fn access_against(&self, from: Name, to: Name) -> Option<&Access> {
-        let rule = self.access.iter().find(|access| access.refuses(from.class(), to.class()))?;
-        let is_launch =
-            |node: &crate::Node| self.launch_of(node) == from.module() && self.node_of(to) == Some(&node.name);
-        (!self.nodes.iter().any(is_launch)).then_some(rule)
-    }
-}
-
-/// Nobody is listed as a caller of whom it may not command, and no face lets in whom its module keeps out: a router goes by the class of the
-/// name that is commanded.
-pub(crate) fn judge(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
-    for (to, line) in module.calls.iter().zip(&lines.calls) {
-        let refuses = |access: &&Access| access.refuses(module.name.class(), to.class());
-        if let Some(access) = installation.access.iter().find(refuses) {
-            reader.report(*line, told(installation, module, *to, access));
-        }
-    }
-    let rule = |class| installation.access.iter().find(|access| access.class == class);
-    let Some(access) = rule(module.name.class()) else { return };
-    for face in module.faces.iter().filter(|face| rule(face.class()).is_none()) {
-        reader.report(module.line, told_of_face(installation, module, *face, access));
-    }
-}
-
-fn told_of_face(installation: &Installation, module: &Module, face: Name, access: &Access) -> String {
-    let classes = &installation.classes;
-    let class = classes.name(face.class()).unwrap_or_default();
-    format!(
-        "module `{}` may be commanded by the classes of [access] in line {} alone, and its face `{}` by all; add a line for class `{class}` there",
-        classes.format(module.name),
-        access.line,
-        classes.format(face),
-    )
-}
-
-fn told(installation: &Installation, module: &Module, to: Name, access: &Access) -> String {
-    let classes = &installation.classes;
-    let class = |class| classes.name(class).unwrap_or_default();
-    format!(
-        "module `{}` calls `{}`, and [access] in line {} does not let class `{}` command class `{}`; add it there, or drop the call",
-        classes.format(module.name),
-        classes.format(to),
-        access.line,
-        class(module.name.class()),
-        class(access.class)
-    )
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::Installation;
+    use rohrpost_mailbox::Name;
 
     const FILE: &str = include_str!("../tests/two_nodes.toml");
 

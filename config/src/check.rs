@@ -1,6 +1,7 @@
 //! Rules across modules.
 
-use crate::access;
+mod access;
+
 use crate::flow::Flow;
 use crate::installation::Installation;
 use crate::module::{Lines, Module};

@@ -1,6 +1,6 @@
 //! Classes by name and number, and with them mailbox names as people write them: `laser.0`, `1.laser.0.2`.
 
-use crate::reader::{Section, nearest};
+use crate::reader::{Section, is_word, nearest};
 use rohrpost_mailbox::{Class, Name, local};
 
 /// Class of programs run by hand; every installation has it.
@@ -193,12 +193,6 @@ impl ClassTable {
 /// The part of a module's name that names its class.
 pub(crate) fn class_of(text: &str) -> &str {
     text.split('.').next().unwrap_or(text)
-}
-
-/// Whether a text can name a class or a node. A letter comes first, so that a number is never a name.
-pub fn is_word(text: &str) -> bool {
-    text.starts_with(|c: char| c.is_ascii_lowercase())
-        && text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
 }
 
 fn byte(text: &str, part: &'static str, digits: &str) -> Result<u8, NameTextError> {

@@ -54,3 +54,17 @@ impl fmt::Display for Errors {
 }
 
 impl std::error::Error for Errors {}
+
+/// Settings that a module cannot use.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}:{line}: settings of module `{module}`: {message}", path.display())]
+pub struct SettingsError {
+    /// The configuration file.
+    pub path: PathBuf,
+    /// Line of the setting in question.
+    pub line: usize,
+    /// The module.
+    pub module: String,
+    /// What is wrong, in the words of the type.
+    pub message: String,
+}

@@ -5,13 +5,11 @@ mod timeline;
 
 use crate::Full;
 use crate::installation::Installation;
-use crate::mailbox::MailboxSpec;
-use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start};
-use crate::network::TRANSIT;
+use crate::mailbox::{MailboxSpec, TRANSIT};
+use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, TCP_CLIENT, TCP_ROUTER};
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
 use crate::saved::SavedValue;
-use crate::tcp::{TCP_CLIENT, TCP_ROUTER};
 use crate::time::TimeSource;
 use crate::units::{duration_text, size_text};
 use rohrpost_mailbox::Name;

@@ -32,6 +32,7 @@
 #![forbid(unsafe_code)]
 
 mod access;
+mod beyond;
 mod calls;
 mod check;
 mod classes;
@@ -44,6 +45,8 @@ mod flow;
 mod gui;
 mod installation;
 mod keys;
+mod lan;
+mod load;
 mod mailbox;
 mod module;
 mod network;
@@ -62,29 +65,27 @@ mod time;
 mod units;
 
 pub use access::Access;
-pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TCP, TOOL, is_word as is_class_name};
+pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TCP, TOOL};
 pub use contents::{Contents, ContentsError};
 pub use digest::Digest;
-pub use errors::{Errors, Problem};
+pub use errors::{Errors, Problem, SettingsError};
 pub use explain::explain;
 pub use flow::Flow;
 pub use gui::{Gui, Show};
 pub use installation::Installation;
 pub use keys::{KEY_BYTES, Key, Keys, KeysError, check_secret};
-pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX};
-pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start};
-pub use network::TRANSIT;
+pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX, TRANSIT};
+pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER};
 pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};
 pub use plan::bounds;
 pub use principal::Principal;
 pub use program::{MissingProgram, find_program};
-pub use reader::nearest;
+pub use reader::{is_word as is_class_name, nearest};
 pub use rohrpost_mailbox::Full;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
-pub use settings::SettingsError;
-pub use tcp::{TCP_CLIENT, TCP_ROUTER, TCP_SERVER, Tcp};
+pub use tcp::{TCP_SERVER, Tcp};
 pub use time::TimeSource;
 pub use units::{
     UnitError, duration_decimal, duration_text, parse_duration, parse_rate, parse_size, rate_text, size_text,

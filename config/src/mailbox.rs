@@ -24,6 +24,18 @@ pub struct MailboxSpec {
     pub claims: u8,
 }
 
+/// The mailbox in which a router takes what goes to other nodes: slots for the largest body each. What has waited longer than its
+/// `max_age` is dropped, and its caller not told: only a stopped router leaves it there for so long, and the caller's next try gets through,
+/// where an answer would end its call. A participant has a sender into it, and so a claim, for
+/// each mailbox of another node that it sends to.
+pub const TRANSIT: MailboxSpec = MailboxSpec {
+    slots: 64,
+    size: BODY_BYTES_MAX as u32,
+    full: Full::Displace,
+    max_age: Some(Duration::from_secs(2)),
+    claims: u8::MAX,
+};
+
 impl MailboxSpec {
     /// Bytes of shared memory that it takes, all in all.
     pub fn memory(&self) -> u64 {

@@ -2,16 +2,18 @@
 
 use crate::calls::Calls;
 use crate::directory::Directory;
-use crate::mailbox::{MailboxLines, Mailboxes, lines_at};
-use crate::network::TRANSIT;
+use crate::mailbox::{MailboxLines, Mailboxes, TRANSIT, lines_at};
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
-use crate::tcp::{TCP_CLIENT, TCP_ROUTER};
 use crate::units::duration_text;
 use rohrpost_mailbox::Name;
 use serde::Deserialize;
 use std::time::Duration;
 
+/// The built-in module that is a node's client of the TCP router.
+pub const TCP_CLIENT: &str = "tcp-client";
+/// The built-in module that is the server.
+pub const TCP_ROUTER: &str = "tcp-router";
 /// The modules that the `rohrpost` program itself contains.
 pub const BUILTINS: [&str; 5] = ["sim", "carmen", "mapper", "pilot", "output"];
 

@@ -4,36 +4,20 @@
 //! on the first node of the file, `router.1` on the second, and so on.
 
 use crate::classes::{ClassTable, ROUTER};
-use crate::installation::Installation;
-use crate::keys::{self, Keys};
-use crate::mailbox::MailboxSpec;
+use crate::keys;
 use crate::module::{Lines, Module, Restart, RestartPolicy};
 use crate::node::Node;
 use crate::reader::Section;
 use crate::units::rate_text;
-use rohrpost_mailbox::{BODY_BYTES_MAX, Full, Name};
-use rohrpost_network::{NODES_MAX, Network, PAYLOAD_MAX, Route, Security, Tdma};
+use rohrpost_mailbox::Name;
+use rohrpost_network::{NODES_MAX, Network, PAYLOAD_MAX, Security, Tdma};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The mailbox in which a router takes what goes to other nodes: slots for the largest body each. What has waited longer than its
-/// `max_age` is dropped, and its caller not told: only a stopped router leaves it there for so long, and the caller's next try gets through,
-/// where an answer would end its call. A participant has a sender into it, and so a claim, for
-/// each mailbox of another node that it sends to.
-pub const TRANSIT: MailboxSpec = MailboxSpec {
-    slots: 64,
-    size: BODY_BYTES_MAX as u32,
-    full: Full::Displace,
-    max_age: Some(Duration::from_secs(2)),
-    claims: u8::MAX,
-};
-
 /// What a file with several nodes must say.
 const CHOICES: &str = "write `security = \"keys\"` (what passes between nodes is sealed; `rohrpost keys new` makes what it takes), or \
                        `security = \"none\"` (it is neither sealed nor signed, and anyone on the network may read and send)";
-const UNPROTECTED: &str =
-    "security = \"none\": packages between nodes are neither sealed nor signed; use a network that nobody else reaches";
 const PORT: u16 = 21_117;
 const MTU: i64 = 1500;
 const MTUS: RangeInclusive<i64> = 576..=65_535;
@@ -151,54 +135,4 @@ pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(
         Module::by_itself(name, node, ROUTER, restart)
     };
     nodes.iter().take(NODES_MAX).enumerate().map(router).collect()
-}
-
-impl Installation {
-    /// What `check` and every start say of the security of the LAN; none if nothing goes over it.
-    pub fn security_text(&self) -> Option<String> {
-        let network = self.network?;
-        Some(match (network.security, &self.keys) {
-            (Security::Keys, Some(folder)) => {
-                format!(
-                    "security = \"keys\": what passes between nodes is sealed with {}",
-                    Keys::file(folder).display()
-                )
-            }
-            _ => UNPROTECTED.into(),
-        })
-    }
-
-    /// The place of a node in the file, from 0: what routers call it.
-    pub fn node_index(&self, node: &str) -> Option<u8> {
-        self.nodes.iter().position(|known| known.name == node).and_then(|index| u8::try_from(index).ok())
-    }
-
-    /// The place of a node on the LAN, which is that among all nodes; none if it is not there.
-    pub fn lan_index(&self, node: &str) -> Option<u8> {
-        self.node_index(node).filter(|index| usize::from(*index) < self.lan_nodes().len())
-    }
-
-    /// The router of a node; none if it is not on the LAN, or alone there.
-    pub fn router_of(&self, node: &str) -> Option<Name> {
-        let class = self.classes.id(ROUTER).filter(|_| self.network.is_some())?;
-        self.lan_index(node).map(|index| Name::new(self.system.id, class.0, index, rohrpost_mailbox::local::COMMANDS))
-    }
-
-    /// All names that lie on other nodes of the LAN than this one: their modules, faces and tools, each with all its mailboxes. Sorted by name; no
-    /// two overlap.
-    pub fn routes_from(&self, node: &str) -> Vec<Route> {
-        let mut routes = Vec::new();
-        for (other, index) in self.lan_nodes().iter().zip(0..).filter(|(other, _)| other.name != node) {
-            let whole = |first: Name, last: Name| Route {
-                first: first.with_local(0),
-                last: last.with_local(u8::MAX),
-                node: index,
-            };
-            let tool = |instance: u8| Name::new(self.system.id, self.classes.tool().0, instance, 0);
-            routes.push(whole(tool(*other.tools.start()), tool(*other.tools.end())));
-            routes.extend(self.modules_on(&other.name).flat_map(Module::names).map(|name| whole(name, name)));
-        }
-        routes.sort_by_key(|route| route.first);
-        routes
-    }
 }

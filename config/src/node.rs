@@ -1,7 +1,6 @@
 //! The system and its nodes: which computers there are, and which tool instances each may hand out.
 
-use crate::classes::is_word;
-use crate::reader::{Item, Section};
+use crate::reader::{Item, Section, is_word};
 use std::net::IpAddr;
 use std::ops::RangeInclusive;
 

@@ -4,7 +4,6 @@
 //! name any other. A wrong value is reported and read as missing: the defaults that then stand in never leave this
 //! crate, since a file with problems gives no installation.
 
-use crate::classes::is_word;
 use crate::errors::Problem;
 use crate::units;
 use std::cell::RefCell;
@@ -395,4 +394,10 @@ pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
     };
     let best = candidates.into_iter().map(|candidate| (likeness(candidate), candidate));
     best.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(likeness, _)| *likeness >= 0.6).map(|(_, candidate)| candidate)
+}
+
+/// Whether a text can name a class or a node. A letter comes first, so that a number is never a name.
+pub fn is_word(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_lowercase())
+        && text.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
 }

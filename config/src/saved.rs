@@ -1,10 +1,9 @@
 //! Values of parameters that were saved: they go before the settings of the same names.
 
-use crate::errors::{Errors, Problem};
+use crate::errors::{Errors, Problem, SettingsError};
 use crate::installation::Installation;
 use crate::module::Module;
 use crate::reader::{Item, Reader, Section, line_of, nearest};
-use crate::settings::SettingsError;
 use rohrpost_mailbox::Name;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};

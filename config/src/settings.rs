@@ -1,26 +1,12 @@
 //! The free settings of a module, given a type.
 
+use crate::errors::SettingsError;
 use crate::installation::Installation;
 use crate::module::Module;
 use crate::reader::line_of;
 use serde::de::DeserializeOwned;
-use std::path::PathBuf;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
-
-/// Settings that a module cannot use.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}:{line}: settings of module `{module}`: {message}", path.display())]
-pub struct SettingsError {
-    /// The configuration file.
-    pub path: PathBuf,
-    /// Line of the setting in question.
-    pub line: usize,
-    /// The module.
-    pub module: String,
-    /// What is wrong, in the words of the type.
-    pub message: String,
-}
 
 impl Installation {
     /// Turns a module's settings into a type, best one with `#[serde(deny_unknown_fields)]`. An error names the line of the

@@ -1,6 +1,6 @@
 //! What runs on all nodes: the own one is looked at, the others are shown by their launches. Nobody is waited for.
 
-use rohrpost::launch::{Look, launcher_of};
+use rohrpost::launcher::{Look, launcher_of};
 use rohrpost::survey::{Distant, Scope, Seen, Survey};
 use rohrpost::{Class, Context, Name};
 use rohrpost_config::Installation;

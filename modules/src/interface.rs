@@ -1,6 +1,6 @@
 //! What the `interface` attribute makes of a trait: an interface that a module serves and proxies call.
 
-use crate::call::{CallError, Caller, Fault, Pending};
+use crate::call::{CallError, Caller, Fault, Pending, append};
 use crate::description::Description;
 use crate::value::Data;
 use rohrpost_mailbox::Name;
@@ -96,16 +96,6 @@ impl ProxyCore {
         let hash = (port.hash)();
         self.begin::<_, (u64, T)>(crate::common::GET_DATA, hash, &(port.number,))?.wait()
     }
-}
-
-/// Appends a value as postcard.
-///
-/// # Errors
-/// When the value cannot be written (a map of unknown length, say).
-pub fn append<T: serde::Serialize + ?Sized>(to: &mut Vec<u8>, value: &T) -> Result<(), postcard::Error> {
-    let taken = std::mem::take(to);
-    *to = postcard::to_extend(value, taken)?;
-    Ok(())
 }
 
 /// The interfaces of a module: one, or a tuple of them, one a face.

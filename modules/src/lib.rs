@@ -20,6 +20,7 @@ pub mod description;
 pub mod interface;
 pub mod interfaces;
 pub mod launch;
+pub mod launcher;
 #[doc(hidden)]
 pub mod macro_support;
 mod module;

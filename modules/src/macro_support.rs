@@ -1,8 +1,8 @@
 //! What the code that our attributes write refers to. Not for people.
 
+pub use crate::call::append;
 pub use crate::call::{CallError, Caller, Fault, Pending};
 pub use crate::description::{Argument, DataItem, Description, Function};
-pub use crate::interface::append;
 pub use crate::interface::{DataPort, Interface, Proxy, ProxyCore, Serve};
 pub use crate::parameter::{Declared, Parameter, ParameterSet, ParameterType, Refusal, put_parameter};
 pub use crate::runtime::{read_arguments, write_result};

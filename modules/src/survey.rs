@@ -15,34 +15,20 @@ mod form;
 mod standing;
 mod usage;
 
+pub use crate::launcher::Scope;
 pub use distant::{Distant, LookFailure, look_at_all};
 pub use form::Seen;
 pub(crate) use standing::in_words;
 pub use standing::{Standing, Working};
 pub use usage::Usage;
 
-use crate::launch::{ChildState, known_children};
-use postcard_schema::Schema;
+use crate::launcher::{ChildState, known_children};
 use rohrpost_config::{Installation, ROUTER, TCP};
 use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
 use rohrpost_mailbox::{
     ClassTraffic, FlowInfo, InspectError, Latency, Loss, MailboxDetail, MailboxInfo, Name, Node, NodeError,
     ParticipantInfo, SlotInfo, local, monotonic_ns, saturating_sum,
 };
-use serde::{Deserialize, Serialize};
-
-/// How much of a node is looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Scope {
-    /// Its modules, and the traffic by class.
-    Modules,
-    /// These and all mailboxes.
-    Mailboxes,
-    /// These and what everybody sends.
-    All,
-    /// What there is of one module (its raw name): its mailboxes and those that it sends to, what it sends and what is sent to it.
-    Module(u32),
-}
 
 /// A node at one moment.
 #[derive(Clone, Debug)]

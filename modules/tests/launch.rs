@@ -5,8 +5,9 @@
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{ModuleState, Name, Node, base_directory, node_directory};
 use rohrpost_modules::call::CallError;
-use rohrpost_modules::interface::append;
-use rohrpost_modules::launch::{Event, Launch, LaunchError, LauncherInterface, Phase};
+use rohrpost_modules::call::append;
+use rohrpost_modules::launch::{Event, Launch, LaunchError};
+use rohrpost_modules::launcher::{LauncherInterface, Phase};
 use rohrpost_modules::runtime::Context;
 use rohrpost_modules::runtime::ToolLink;
 use rohrpost_modules::{Module, ModuleError, run};

@@ -115,7 +115,8 @@ fn what_a_file_means_can_be_read_by_programs() {
     assert_eq!(motor["mailboxes"]["commands"]["max_age_ms"], 300.0);
     assert_eq!(json["missing_programs"][0]["module"], "motor.0");
     let number = |module: &serde_json::Value| module["number"].as_u64().unwrap();
-    assert_eq!(number(motor), 1 << 24 | motor["priority"].as_u64().unwrap() << 16);
+    let system = installation["system"]["id"].as_u64().unwrap();
+    assert_eq!(number(motor), system << 24 | motor["priority"].as_u64().unwrap() << 16);
     assert_eq!((&motor["required"], &motor["optional"]), (&false.into(), &false.into()));
     // The opposite of what it says of itself.
     std::fs::write(place.path("sealed.toml"), full.replace("security = \"none\"", "security = \"keys\"")).unwrap();

@@ -5,7 +5,7 @@ use crate::output::lines;
 use crate::probe::{COUNT, COUNT_AGAIN, ProbingInterface};
 use nix::sys::signal::Signal;
 use rohrpost::common;
-use rohrpost::launch::{ControlError, LauncherInterface};
+use rohrpost::launcher::{ControlError, LauncherInterface};
 use rohrpost::serde::{Serialize, de::DeserializeOwned};
 use rohrpost::{CallError, Class, Fault};
 use rohrpost_mailbox::{Full, Label, Name, Options, Participant, Receiver, Sender, Shape, Type, local};

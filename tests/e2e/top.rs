@@ -4,7 +4,7 @@ use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::process::Running;
 use crate::terminal::Terminal;
 use nix::sys::signal::Signal;
-use rohrpost::launch::{ChildState, Phase};
+use rohrpost::launcher::{ChildState, Phase};
 use std::process::Stdio;
 
 /// Top looks often, so that tests need not wait.

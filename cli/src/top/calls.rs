@@ -6,7 +6,7 @@ use super::super::target::Running;
 use rohrpost::CallError;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::launch::{ControlError, Look, launcher_of};
+use rohrpost::launcher::{ControlError, Look, launcher_of};
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::survey::{Distant, Scope, Seen, Survey};
 use rohrpost::{Name, ToolLink};

@@ -1,6 +1,6 @@
 //! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed.
 
-use super::check::{self, Refused, Settings as _};
+use super::settings::{self, Refused, Settings as _};
 use crate::interfaces::{Laser, LaserInterface, Player, PlayerInterface, Progress, Wheels, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::robot::carmen::{self, Record};
@@ -29,7 +29,7 @@ pub(super) struct Settings {
     range_max_m: Option<f32>,
 }
 
-impl check::Settings for Settings {
+impl settings::Settings for Settings {
     fn check(&self) -> Result<(), Refused> {
         if self.speed > 0.0 && self.speed <= SPEED_MAX {
             return Ok(());

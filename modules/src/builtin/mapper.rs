@@ -1,6 +1,6 @@
 //! `mapper`: draws a map from scans and poses.
 
-use super::check::{self, Called, Refused, Settings as _};
+use super::settings::{self, Called, Refused, Settings as _};
 use crate::interface::Interface;
 use crate::interfaces::{Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface};
 use crate::module::{Module, ModuleError};
@@ -29,7 +29,7 @@ pub(super) struct Settings {
     resolution_m: f64,
 }
 
-impl check::Settings for Settings {
+impl settings::Settings for Settings {
     fn check(&self) -> Result<(), Refused> {
         if (0.005..=1.0).contains(&self.resolution_m) {
             return Ok(());

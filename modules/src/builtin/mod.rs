@@ -5,6 +5,7 @@ mod check;
 mod mapper;
 mod output;
 mod pilot;
+mod settings;
 mod sim;
 
 pub use check::{check, check_saved};
@@ -26,9 +27,9 @@ struct Builtin {
 }
 
 impl Builtin {
-    fn of<M: Module<Settings: check::Settings>>() -> Self {
+    fn of<M: Module<Settings: settings::Settings>>() -> Self {
         let descriptions = || M::Interfaces::table().into_iter().map(|served| served.description).collect();
-        Self { run: run_started::<M>, check: check::module::<M>, check_saved: check::saved::<M>, descriptions }
+        Self { run: run_started::<M>, check: settings::module::<M>, check_saved: settings::saved::<M>, descriptions }
     }
 
     fn find(name: &str) -> Option<Self> {

@@ -1,6 +1,6 @@
 //! `pilot`: drives about without hitting anything, by what the scanner sees.
 
-use super::check::{self, Called};
+use super::settings::{self, Called};
 use crate::interface::Interface;
 use crate::interfaces::{LaserInterface, MotorInterface, MotorProxy};
 use crate::module::{Module, ModuleError};
@@ -24,7 +24,7 @@ pub(super) struct Settings {
     seed: u64,
 }
 
-impl check::Settings for Settings {
+impl settings::Settings for Settings {
     fn parameters(&self) -> &'static [&'static str] {
         self.names()
     }

@@ -1,6 +1,6 @@
 //! `sim`: a robot in a text map stands in for the drivers of motor, wheels and scanner.
 
-use super::check::{self, Refused, Settings as _};
+use super::settings::{self, Refused, Settings as _};
 use crate::interfaces::{DriveError, LaserInterface, Motor, MotorInterface, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::parameter::ParameterSet;
@@ -49,7 +49,7 @@ impl Default for Settings {
     }
 }
 
-impl check::Settings for Settings {
+impl settings::Settings for Settings {
     fn parameters(&self) -> &'static [&'static str] {
         self.names()
     }

@@ -87,6 +87,16 @@ fn split<const N: usize>(body: &[u8]) -> Result<([u32; N], &[u8]), Short> {
     Ok((std::array::from_fn(|_| words.next().unwrap_or_default()), rest))
 }
 
+/// Appends a value as postcard.
+///
+/// # Errors
+/// When the value cannot be written (a map of unknown length, say).
+pub fn append<T: serde::Serialize + ?Sized>(to: &mut Vec<u8>, value: &T) -> Result<(), postcard::Error> {
+    let taken = std::mem::take(to);
+    *to = postcard::to_extend(value, taken)?;
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! What may go wrong with a call, and who says so.
 
 use super::{CallEnvelope, ReplyEnvelope};
-use crate::interface::append;
+use crate::call::append;
 use crate::output::plain::line;
 use postcard_schema::Schema;
 use rohrpost_mailbox::{Name, SendError};

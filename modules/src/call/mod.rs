@@ -10,7 +10,7 @@ mod once;
 mod tally;
 
 pub(crate) use envelope::micros;
-pub use envelope::{CallEnvelope, ReplyEnvelope};
+pub use envelope::{CallEnvelope, ReplyEnvelope, append};
 pub use error::{CallError, Fault};
 pub(crate) use link::is_to;
 pub use link::{CALLS_MAX, Caller, Link, Pending};

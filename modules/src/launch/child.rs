@@ -6,13 +6,13 @@ mod ending;
 
 pub(super) use ending::Then;
 
-use super::control::{ChildState, Phase};
 use super::health::Health;
 use super::policy::{Policy, STEADY};
 use super::printed::Printed;
 use super::program::Program;
 use super::repeats::Repeats;
 use crate::common::OutputLevel;
+use crate::launcher::{ChildState, Phase};
 use crate::output::Relay;
 use ending::Ending;
 use nix::sys::signal::Signal;

@@ -3,61 +3,16 @@
 //! A look is taken once and kept as bytes; its pages are parts of these, so they belong together however long their reader takes.
 //! The oldest look gives way to a new one, and its reader is told to begin anew.
 
-use crate::survey::{MailboxLook, Scope, Seen, Survey};
-use postcard_schema::Schema;
+use crate::launcher::{LOOK_BYTES_MAX, Look, LookError, LookPage};
+use crate::survey::{MailboxLook, Seen, Survey};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{InspectError, Name, Node};
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Looks that are kept: so many readers may be at it at a time.
 const LOOKS_KEPT: usize = 16;
-/// Bytes of the longest look; one is some ten kilobytes.
-pub const LOOK_BYTES_MAX: usize = 1 << 20;
 /// Most bytes of a page, whatever its reader asks for: with what is around it, it fits a package.
 const PAGE_BYTES_MAX: u16 = 60_000;
-
-/// What is to be looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Look {
-    /// The node.
-    Survey(Scope),
-    /// A mailbox (its raw name), down to its slots.
-    Mailbox(u32),
-}
-
-/// A part of a look.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct LookPage {
-    /// Number of the look: pages of different ones do not belong together.
-    pub look: u32,
-    /// Bytes of the whole.
-    pub total: u32,
-    /// First byte of this page.
-    pub from: u32,
-    /// From there on, as many as were asked for or are left.
-    pub bytes: Vec<u8>,
-}
-
-/// Why launch shows nothing.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema, thiserror::Error)]
-pub enum LookError {
-    /// Reader and launch are of different versions.
-    #[error(
-        "its launch shows nodes in another form ({0:#010x}) than this program reads: use the same version of Rohrpost on all \
-         nodes (`rohrpost version`)"
-    )]
-    Form(u32),
-    /// Newer looks took its place; begin anew.
-    #[error("its launch does not keep this look any more: too many look at once; try again")]
-    Gone,
-    /// The look itself failed.
-    #[error("{0}")]
-    Failed(String),
-    /// The look has so many bytes.
-    #[error("the look has {0} bytes, which is more than {max}; look at one module (`rohrpost bw NAME`)", max = LOOK_BYTES_MAX)]
-    TooLarge(u32),
-}
 
 /// The looks that launch keeps.
 #[derive(Default)]

@@ -16,12 +16,10 @@
 //! cannot is ended by the next launch.
 
 mod child;
-mod control;
 mod end;
 mod error;
 mod events;
 mod health;
-mod known;
 mod leftovers;
 mod look;
 mod policy;
@@ -31,21 +29,17 @@ mod repeats;
 mod serve;
 mod start;
 
-pub use control::{ChildState, Children, ControlError, Launcher, LauncherInterface, LauncherProxy, Phase, launcher_of};
-pub(crate) use control::{LOOK, LOOK_ON};
 pub use error::LaunchError;
 pub use events::{Event, events};
-pub(crate) use known::read as known_children;
 pub use leftovers::CONFIG_FILE;
-pub use look::{LOOK_BYTES_MAX, Look, LookError, LookPage};
 
+use crate::launcher::{Known, Phase};
 use crate::output::{Relay, plain};
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
 use end::Ending;
 use events::Bell;
-use known::Known;
 use look::Looks;
 use program::Program;
 use rohrpost_config::{Installation, Module, Node as NodeConfig, Reach, TimeSource as ConfiguredTime};

@@ -1,12 +1,13 @@
 //! Launch as those who send it commands see it.
 
 use super::child::{Child, Then};
-use super::control::{Children, ControlError, Launcher, LauncherInterface};
-use super::look::{Look, LookError, LookPage, Looks, see};
+use super::look::{Looks, see};
 use crate::call::{Fault, Link};
 use crate::common;
 use crate::description::Description;
 use crate::interface::{Interface, Serve};
+use crate::launcher::{Children, ControlError, Launcher, LauncherInterface};
+use crate::launcher::{Look, LookError, LookPage};
 use crate::runtime::refusals::{Cause, Refusals};
 use crate::runtime::server::{Call, Desk, Servant, admit};
 use rohrpost_config::{Installation, Principal};

@@ -2,10 +2,10 @@
 //! and why it is in error. Nothing here waits for a module that may be done without.
 
 use super::child::Child;
-use super::control::Phase;
 use super::{Launch, LaunchError};
 use crate::call::{CallError, Fault};
 use crate::common::{self, Status};
+use crate::launcher::Phase;
 use crate::output::plain;
 use rohrpost_config::{Module, Scheduling as Wanted};
 use rohrpost_mailbox::sys::{Scheduling, scheduling_of};

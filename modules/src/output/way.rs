@@ -402,7 +402,7 @@ impl Output {
             Label { from: self.from, kind: Type::data(1), id: 0, priority: self.priority, options: Options::STAMPED };
         way.bytes.clear();
         // A line can be written: text and numbers.
-        let _ = crate::interface::append(&mut way.bytes, &line);
+        let _ = crate::call::append(&mut way.bytes, &line);
         let (stamp_ns, sequence, missed) = (line.time_ns, way.sequence, line.lost);
         let head = DataHead { stamp_ns, sequence, missed, incarnation: 0 };
         let Some(sender) = &mut way.sender else { return false };

@@ -3,9 +3,10 @@
 use super::face::Face;
 use super::follow::{Followings, Rate, Subscription};
 use super::refusals::Refusals;
+use crate::call::append;
 use crate::call::{Caller, Link};
 use crate::common::DataHead;
-use crate::interface::{DataPort, Proxy, append};
+use crate::interface::{DataPort, Proxy};
 use crate::publish::{Delivery, Newest, Subscriptions};
 use crate::value::Data;
 use rohrpost_config::{ClassTable, Installation, NameTextError, Principal};

@@ -1,9 +1,9 @@
 //! The subscribing side of continuous data: asks, renews, and sees gaps.
 
 use super::refusals::Cause;
+use crate::call::append;
 use crate::call::{CallError, Fault, Link, is_to};
 use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
-use crate::interface::append;
 use rohrpost_mailbox::{Head, Name, Options};
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};

@@ -1,12 +1,12 @@
 //! How a program that is no module takes part: tools, tests, launch itself.
 
+use crate::call::append;
 use crate::call::{CallError, Link, REPLIES_KEPT};
 use crate::common::{
     self, Change, DescriptionPart, Exchange, ExchangePage, OutputLevel, ParameterPage, SetParameters, Status,
     TimeReport,
 };
 use crate::description::Description;
-use crate::interface::append;
 use crate::parameter::{Parameter, Refusal};
 use crate::value::read_described;
 use rohrpost_config::Installation;

@@ -3,9 +3,9 @@
 use super::context::Context;
 use super::exchange;
 use super::face::Offer;
+use super::life::Life;
 use super::parameters;
 use super::refusals::Cause;
-use super::runner::Life;
 use super::server::{Call, Servant, admit, read_arguments, write_result};
 use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};

@@ -9,11 +9,13 @@
 //! ```
 
 mod context;
+mod error;
 mod exchange;
 mod face;
 mod follow;
 mod host;
 mod hosted;
+mod life;
 mod parameters;
 mod received;
 pub(crate) mod refusals;
@@ -22,10 +24,11 @@ pub(crate) mod server;
 mod start;
 
 pub use context::{Context, ContextError};
+pub use error::StartError;
 pub use follow::{BadRate, Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};
 pub use received::{Received, Unreadable};
 pub use runner::{exit, run, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;
-pub use start::{Start, StartError, find_other_versions, find_running, kept};
+pub use start::{Start, find_other_versions, find_running, kept};

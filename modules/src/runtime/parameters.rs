@@ -1,7 +1,7 @@
 //! The common functions that show and set parameters, and the check of what a module starts with.
 
 use super::context::Context;
-use super::start::StartError;
+use super::error::StartError;
 use crate::common::{Change, PARAMETER_PAGE, ParameterPage, SetParameters};
 use crate::module::Module;
 use crate::parameter::{Parameter, ParameterSet, Refusal, value_text};

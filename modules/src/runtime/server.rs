@@ -1,9 +1,9 @@
 //! Commands: taken from a mailbox, decided on, run by whoever serves there, answered.
 
 use super::refusals::Cause;
+use crate::call::append;
 use crate::call::{CallEnvelope, Fault, Once, ReplyEnvelope, Request, Verdict};
 use crate::common::{self, DescriptionPart};
-use crate::interface::append;
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{Head, Kind, Label, Name, Options, Package, Receiver, SendError, Type, local, monotonic_ns};
 

@@ -3,9 +3,9 @@
 //! Nothing here waits but [`look_at_all`], and that for a bounded time. A page that gets lost is asked for again.
 
 use super::Seen;
+use crate::call::append;
 use crate::call::{CallError, Fault, Link};
-use crate::interface::append;
-use crate::launch::{LOOK, LOOK_BYTES_MAX, LOOK_ON, LauncherInterface, Look, LookError, LookPage};
+use crate::launcher::{LOOK, LOOK_BYTES_MAX, LOOK_ON, LauncherInterface, Look, LookError, LookPage};
 use rohrpost_mailbox::{Name, wait_any};
 use std::time::{Duration, Instant};
 

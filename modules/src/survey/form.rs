@@ -9,7 +9,7 @@ mod tests;
 mod traffic;
 
 use super::{MailboxLook, ModuleSurvey, Survey, Usage, Working};
-use crate::launch::ChildState;
+use crate::launcher::ChildState;
 use detail::{DetailForm, detail, detail_form};
 use postcard_schema::Schema;
 use postcard_schema::schema::owned::OwnedNamedType;
@@ -18,7 +18,7 @@ use rohrpost_mailbox::{Full, Loss, MailboxInfo, ModuleState, Name, ParticipantIn
 use serde::{Deserialize, Serialize};
 use std::hash::Hasher;
 use std::time::Duration;
-use traffic::{ClassForm, FlowForm, LatencyForm, class, class_form, flow, flow_form, latency, latency_form};
+use traffic::{ClassForm, FlowForm, LatencyForm, class, class_form, flow, flow_form, latency, latency_form, ns};
 
 /// What one look shows.
 #[derive(Clone, Debug)]
@@ -318,8 +318,4 @@ fn mailbox(form: MailboxForm) -> MailboxInfo {
         sent: form.sent,
         classes: form.classes.into_iter().map(class).collect(),
     }
-}
-
-fn ns(time: Duration) -> u64 {
-    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -6,7 +6,7 @@
 use super::ModuleSurvey;
 use crate::common::State;
 use crate::description::Description;
-use crate::launch::Phase;
+use crate::launcher::Phase;
 use crate::output::plain;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Node, Work};

@@ -37,7 +37,7 @@ mod tests {
     use crate::description::Description;
     use crate::interface::Interface;
     use crate::interfaces::{CartographerInterface, CollectorInterface, LaserInterface, MotorInterface};
-    use crate::launch::LauncherInterface;
+    use crate::launcher::LauncherInterface;
     use crate::parameter::{Declared, Parameter};
 
     /// A type of this many levels: options of options, as two bytes each.

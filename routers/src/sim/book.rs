@@ -6,150 +6,18 @@
 //! ```
 
 use super::clock::Now;
-use super::receiving::Receiving;
-use super::sending::Sending;
+use super::lives::{Receiving, Sending};
+use super::package::{Package, Role, Way, admitted};
+use super::promise::{Problem, Promise};
 use super::table::Table;
 use super::times::Times;
 use super::wire::Wire;
 use crate::frame::NodeIndex;
 use crate::time::Term;
-use rohrpost_mailbox::{Head, Name, Priority, local};
+use rohrpost_mailbox::{Head, Name};
 use rohrpost_network::LEVELS;
 use std::collections::BTreeMap;
 use std::rc::Rc;
-
-/// A promise that was broken.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Problem {
-    /// Name of the promise.
-    pub promise: Promise,
-    /// When, true ns.
-    pub at_ns: u64,
-    /// What was seen.
-    pub text: String,
-}
-
-/// What must hold whatever the network does.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum Promise {
-    /// Every accepted package is delivered, or counted with a cause, or was in a datagram that the network lost.
-    Accounts,
-    /// No command runs twice, and one that is said not to have run has not.
-    AtMostOnce,
-    /// A router delivers no package twice within one life of both ends.
-    NoCopies,
-    /// Of one sender and priority, packages come in their order.
-    Order,
-    /// Nothing is delivered that was not sent, unchanged, to that mailbox.
-    Unchanged,
-    /// An urgent package is behind at most one datagram of lower levels.
-    Urgency,
-    /// What gives way to what has no room is the sender's own newest of its lowest level.
-    Displacing,
-    /// Nothing leaves or is delivered that waited for too long, and a command hurries no more than its sender.
-    Fresh,
-    /// No more bytes a second than allowed.
-    Pace,
-    /// Queue, quotas and reassembly stay within their limits.
-    Bounded,
-    /// What a router says of its peers and of losses on the wire is so.
-    Links,
-    /// Nothing is delivered that is not admitted: where datagrams are sealed, in the name of another node; to a router's own mailbox; with more
-    /// priority than its sender, or who asked for it, may have.
-    Admission,
-    /// A while after the last fault all is well.
-    Recovery,
-    /// System time is within its stated bound.
-    TimeBound,
-    /// System time never goes back within an epoch.
-    TimeForward,
-    /// One master in a term, and one master a while after the last fault; who sends in its place does so only when it was not heard, and
-    /// nobody goes by it.
-    OneMaster,
-    /// With time slots no two nodes transmit at once, unless a fault parts them: see [`Divisions::excuse`].
-    ///
-    /// [`Divisions::excuse`]: super::divided::Divisions::excuse
-    Exclusive,
-    /// With time slots each datagram is on the wire in a window of its sender, before its guard, as the sender reckons, and none is sent
-    /// in a window whose wake-up came too late.
-    InWindow,
-    /// With time slots nobody sends while its own bound is greater than what is allowed, or while it is further off in truth.
-    SilentWhenUnsure,
-}
-
-/// What a package is for.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Role {
-    /// Data of a flow.
-    Data,
-    /// A try of a call, so many ns after the first.
-    Command {
-        /// Which call.
-        call: usize,
-        /// Its age when it was posted, ns on the caller's clock.
-        age_ns: u64,
-    },
-    /// An answer to a call.
-    Answer {
-        /// Which call.
-        call: usize,
-        /// What it says.
-        answer: super::calls::Answer,
-    },
-    /// A router's answer to a command that it could not deliver. It has no place among those of the module for which it speaks.
-    Report {
-        /// Which call.
-        call: usize,
-    },
-    /// What nobody needs, from who wants to do harm: a program that writes what it likes in its heads, and whose router caps no priority.
-    Intruder,
-}
-
-/// How far a package has come at its sender's side.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Way {
-    /// It waits for the router, or was lost there: by the mailbox, which counts it.
-    Transit,
-    /// Its router has it.
-    Accepted,
-    /// Its router counted it with a cause.
-    Counted,
-    /// All of it has left in datagrams.
-    Left,
-}
-
-/// A package.
-#[derive(Clone, Debug)]
-pub struct Package {
-    /// Its head when it was posted.
-    pub head: Head,
-    /// Where its modules are.
-    pub from_node: NodeIndex,
-    /// For whom.
-    pub to_node: NodeIndex,
-    /// What it is for.
-    pub role: Role,
-    /// When it was posted, true ns.
-    pub posted_ns: u64,
-    /// Its place among those of its sender, receiver and priority.
-    pub(super) place: u32,
-    /// How far it has come.
-    pub way: Way,
-    /// Life of the router that accepted it.
-    pub life: u32,
-    /// When it was published, on its node's monotonic clock.
-    pub(super) published_ns: u64,
-    /// Its place among all that its router accepted.
-    pub(super) ticket: u64,
-    /// Datagrams of lower levels that had left when it was accepted.
-    pub(super) lower: u64,
-    /// It was for a node that its router did not know yet, so that others may go before it.
-    pub(super) held: bool,
-    /// Whether it came marked as one that was handed out before.
-    pub redelivered: bool,
-    /// At each delivery, incarnation of the router that sent it and life of the one that delivered.
-    pub deliveries: Vec<(u64, u32)>,
-}
 
 /// The books.
 #[derive(Default)]
@@ -262,18 +130,6 @@ impl Book {
         let start = number as usize % PATTERN_PRIME;
         number_of(body) == Some(number) && body[8..] == self.pattern[start + 8..start + body.len()]
     }
-}
-
-/// As a package may be delivered at most.
-pub(super) fn admitted(head: &Head) -> Head {
-    let [sender, receiver] = [head.from, head.to].map(|name| name.class().0);
-    let most = match head.kind.0 {
-        1.. => sender,
-        _ if head.to.local() == local::COMMANDS => sender,
-        -16383..=-1 => receiver,
-        _ => sender.max(receiver),
-    };
-    Head { priority: Priority(head.priority.0.min(most)), ..*head }
 }
 
 fn key(head: &Head) -> (Name, Name, i16, u16) {

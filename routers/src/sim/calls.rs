@@ -1,7 +1,9 @@
 //! Callers and servers of a simulated network: three tries of each command, and a guard that lets it run at most once.
 
-use super::book::{Book, Promise};
+use super::book::Book;
 use super::clock::Now;
+use super::package::Answer;
+use super::promise::Promise;
 use rohrpost_mailbox::Name;
 use std::collections::VecDeque;
 
@@ -52,17 +54,6 @@ pub trait Guard {
 
 /// Makes the guard of a server that starts now, on its monotonic clock.
 pub type NewGuard = fn(started_ns: u64) -> Box<dyn Guard>;
-
-/// What a caller is told.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Answer {
-    /// It was run, as this run of all.
-    Ran(u32),
-    /// It may have been run.
-    Interrupted,
-    /// It was not run.
-    NotRun,
-}
 
 /// A call.
 #[derive(Clone, Debug)]

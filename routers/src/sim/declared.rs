@@ -2,8 +2,9 @@
 
 use super::chance::Chance;
 use super::divided::Divisions;
-use super::plan::{DRAIN_NS, Flow, MS, Plan, S};
+use super::plan::{Flow, Plan};
 use super::slots::{AROUND_BYTES, node_bytes_s};
+use super::spans::{DRAIN_NS, MS, S};
 use rohrpost_mailbox::{HEAD_BYTES, Name, local};
 use rohrpost_network::HAND_OVER;
 

@@ -1,7 +1,8 @@
 //! Which faults divide a network with time slots, whom they part, and for how long that excuses two nodes that transmit at once.
 
-use super::plan::{Fault, MS, Plan};
-use super::wire::{Basis, Transmission};
+use super::fault::{Fault, Planned};
+use super::spans::MS;
+use super::transmission::{Basis, Transmission};
 
 /// A fault that divides the network for longer than this may leave it with two times: two masters that do not hear each other.
 pub const HOLDOVER_NS: u64 = 100 * MS;
@@ -65,15 +66,15 @@ pub struct Divisions {
 }
 
 impl Divisions {
-    /// Those of a plan.
-    pub fn of(plan: &Plan) -> Self {
-        let all = plan.faults.iter().filter_map(|planned| {
+    /// Those of such faults, where cycles are so long.
+    pub fn of(faults: &[Planned], cycle_ns: u64) -> Self {
+        let all = faults.iter().filter_map(|planned| {
             let parts = Parts::of(&planned.fault)?;
             // What it has kept up still comes, and nothing overtakes it.
             let way_ns = if let Fault::Bad { quality, .. } = planned.fault { quality.way_ns_max() } else { 0 };
             Some(Division { from_ns: planned.from_ns, until_ns: planned.until_ns + way_ns, parts })
         });
-        Self { all: all.collect(), cycle_ns: plan.shape.interval_ns, asks_ns: 0 }
+        Self { all: all.collect(), cycle_ns, asks_ns: 0 }
     }
 
     /// Whether two nodes may not be blamed for transmitting at once. `began_ns`: when the times by which they go began.

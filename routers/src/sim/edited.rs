@@ -1,8 +1,10 @@
 //! Networks with time slots on whose wire are nodes with other tables: routers that were started anew from a file that somebody has edited.
 
 use super::chance::Chance;
-use super::plan::{Fault, MS, Plan, Planned, S, US};
+use super::fault::{Fault, Planned};
+use super::plan::Plan;
 use super::slots::Slots;
+use super::spans::{MS, S, US};
 use crate::frame::NodeIndex;
 use rohrpost_network::TimeSlot;
 use std::time::Duration;

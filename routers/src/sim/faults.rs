@@ -1,13 +1,14 @@
 //! Faults of a simulated network: how they begin, and how they end.
 
-use super::book::Role;
 use super::chance::Chance;
 use super::clock::Now;
-use super::modules::DATA_MAILBOXES;
+use super::fault::Fault;
+use super::host::DATA_MAILBOXES;
+use super::package::Role;
 use super::packages::{ROUTER_CLASS, digest};
-use super::plan::{Fault, MS, SYSTEM, mended};
-use super::run::incarnation;
+use super::plan::{SYSTEM, incarnation, mended};
 use super::seals::altered;
+use super::spans::MS;
 use super::station::Arrived;
 use super::world::{Event, World};
 use crate::admission::{PACKET, TUNNEL};
@@ -277,19 +278,4 @@ impl World<'_> {
         bytes.extend_from_slice(&rest);
         Rc::from(bytes)
     }
-}
-
-/// Flips some bits.
-pub(super) fn damage(bytes: &[u8], chance: &mut Chance) -> Rc<[u8]> {
-    let mut bytes = bytes.to_vec();
-    for _ in 0..chance.between(1, 4) {
-        let at = chance.below(bytes.len() as u64) as usize;
-        if let Some(byte) = bytes.get_mut(at) {
-            *byte ^= 1 << chance.below(8);
-        }
-    }
-    if chance.percent(20) {
-        bytes.truncate(chance.below(bytes.len() as u64) as usize);
-    }
-    Rc::from(bytes)
 }

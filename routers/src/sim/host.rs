@@ -9,6 +9,8 @@ use std::rc::Rc;
 pub const TRANSIT_SLOTS: usize = 64;
 /// Older packages are dropped when the router takes from it, ns.
 pub const TRANSIT_AGE_MAX_NS: u64 = 2_000_000_000;
+/// Mailboxes for data that a module has.
+pub(super) const DATA_MAILBOXES: u8 = 4;
 /// Commands that wait for a module at most.
 pub const COMMAND_SLOTS: usize = 16;
 

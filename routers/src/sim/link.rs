@@ -1,7 +1,7 @@
 //! One direction between two computers: what it loses, delays, copies, reorders and damages.
 
 use super::chance::Chance;
-use super::plan::WIRE_NS_MAX;
+use super::spans::WIRE_NS_MAX;
 
 /// How a link treats datagrams. Shares are of a million.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -6,7 +6,7 @@
 //!                            └──────────────▶ Book: every package, every broken Promise ◀──────────────────────┘
 //! ```
 //!
-//! A new protocol comes as one more [`station::Layer`]; what must hold of it as one more [`book::Promise`].
+//! A new protocol comes as one more [`station::Layer`]; what must hold of it as one more [`promise::Promise`].
 
 pub mod book;
 pub mod calls;
@@ -15,12 +15,16 @@ pub mod clock;
 pub mod declared;
 pub mod divided;
 mod edited;
+pub mod fault;
 mod faults;
 pub mod host;
 pub mod link;
+pub mod lives;
 mod modules;
+pub mod package;
 pub mod packages;
 pub mod plan;
+pub mod promise;
 mod rare;
 pub mod receiving;
 mod rough;
@@ -29,11 +33,13 @@ mod seals;
 pub mod sending;
 pub mod slots;
 pub mod slotted;
+pub mod spans;
 pub mod station;
 mod table;
 pub mod ticking;
 pub mod times;
 pub mod trace;
+pub mod transmission;
 mod unsteady;
 pub mod wire;
 pub mod world;

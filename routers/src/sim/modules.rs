@@ -1,14 +1,14 @@
 //! The modules of a simulated network: they post data and commands, run commands, and read what comes.
 
-use super::book::{Promise, Role, Way, admitted};
-use super::calls::{Answer, Waiting};
-use super::host::Parcel;
-use super::plan::{MS, US};
+use super::calls::Waiting;
+use super::host::{DATA_MAILBOXES, Parcel};
+use super::package::Answer;
+use super::package::{Role, Way, admitted};
+use super::promise::{Problem, Promise};
+use super::spans::{MS, US};
 use super::world::{Event, World};
 use rohrpost_mailbox::{Head, Name, Options, Priority, Type, local};
 
-/// Mailboxes for data that a module has.
-pub(super) const DATA_MAILBOXES: u8 = 4;
 /// Bytes of a command and of its answer.
 const CALL_BYTES: (u64, u64) = (8, 200);
 /// A call that is valid for so long is answered, if all is well.
@@ -199,7 +199,7 @@ impl World<'_> {
             let meant = call.began_true_ns > well_ns && call.valid_for_ns >= ANSWERED_WITHIN_NS;
             if meant && !matches!(call.outcome, Some(Answer::Ran(_))) {
                 let text = format!("call {index}, begun at {} ns, has {:?}", call.began_true_ns, call.outcome);
-                self.book.problems.push(super::book::Problem { promise: Promise::Recovery, at_ns: self.now_ns, text });
+                self.book.problems.push(Problem { promise: Promise::Recovery, at_ns: self.now_ns, text });
             }
         }
         for number in 0..self.book.packages.len() {

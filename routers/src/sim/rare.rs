@@ -1,8 +1,10 @@
 //! Networks that seal and in which joining is hard: slots that come seldom, and many nodes of which one alone may be master.
 
 use super::chance::Chance;
-use super::plan::{Fault, MS, Plan, Planned, S};
+use super::fault::{Fault, Planned};
+use super::plan::Plan;
 use super::slots::node_bytes_s;
+use super::spans::{MS, S};
 use rohrpost_network::TimeSlot;
 
 /// From one slot of a node to its next.

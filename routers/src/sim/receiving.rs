@@ -1,45 +1,14 @@
 //! The books of the receiver's side: what a router took, and what it delivered or lost.
 
-use super::book::{Book, Package, Promise, Role, admitted};
+use super::book::Book;
 use super::clock::Now;
+use super::lives::{Receipt, Taken};
+use super::package::{Package, Role, admitted};
 use super::packages::ROUTER_CLASS;
-use super::table::{Group, Table};
+use super::promise::Promise;
 use crate::frame::{Frame, NodeIndex};
 use crate::inbound::{REORDER_MAX, WINDOW};
-use rohrpost_mailbox::{Head, Name, local};
-
-/// What one life of a router takes.
-#[derive(Default, Debug)]
-pub struct Receiving {
-    /// Packages of which something came.
-    receipts: Table<u32, Receipt>,
-    /// Datagrams, by the sender's incarnation.
-    taken: Table<u64, Taken>,
-    /// The life of each peer that was heard last.
-    present: Table<NodeIndex, u64>,
-    /// Last place that was delivered, of sender, receiver and priority.
-    last: Table<(Name, Name, u8), u32>,
-}
-
-/// What one life of a router has had of a package.
-#[derive(Clone, Copy, Default, Debug)]
-struct Receipt {
-    parts: u32,
-    /// It was delivered, or counted with a cause.
-    ended: bool,
-}
-
-/// What one life of a router has taken of another.
-#[derive(Default, Debug)]
-struct Taken {
-    from: NodeIndex,
-    sequences: Group<u64>,
-    /// The first that counts: what went before the beginning is none of ours.
-    start: u64,
-    highest: u64,
-    /// It was taken for over, and came back: what was missing meanwhile is not counted.
-    unclear: bool,
-}
+use rohrpost_mailbox::{Head, local};
 
 impl Book {
     /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was the last

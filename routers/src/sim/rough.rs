@@ -1,8 +1,10 @@
 //! Small networks in which all goes wrong that can, so that a mistake shows soon.
 
 use super::chance::Chance;
+use super::fault::{Fault, Planned};
 use super::link::Quality;
-use super::plan::{Calls, DRAIN_NS, Fault, Flow, MS, Plan, Planned, RECOVERY_NS, S, Shape, US, WELL_NS};
+use super::plan::{Calls, Flow, Plan, Shape};
+use super::spans::{DRAIN_NS, MS, RECOVERY_NS, S, US, WELL_NS};
 use rohrpost_mailbox::local;
 
 /// When all faults are over.
@@ -39,7 +41,7 @@ impl Plan {
         plan.timed_ns = MENDED_NS + 2 * S;
         plan.traffic_end_ns = MENDED_NS + RECOVERY_NS + WELL_NS;
         plan.end_ns = plan.traffic_end_ns + DRAIN_NS;
-        plan.stepped_ns = plan.timed_ns + super::plan::EPOCH_PAUSE_NS;
+        plan.stepped_ns = plan.timed_ns + super::spans::EPOCH_PAUSE_NS;
         plan.rough_traffic(&mut chance);
         plan.rough_faults(&mut chance);
         plan

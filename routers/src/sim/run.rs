@@ -1,9 +1,9 @@
 //! One seed, from its plan to its verdict.
 
-use super::book::Problem;
 use super::calls::NewGuard;
 use super::packages::{Packages, settings};
-use super::plan::{Flow, Plan};
+use super::plan::{Flow, Plan, incarnation};
+use super::promise::Problem;
 use super::seals;
 use super::slotted::Slotted;
 use super::station::Layer;
@@ -59,11 +59,6 @@ fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticki
     let slowest = |flow: &Flow| book.slowest_ns.get(&(flow.from, flow.to, flow.priority)).copied().unwrap_or_default();
     let slowest_ns = plan.flows.iter().map(slowest).collect();
     Outcome { problems: book.problems, seen: book.seen, slowest_ns, trace: world.trace.lines }
-}
-
-/// Of a life of a router: never the same again, and in no order.
-pub(super) fn incarnation(seed: u64, life: u32) -> u64 {
-    (seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1
 }
 
 /// Routers as this version has them.

@@ -1,7 +1,6 @@
 //! Sealed datagrams in a simulated network: what the layers seal with, and what those do who have no key.
 
 use super::chance::Chance;
-use super::faults::damage;
 use crate::frame::{self, FrameHead};
 use crate::security::{
     Acquaintances, Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, Port, Rejection, Sealing,
@@ -111,5 +110,20 @@ pub(super) fn incarnation(datagram: &[u8]) -> u64 {
 pub(super) fn altered(datagram: &[u8], chance: &mut Chance) -> Rc<[u8]> {
     let mut bytes = damage(datagram, chance).to_vec();
     frame::write_check(&mut bytes);
+    Rc::from(bytes)
+}
+
+/// Flips some bits.
+pub(super) fn damage(bytes: &[u8], chance: &mut Chance) -> Rc<[u8]> {
+    let mut bytes = bytes.to_vec();
+    for _ in 0..chance.between(1, 4) {
+        let at = chance.below(bytes.len() as u64) as usize;
+        if let Some(byte) = bytes.get_mut(at) {
+            *byte ^= 1 << chance.below(8);
+        }
+    }
+    if chance.percent(20) {
+        bytes.truncate(chance.below(bytes.len() as u64) as usize);
+    }
     Rc::from(bytes)
 }

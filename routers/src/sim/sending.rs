@@ -1,51 +1,18 @@
 //! The books of the sender's side: what a router accepted, and how it left or was lost.
 
-use super::book::{Book, Promise, Way};
+use super::book::Book;
 use super::clock::Now;
-use super::plan::{MS, Shape};
-use super::table::Table;
+use super::lives::Account;
+use super::package::Way;
+use super::plan::Shape;
+use super::promise::Promise;
+use super::spans::MS;
 use crate::counts::Cause;
 use crate::frame::Frame;
 use crate::intake::MAKING_NS;
 use crate::outbound::WAIT_MAX_NS;
-use rohrpost_mailbox::{Head, Name};
+use rohrpost_mailbox::Head;
 use rohrpost_network::LEVELS;
-use std::collections::BTreeSet;
-
-/// Packages that one life of a router has to account for.
-#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
-pub struct Account {
-    /// Taken from its computer.
-    pub accepted: u64,
-    /// Sent whole.
-    pub left: u64,
-    /// Counted with a cause.
-    pub lost: u64,
-}
-
-/// What one life of a router sends.
-#[derive(Default, Debug)]
-pub struct Sending {
-    /// Its packages.
-    pub account: Account,
-    /// Datagrams whose most urgent package is of a lower level than this.
-    below: [u64; LEVELS],
-    /// Packages of each module that wait.
-    waiting: Table<Name, Waiting>,
-    /// The one that came last.
-    newest: u32,
-    /// All that has left is through then, at the configured rate, on the node's monotonic clock.
-    through_ns: u64,
-    /// Level of the most urgent package in the datagram that left last.
-    last: usize,
-}
-
-#[derive(Default, Debug)]
-struct Waiting {
-    /// Level, place among all, number.
-    packages: BTreeSet<(usize, u64, u32)>,
-    bytes: usize,
-}
 
 /// What leaves may be so far ahead of its rate.
 const AHEAD_NS_MAX: u64 = MS + 1000;

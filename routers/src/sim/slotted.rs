@@ -1,12 +1,12 @@
 //! The layer of a router with time slots: packages and time in the hands of one thread, which sends in the node's own windows alone.
 
-use super::book::Promise;
 use super::clock::Now;
 use super::packages::{Hands, Packages};
-use super::plan::RECOVERY_NS;
+use super::promise::Promise;
+use super::spans::RECOVERY_NS;
 use super::station::{Arrived, Io, Layer, PORTS, Port, Sent};
 use super::ticking::{self, Ticking};
-use super::wire::{Basis, Says};
+use super::transmission::{Basis, Says};
 use crate::frame::{FrameHead, Kind};
 use crate::intake::{Intake, QUIET_NS, TAKING_NS};
 use crate::tdma::{Carries, Discipline, Kind as WindowKind, Next, Permit, Planned, Table, UNPROVEN_CYCLES, Verdict};
@@ -268,7 +268,7 @@ impl Layer for Slotted {
         let masters = clock.master().and_then(|master| io.book.times.page(io.now, master.into()));
         let is_of_later_epoch = masters.is_some_and(|page| page.epoch < clock.record().epoch);
         // Who is further off than it may be says nothing, and slews for up to five seconds, or waits until a master begins an epoch, see
-        // [`EPOCH_PAUSE_NS`](super::plan::EPOCH_PAUSE_NS).
+        // [`EPOCH_PAUSE_NS`](super::spans::EPOCH_PAUSE_NS).
         let waits = is_of_later_epoch || off_ns.is_some_and(|off_ns| off_ns > self.allowance_ns());
         if waits && io.now.true_ns < io.plan.stepped_ns {
             io.book.saw("waits for an epoch");

@@ -1,9 +1,10 @@
 //! The layer that keeps time: `Clock`, called as the thread of the shell calls it, and watched.
 
-use super::book::Promise;
 use super::clock::Now;
-use super::plan::{Plan, S, SYSTEM};
+use super::plan::{Plan, SYSTEM};
+use super::promise::Promise;
 use super::seals::TimeSeals;
+use super::spans::S;
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::times::Left;
 use crate::frame::{FrameHead, NodeIndex};

@@ -3,8 +3,8 @@
 //! The time of a term is its master's line, as it stood when the master began to reign, shifted so that it goes on from the time that
 //! this node had followed before. A page's bound must contain its distance from the time of the term that it follows.
 
-use super::book::{Problem, Promise};
 use super::clock::{Clock, Now};
+use super::promise::{Problem, Promise};
 use crate::time::{Clock as Core, Role, Term};
 use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, Watched};
 use std::collections::BTreeMap;

@@ -1,7 +1,9 @@
 //! Networks whose computers sleep, and whose clocks time daemons slew.
 
 use super::chance::Chance;
-use super::plan::{Fault, MS, Plan, Planned, S};
+use super::fault::{Fault, Planned};
+use super::plan::Plan;
+use super::spans::{MS, S};
 
 /// What daemons slew by, ns a second: what the kernel does by itself, and what chrony may.
 const SLEWED_PPB: [i64; 6] = [500_000, -500_000, 300_000, -1_000_000, 20_000_000, -83_000_000];

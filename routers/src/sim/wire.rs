@@ -1,10 +1,11 @@
 //! The wire of a network with time slots, by true time: when each node transmits, and that no two do at once.
 
-use super::book::{Problem, Promise};
 use super::clock::Now;
-use super::plan::US;
+use super::promise::{Problem, Promise};
 use super::slots::Slots;
-use crate::time::{Reckoning, Term};
+use super::spans::US;
+use super::transmission::{Basis, Says, Transmission};
+use crate::time::Term;
 use std::collections::{BTreeMap, VecDeque};
 
 /// From the call to the first bit, ns: usually the shorter, and by chance up to the longer.
@@ -13,68 +14,6 @@ pub const LEAD_NS: (u64, u64) = (8 * US, 20 * US);
 const SLACK_NS: u64 = US;
 /// Transmissions that one which begins now may still meet.
 const RECENT_MAX: usize = 64;
-
-/// By what a node finds its windows.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub enum Basis {
-    /// Time that it has measured, or its own as a master.
-    #[default]
-    Own,
-    /// What it has heard only: it asks what time it is.
-    Heard {
-        /// All that it heard was on its way for too long.
-        is_misled: bool,
-    },
-    /// What it has heard of those who have not shown that they live: it asks whether they do.
-    Overheard {
-        /// Somebody repeats what they said once, or it was on its way for too long.
-        is_misled: bool,
-    },
-    /// A time that it began: it only says so.
-    Begins {
-        /// Since when, true ns.
-        since_ns: u64,
-    },
-}
-
-impl Basis {
-    /// Whether it cannot know better.
-    pub fn is_misled(self) -> bool {
-        matches!(self, Self::Heard { is_misled: true } | Self::Overheard { is_misled: true })
-    }
-}
-
-/// By what a node sends, and by whose time.
-#[derive(Clone, Copy, Default, Debug)]
-pub struct Says {
-    /// By what it finds its windows.
-    pub basis: Basis,
-    /// Of its configuration.
-    pub digest: u64,
-    /// The term whose time that is, as far as it knows.
-    pub term: Term,
-    /// The line by which it reckons.
-    pub reckoning: Option<Reckoning>,
-}
-
-/// A datagram that is being transmitted.
-#[derive(Clone, Copy, Debug)]
-pub struct Transmission {
-    /// Who does.
-    pub node: usize,
-    /// By what.
-    pub basis: Basis,
-    /// Of its configuration.
-    pub digest: u64,
-    /// The term whose time it keeps.
-    pub term: Term,
-    /// The master of that term.
-    pub master: Option<usize>,
-    /// First and last bit, true ns.
-    pub begin_ns: u64,
-    /// See `begin_ns`.
-    pub end_ns: u64,
-}
 
 /// All that was transmitted lately.
 #[derive(Default, Debug)]
@@ -153,11 +92,5 @@ impl Wire {
         }
         self.recent.push_back(own);
         own
-    }
-}
-
-impl Transmission {
-    fn meets(&self, other: &Self) -> bool {
-        self.begin_ns < other.end_ns && other.begin_ns < self.end_ns
     }
 }

@@ -6,7 +6,7 @@ use rohrpost_mailbox::Name;
 use rohrpost_modules::call::{CallEnvelope, Fault, Once, ReplyEnvelope, Request, Verdict};
 use rohrpost_modules::common::{Change, DataHead, DescriptionPart, SetParameters, Status, Subscribe};
 use rohrpost_modules::interfaces::Page;
-use rohrpost_modules::launch::Children;
+use rohrpost_modules::launcher::Children;
 use rohrpost_modules::runtime::read_arguments;
 use rohrpost_modules::types::{LaserScan, OccupancyGrid, Odometry, Twist};
 use rohrpost_modules::value::Data;

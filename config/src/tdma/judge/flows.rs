@@ -2,7 +2,7 @@
 
 use super::{Judge, period_text};
 use crate::flow::Flow;
-use crate::network::TRANSIT;
+use crate::mailbox::TRANSIT;
 use crate::units::{duration_decimal, size_text};
 use rohrpost_network::{FlowBound, KEPT_IN_BYTES, Remedy, TAKEN_BEFORE, TRANSIT_LOOK, Unbounded, round_up};
 use std::time::Duration;

@@ -33,7 +33,7 @@ const NUMBERS_BYTES: usize = 10 + 5 + 1 + 5 + 5 + 2;
 #[serde(deny_unknown_fields)]
 pub(super) struct Settings {}
 
-impl super::check::Settings for Settings {}
+impl super::settings::Settings for Settings {}
 
 pub(super) struct OutputModule {
     admission: Admission,

@@ -1,7 +1,7 @@
 //! Looks survive their way, and bytes that are none are refused.
 
 use super::*;
-use crate::launch::Phase;
+use crate::launcher::Phase;
 use proptest::prelude::*;
 use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, FlowSecond, Latency, Type};
 

@@ -1,6 +1,5 @@
 //! What classes received and who sent what to whom, as it travels.
 
-use super::ns;
 use postcard_schema::Schema;
 use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, FlowSecond, LATENCY_BUCKETS, Latency, Loss, Name, Type};
 use serde::{Deserialize, Serialize};
@@ -127,4 +126,8 @@ pub(super) fn flow(form: FlowForm) -> FlowInfo {
         age_sum_ns: form.age_sum_ns,
         seconds: form.seconds.into_iter().map(second).collect(),
     }
+}
+
+pub(super) fn ns(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -6,7 +6,7 @@ use crate::fragment::PARTIAL_MAX;
 use crate::frame::NodeIndex;
 use crate::inbound::TICK_EVERY_NS;
 use crate::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
-use crate::sim::book::Promise;
+use crate::sim::promise::Promise;
 use crate::sim::station::Io;
 
 /// So long after a datagram came what went before it, and is missing, is counted as lost: at the third tick.

@@ -11,9 +11,10 @@ pub(super) use settings::{ROUTER_CLASS, digest};
 pub use settings::{address, settings};
 pub(super) use slotted::Hands;
 
-use super::book::{Promise, Role};
 use super::clock::Now;
 use super::host::{Parcel, TRANSIT_AGE_MAX_NS};
+use super::package::Role;
+use super::promise::Promise;
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::broken::harmful;
@@ -21,11 +22,10 @@ use crate::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound};
 use crate::intake::hurries;
 use crate::outbound::{Accepted, Outbound, Output, Package};
-use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, TAG_BYTES};
+use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, Said, TAG_BYTES};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Options, Type};
-use slotted::say;
 use std::collections::VecDeque;
 use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
@@ -357,4 +357,17 @@ fn shown(datagram: &[u8]) -> String {
         }
         Err(error) => error.to_string(),
     }
+}
+
+/// Says a hello, or has it wait for a slot.
+fn say(io: &Io<'_>, seals: &mut PackageSeals, line: &mut VecDeque<Sent>, said: Said, datagram: &[u8]) {
+    if io.plan.slots.is_none() {
+        let bytes = Rc::from(datagram);
+        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes, handed: Now::default() });
+    }
+    let PackageSeals { gate, waiting, .. } = seals;
+    gate.waits(said, || {
+        waiting.put(io.now.monotonic_ns, said, datagram);
+        true
+    });
 }

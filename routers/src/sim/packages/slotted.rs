@@ -7,14 +7,11 @@ use super::{PORT, Packages};
 use crate::frame::NodeIndex;
 use crate::intake::{Intake, MAKING_NS, TAKING_NS, Transit};
 use crate::outbound::Accepted;
-use crate::security::{HELLO_SLOT_BYTES, Said};
-use crate::sim::clock::Now;
+use crate::security::HELLO_SLOT_BYTES;
 use crate::sim::host::TRANSIT_SLOTS;
-use crate::sim::seals::PackageSeals;
 use crate::sim::station::{Io, Sent};
 use crate::tdma::Permit;
 use rohrpost_mailbox::{Head, Priority};
-use std::collections::VecDeque;
 use std::rc::Rc;
 
 /// What a package goes through when it is taken from the transit mailbox.
@@ -95,17 +92,4 @@ impl Packages {
         self.outbound.tidy(watch.io.now.monotonic_ns, &mut watch);
         until_ns
     }
-}
-
-/// Says a hello, or has it wait for a slot.
-pub(super) fn say(io: &Io<'_>, seals: &mut PackageSeals, line: &mut VecDeque<Sent>, said: Said, datagram: &[u8]) {
-    if io.plan.slots.is_none() {
-        let bytes = Rc::from(datagram);
-        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes, handed: Now::default() });
-    }
-    let PackageSeals { gate, waiting, .. } = seals;
-    gate.waits(said, || {
-        waiting.put(io.now.monotonic_ns, said, datagram);
-        true
-    });
 }

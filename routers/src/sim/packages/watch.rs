@@ -4,8 +4,8 @@ use crate::counts::Cause;
 use crate::frame::NodeIndex;
 use crate::inbound::SOCKET_MAX_NS;
 use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::sim::book::Promise;
 use crate::sim::host::Closed;
+use crate::sim::promise::Promise;
 use crate::sim::station::Io;
 use rohrpost_mailbox::{Head, Kind, Options};
 

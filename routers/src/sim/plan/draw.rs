@@ -1,9 +1,11 @@
 //! The parts of a plan, each drawn by chance: the configuration, nodes, links, traffic, faults.
 
-use super::{Calls, Fault, Flow, MS, NodePlan, Plan, Planned, S, SYSTEM, Shape, US};
+use super::{Calls, Flow, NodePlan, Plan, SYSTEM, Shape};
 use crate::frame::NodeIndex;
 use crate::sim::chance::Chance;
+use crate::sim::fault::{Fault, Planned};
 use crate::sim::link::Quality;
+use crate::sim::spans::{MS, S, US};
 use rohrpost_mailbox::Name;
 
 /// Classes of the modules that may stand on a node; the first is not real time.

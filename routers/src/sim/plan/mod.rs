@@ -5,45 +5,21 @@
 //! ```
 
 mod draw;
+mod slots;
 
 pub(super) use draw::{masters, node};
 
 use super::chance::Chance;
+use super::fault::{Fault, Planned};
 use super::link::Quality;
 use super::slots::Slots;
+use super::spans::{DRAIN_NS, EPOCH_PAUSE_NS, RECOVERY_NS, S, TIMED_INTERVALS, WELL_NS};
 use crate::frame::NodeIndex;
-use crate::inbound::REFUSE_EVERY_NS;
-use crate::link::REFUSED_FOR_NS;
 use rohrpost_mailbox::Name;
 use rohrpost_network::NODES_MAX;
 
-/// Microseconds, milliseconds and seconds in ns.
-pub const US: u64 = 1_000;
-/// See [`US`].
-pub const MS: u64 = 1_000_000;
-/// See [`US`].
-pub const S: u64 = 1_000_000_000;
-
 /// System of all nodes.
 pub const SYSTEM: u8 = 1;
-/// So long after the last fault everything must be as if there had been none: every call answered, nothing lost. A datagram that went
-/// astray is refused up to a second later, and a refusal holds for three.
-pub const RECOVERY_NS: u64 = REFUSE_EVERY_NS + REFUSED_FOR_NS + S / 4;
-/// So long all must be well.
-pub const WELL_NS: u64 = 3 * S / 2;
-/// After the last package all has been delivered or counted within this time: what may wait, waits 2 s at most.
-pub const DRAIN_NS: u64 = 7 * S / 2;
-
-/// A datagram takes so long on the wire at most: with the longest waits in a router and in a socket, less than the 2 s that "at most
-/// once" relies on.
-pub const WIRE_NS_MAX: u64 = 100 * MS;
-
-/// So many intervals after the last fault, and one for each that may be master, all nodes follow one.
-pub const TIMED_INTERVALS: u64 = 12;
-
-/// Nodes of two parts that were far off each other step, but a master begins an epoch only after such a pause.
-pub const EPOCH_PAUSE_NS: u64 = 10 * S;
-
 /// One computer.
 #[derive(Clone, Debug)]
 pub struct NodePlan {
@@ -112,146 +88,6 @@ pub struct Calls {
     pub valid_for_ns: u64,
     /// With what priority its commands are posted; they leave with the caller's class at most.
     pub priority: u8,
-}
-
-/// What goes wrong.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Fault {
-    /// A node's router is stopped, and goes on afterwards; with `whole` all of the computer.
-    Freeze {
-        /// Which.
-        node: usize,
-        /// Its modules too.
-        whole: bool,
-    },
-    /// A node's router dies, and a new one comes.
-    Restart {
-        /// Which.
-        node: usize,
-    },
-    /// Nothing goes this way.
-    Cut {
-        /// From there.
-        from: usize,
-        /// To here.
-        to: usize,
-    },
-    /// Those whose bit is set, and the others, do not reach each other.
-    Split {
-        /// Bit of each node.
-        side: u64,
-    },
-    /// A link is bad.
-    Bad {
-        /// From there.
-        from: usize,
-        /// To here.
-        to: usize,
-        /// So bad.
-        quality: Quality,
-    },
-    /// A module has no mailboxes.
-    Absent {
-        /// Where it is.
-        node: usize,
-        /// Which.
-        module: Name,
-    },
-    /// The mailboxes of a module are full.
-    Full {
-        /// Where it is.
-        node: usize,
-        /// Which.
-        module: Name,
-    },
-    /// A module dies, with a command in its hand, and a new one comes.
-    ModuleRestart {
-        /// Where it is.
-        node: usize,
-        /// Which.
-        module: Name,
-    },
-    /// A computer sleeps.
-    Sleep {
-        /// Which.
-        node: usize,
-        /// By so much more than true it takes its sleep to be, ns.
-        wrong_ns: i64,
-    },
-    /// A time daemon slews a computer's clock.
-    Slew {
-        /// Where.
-        node: usize,
-        /// By how much, ns a second.
-        slewed_ppb: i64,
-    },
-    /// A node's router is started anew from a file that somebody has edited, and after that from the right one.
-    Edited {
-        /// Which.
-        node: usize,
-        /// Edition of the file.
-        edition: usize,
-    },
-    /// Somebody repeats all that a node is told of the time, so much later.
-    Echo {
-        /// Who.
-        to: usize,
-        /// See above.
-        delay_ns: u64,
-    },
-    /// The socket of a router does not take every other datagram.
-    Unsendable {
-        /// Where.
-        node: usize,
-    },
-    /// Somebody sets CLOCK_REALTIME.
-    Step {
-        /// Where.
-        node: usize,
-        /// By how much, ns.
-        by_ns: i64,
-    },
-    /// Datagrams that no router of this installation sent.
-    Foreign {
-        /// To whom.
-        to: usize,
-        /// How many.
-        count: u64,
-    },
-    /// A program of a node writes what it likes in its heads, and its router caps no priority.
-    Intruder {
-        /// Where.
-        node: usize,
-        /// How many packages.
-        count: u64,
-    },
-    /// Datagrams such as a router could have sent, of a life that never was or of a place far from its own.
-    Forged {
-        /// In whose name.
-        from: usize,
-        /// To whom.
-        to: usize,
-        /// How many.
-        count: u64,
-    },
-    /// Datagrams that were sent long ago come once more.
-    Replay {
-        /// To whom.
-        to: usize,
-        /// How many.
-        count: u64,
-    },
-}
-
-/// A fault with its times.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Planned {
-    /// When it begins, true ns.
-    pub from_ns: u64,
-    /// When it is over, true ns.
-    pub until_ns: u64,
-    /// What it is.
-    pub fault: Fault,
 }
 
 /// All of it.
@@ -438,4 +274,9 @@ impl Plan {
 /// What is left of a link's quality after the faults.
 pub fn mended(quality: Quality) -> Quality {
     Quality { loss_ppm: 0, copy_ppm: 0, reorder_ppm: 0, damage_ppm: 0, rate_bytes_s: 0, ..quality }
+}
+
+/// Of a life of a router: never the same again, and in no order.
+pub(super) fn incarnation(seed: u64, life: u32) -> u64 {
+    (seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1
 }

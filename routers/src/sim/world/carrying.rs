@@ -1,10 +1,10 @@
 //! Datagrams on their way from router to router: handed to the kernel, put on the wire, passed by a link, taken at the other end.
 
 use super::{Event, OLD_MAX, World};
-use crate::sim::book::{Problem, Promise};
 use crate::sim::clock::Now;
-use crate::sim::faults::damage;
-use crate::sim::plan::US;
+use crate::sim::promise::{Problem, Promise};
+use crate::sim::seals::damage;
+use crate::sim::spans::US;
 use crate::sim::station::{Arrived, Io, Port, Router, Sent};
 use crate::sim::wire::LEAD_NS;
 use std::rc::Rc;

@@ -10,13 +10,15 @@ mod routers;
 
 pub(super) use event::Event;
 
-use super::book::{Book, Problem};
+use super::book::Book;
 use super::calls::{Calls, NewGuard, Server};
 use super::chance::Chance;
 use super::clock::{Clock, Now};
+use super::host::DATA_MAILBOXES;
 use super::link::Link;
-use super::modules::DATA_MAILBOXES;
-use super::plan::{MS, Plan, RECOVERY_NS, S};
+use super::plan::Plan;
+use super::promise::Problem;
+use super::spans::{MS, RECOVERY_NS, S};
 use super::station::{Arrived, Layer, Sent, Station};
 use super::ticking;
 use super::times::Left;

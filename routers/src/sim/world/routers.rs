@@ -1,7 +1,7 @@
 //! Lives of routers: they start, wake, do what is due, and die.
 
 use super::{Event, World};
-use crate::sim::plan::{MS, US};
+use crate::sim::spans::{MS, US};
 use crate::sim::station::Router;
 use crate::tdma::LATE_NS;
 

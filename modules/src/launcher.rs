@@ -1,11 +1,14 @@
-//! What launch can be asked while it runs: how its modules are, and to stop, start and restart one.
+//! Launch as others see it: what it can be asked while it runs, and what it knows of its modules.
 //!
 //! Launch takes the first instance of class `tool` on its node; this is the interface that it serves there.
 
-use super::look::{Look, LookError, LookPage};
+mod known;
+
+pub(crate) use known::{Known, read as known_children};
+
 use crate::call::CallError;
+use crate::call::append;
 use crate::interface;
-use crate::interface::append;
 use crate::runtime::ToolLink;
 use postcard_schema::Schema;
 use rohrpost_config::Installation;
@@ -111,6 +114,64 @@ pub enum ControlError {
     /// Launch stops all modules.
     #[error("launch is ending; it stops {0} like all others")]
     Ending(String),
+}
+
+/// Bytes of the longest look; one is some ten kilobytes.
+pub const LOOK_BYTES_MAX: usize = 1 << 20;
+
+/// How much of a node is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Scope {
+    /// Its modules, and the traffic by class.
+    Modules,
+    /// These and all mailboxes.
+    Mailboxes,
+    /// These and what everybody sends.
+    All,
+    /// What there is of one module (its raw name): its mailboxes and those that it sends to, what it sends and what is sent to it.
+    Module(u32),
+}
+
+/// What is to be looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Look {
+    /// The node.
+    Survey(Scope),
+    /// A mailbox (its raw name), down to its slots.
+    Mailbox(u32),
+}
+
+/// A part of a look.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct LookPage {
+    /// Number of the look: pages of different ones do not belong together.
+    pub look: u32,
+    /// Bytes of the whole.
+    pub total: u32,
+    /// First byte of this page.
+    pub from: u32,
+    /// From there on, as many as were asked for or are left.
+    pub bytes: Vec<u8>,
+}
+
+/// Why launch shows nothing.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema, thiserror::Error)]
+pub enum LookError {
+    /// Reader and launch are of different versions.
+    #[error(
+        "its launch shows nodes in another form ({0:#010x}) than this program reads: use the same version of Rohrpost on all \
+         nodes (`rohrpost version`)"
+    )]
+    Form(u32),
+    /// Newer looks took its place; begin anew.
+    #[error("its launch does not keep this look any more: too many look at once; try again")]
+    Gone,
+    /// The look itself failed.
+    #[error("{0}")]
+    Failed(String),
+    /// The look has so many bytes.
+    #[error("the look has {0} bytes, which is more than {max}; look at one module (`rohrpost bw NAME`)", max = LOOK_BYTES_MAX)]
+    TooLarge(u32),
 }
 
 /// Launch: starts the modules of its node, and watches over them.

@@ -1,7 +1,6 @@
 //! What launch knows of its modules, in a file of the node's directory: whoever looks at the node reads it and asks nobody.
 
-use super::ChildState;
-use super::control::LauncherInterface;
+use super::{ChildState, LauncherInterface};
 use rohrpost_mailbox::Node;
 use std::fs;
 use std::path::PathBuf;
@@ -11,13 +10,13 @@ const FILE: &str = "children";
 
 /// Remembers what was written last: only what has changed is written.
 #[derive(Default)]
-pub(super) struct Known {
+pub(crate) struct Known {
     written: Option<Vec<ChildState>>,
 }
 
 impl Known {
     /// Writes it, whole, if it has changed. A full /dev/shm is no reason not to look after modules: then it is tried again.
-    pub(super) fn write(&mut self, node: &Node, mut states: Vec<ChildState>) {
+    pub(crate) fn write(&mut self, node: &Node, mut states: Vec<ChildState>) {
         // It changes all the time, and whoever wants it asks.
         states.iter_mut().for_each(|state| state.starts_in_ms = None);
         if self.written.as_ref() == Some(&states) {

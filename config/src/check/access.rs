@@ -1,0 +1,47 @@
+//! Whether what modules call agrees with `[access]`.
+
+use crate::access::Access;
+use crate::installation::Installation;
+use crate::module::{Lines, Module};
+use crate::reader::Reader;
+use rohrpost_mailbox::Name;
+
+/// Nobody is listed as a caller of whom it may not command, and no face lets in whom its module keeps out: a router goes by the class of the
+/// name that is commanded.
+pub(crate) fn judge(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
+    for (to, line) in module.calls.iter().zip(&lines.calls) {
+        let refuses = |access: &&Access| access.refuses(module.name.class(), to.class());
+        if let Some(access) = installation.access.iter().find(refuses) {
+            reader.report(*line, told(installation, module, *to, access));
+        }
+    }
+    let rule = |class| installation.access.iter().find(|access| access.class == class);
+    let Some(access) = rule(module.name.class()) else { return };
+    for face in module.faces.iter().filter(|face| rule(face.class()).is_none()) {
+        reader.report(module.line, told_of_face(installation, module, *face, access));
+    }
+}
+
+fn told_of_face(installation: &Installation, module: &Module, face: Name, access: &Access) -> String {
+    let classes = &installation.classes;
+    let class = classes.name(face.class()).unwrap_or_default();
+    format!(
+        "module `{}` may be commanded by the classes of [access] in line {} alone, and its face `{}` by all; add a line for class `{class}` there",
+        classes.format(module.name),
+        access.line,
+        classes.format(face),
+    )
+}
+
+fn told(installation: &Installation, module: &Module, to: Name, access: &Access) -> String {
+    let classes = &installation.classes;
+    let class = |class| classes.name(class).unwrap_or_default();
+    format!(
+        "module `{}` calls `{}`, and [access] in line {} does not let class `{}` command class `{}`; add it there, or drop the call",
+        classes.format(module.name),
+        classes.format(to),
+        access.line,
+        class(module.name.class()),
+        class(access.class)
+    )
+}

@@ -1,0 +1,158 @@
+//! Reads and checks an installation's file as a whole.
+
+use crate::access::Access;
+use crate::check;
+use crate::classes::ClassTable;
+use crate::directory::Directory;
+use crate::errors::{Errors, Problem};
+use crate::flow::Flow;
+use crate::gui::Gui;
+use crate::installation::Installation;
+use crate::module::{Context, Module};
+use crate::network;
+use crate::node::{self, Node, System};
+use crate::output::Output;
+use crate::reader::{Reader, Section};
+use crate::saved::Saved;
+use crate::scheduling::SchedulingRule;
+use crate::tcp::{self, Tcp};
+use crate::tdma;
+use crate::time::TimeSource;
+use rohrpost_mailbox::Name;
+use std::path::{Path, PathBuf};
+use toml::de::DeTable;
+
+impl Installation {
+    /// Reads and checks a file, and the parameters saved beside it.
+    pub fn load(path: &Path) -> Result<Self, Errors> {
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            let message = format!("cannot be read ({error}); name an installation's file, such as config/demo.toml");
+            Errors::new(path, vec![Problem { line: None, message }])
+        })?;
+        let mut installation = Self::parse(&text, path)?;
+        if let Some(file) = &installation.parameters {
+            installation.saved = Some(Saved::load(file, &installation)?);
+        }
+        Ok(installation)
+    }
+
+    /// Checks the text of a file; `path` is its name in messages and the place that relative paths start from. Saved
+    /// parameters are not read.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, Errors> {
+        let reader = Reader::new(text);
+        let (document, syntax) = DeTable::parse_recoverable(text);
+        for error in &syntax {
+            reader.report_syntax(error);
+        }
+        // What the parser made up in place of what it could not read is not worth judging.
+        let read = if syntax.is_empty() { read(&reader, document.get_ref(), text, path) } else { None };
+        let problems = reader.into_problems();
+        match read {
+            Some(installation) if problems.is_empty() => Ok(installation),
+            _ => Err(Errors::new(path, problems)),
+        }
+    }
+}
+
+fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &Path) -> Option<Installation> {
+    let file = Section::new(reader, "", 1, table);
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    let name = file.required("installation", "installation = \"demo\"").and_then(|item| item.word("demo"));
+    let parameters = file.get("parameters").and_then(|item| item.text("tuned.toml")).map(|path| folder.join(path));
+    let system = System::read(required(&file, "system", "`[system]` with `name = \"robot\"` and `id = 1`"));
+    let classes = ClassTable::read(
+        required(&file, "classes", "`[classes]` with lines such as `laser = { id = 150, text = \"Tells distances\" }`"),
+        system.id,
+    );
+    let scheduling = SchedulingRule::read(file.section("scheduling", "[scheduling]"));
+    let nodes = Node::read_all(required(&file, "nodes", "`[nodes.main]`"));
+    let on_lan = node::on_lan(&nodes);
+    let (tdma, slot_lines) = tdma::read(&file, sections(&file, "slot"), on_lan).unzip();
+    let network = file.section("network", "[network]").map(|section| network::read(section, on_lan, tdma.as_ref()));
+    let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
+    let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
+    let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
+    network::judge(&file, on_lan, &classes);
+    let tcp = file.section("tcp", "[tcp]").map(|section| Tcp::read(section, &nodes, tdma.as_ref()));
+    if tcp.is_some() {
+        tcp::judge(&file, &classes, scheduling);
+    }
+    tcp::judge_nodes(&file, tcp.as_ref(), &nodes);
+
+    let sections = self::sections(&file, "module");
+    if sections.is_empty() {
+        file.report("no module; add one: `[[module]]` with `name` and `builtin` or `program`");
+    }
+    let mut routers = network::routers(on_lan, &classes, system.id);
+    routers.extend(tcp::modules(tcp.as_ref(), &nodes, &classes, system.id));
+    let router_names: Vec<Name> = routers.iter().map(|(router, _)| router.name).collect();
+    let directory = Directory::read(&sections, &classes, &router_names);
+    let context = Context { directory: &directory, nodes: &nodes };
+    let read = sections.into_iter().enumerate().filter_map(|(index, section)| context.read(section, index));
+    let (modules, lines): (Vec<Module>, Vec<_>) = routers.into_iter().chain(read).unzip();
+
+    let access = Access::read_all(file.section("access", "[access]"), &classes);
+    let output = Output::read(file.section("output", "[output]"), &directory, &folder);
+    let gui = Gui::read(file.section("gui", "[gui]"), &directory);
+    let flow_sections = self::sections(&file, "flow").into_iter();
+    let flows = flow_sections.filter_map(|section| Flow::read(section, &directory)).collect();
+    file.finish();
+
+    let name = name?.into();
+    let (path, text) = (path.to_owned(), text.to_owned());
+    let installation = Installation {
+        name,
+        shown: path.clone(),
+        path,
+        folder,
+        text,
+        system,
+        classes,
+        nodes,
+        modules,
+        network,
+        keys,
+        tdma,
+        tcp,
+        time,
+        access,
+        output,
+        gui,
+        flows,
+        parameters,
+        saved: None,
+        scheduling,
+    };
+    check::across(&installation, &lines, slot_lines.as_ref(), reader);
+    Some(installation)
+}
+
+fn required<'d>(file: &Section<'d>, key: &'static str, right: &str) -> Option<Section<'d>> {
+    let item = file.get(key);
+    if item.is_none() {
+        file.report(format!("section `[{key}]` is missing; add {right}"));
+    }
+    item?.section(&format!("[{key}]"))
+}
+
+/// The tables of an array: every `[[key]]`.
+fn sections<'d>(file: &Section<'d>, key: &'static str) -> Vec<Section<'d>> {
+    let Some(item) = file.get(key) else { return Vec::new() };
+    let header = format!("[[{key}]]");
+    let Some(tables) = item.value.get_ref().as_array() else {
+        item.report(format!("write `{header}`, with two brackets: there may be several"));
+        return Vec::new();
+    };
+    let section = |value: &'d toml::Spanned<toml::de::DeValue<'d>>| {
+        let line = file.reader.line(value.span());
+        let Some(table) = value.get_ref().as_table() else {
+            file.reader.report(line, format!("`{key}` holds something that is no table; write `{header}`"));
+            return None;
+        };
+        Some(Section::new(file.reader, &header, line, table))
+    };
+    tables.iter().filter_map(section).collect()
+}

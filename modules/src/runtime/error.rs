@@ -1,0 +1,76 @@
+//! Why a module did not start.
+
+use rohrpost_config::{Errors, NameTextError, SettingsError};
+use rohrpost_mailbox::NodeError;
+use std::path::PathBuf;
+
+/// Why a module did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The command line.
+    #[error("{0}\nusage: --config FILE --name CLASS.INSTANCE [--off]")]
+    Usage(String),
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] Errors),
+    /// The name given.
+    #[error(transparent)]
+    Name(#[from] NameTextError),
+    /// No such module.
+    #[error("{0}: no [[module]] is called `{1}`")]
+    NoModule(PathBuf, String),
+    /// The module's settings.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The node.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// A mailbox, which the text names as the configuration does.
+    #[error("{0}")]
+    Mailbox(String),
+    /// A face without an interface.
+    #[error("`{0}` is a face of `{1}`, but that program has no interface of class `{2}`")]
+    Face(String, String, String),
+    /// An interface without a name that it is reached by.
+    #[error(
+        "the program of `{module}` serves an interface of class `{interface}`, but the module is called {names}: nobody could call \
+         it, and its data could not be published; give the module a name or a face of class `{interface}`, or run another program"
+    )]
+    Interface {
+        /// The module.
+        module: String,
+        /// Its names.
+        names: String,
+        /// Class of the interface.
+        interface: &'static str,
+    },
+    /// Launch is gone.
+    #[error("launch, process {0}, ended before this module began")]
+    Orphan(u32),
+    /// The module said no.
+    #[error("{0}: {1}")]
+    Module(String, String),
+    /// The system said no.
+    #[error("{0}: {1}")]
+    System(&'static str, std::io::Error),
+}
+
+impl StartError {
+    /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the same way.
+    pub const CONFIGURATION: u8 = 78;
+
+    /// The exit code that tells launch whether starting again may help.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            // As command lines everywhere do.
+            Self::Usage(_) => 2,
+            Self::Config(_)
+            | Self::Name(_)
+            | Self::NoModule(..)
+            | Self::Settings(_)
+            | Self::Face(..)
+            | Self::Interface { .. } => Self::CONFIGURATION,
+            Self::Node(_) | Self::Mailbox(_) | Self::Orphan(_) | Self::Module(..) | Self::System(..) => 1,
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! What must hold of a simulated network, and how it is told that it did not.
+
+/// A promise that was broken.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Problem {
+    /// Name of the promise.
+    pub promise: Promise,
+    /// When, true ns.
+    pub at_ns: u64,
+    /// What was seen.
+    pub text: String,
+}
+
+/// What must hold whatever the network does.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum Promise {
+    /// Every accepted package is delivered, or counted with a cause, or was in a datagram that the network lost.
+    Accounts,
+    /// No command runs twice, and one that is said not to have run has not.
+    AtMostOnce,
+    /// A router delivers no package twice within one life of both ends.
+    NoCopies,
+    /// Of one sender and priority, packages come in their order.
+    Order,
+    /// Nothing is delivered that was not sent, unchanged, to that mailbox.
+    Unchanged,
+    /// An urgent package is behind at most one datagram of lower levels.
+    Urgency,
+    /// What gives way to what has no room is the sender's own newest of its lowest level.
+    Displacing,
+    /// Nothing leaves or is delivered that waited for too long, and a command hurries no more than its sender.
+    Fresh,
+    /// No more bytes a second than allowed.
+    Pace,
+    /// Queue, quotas and reassembly stay within their limits.
+    Bounded,
+    /// What a router says of its peers and of losses on the wire is so.
+    Links,
+    /// Nothing is delivered that is not admitted: where datagrams are sealed, in the name of another node; to a router's own mailbox; with more
+    /// priority than its sender, or who asked for it, may have.
+    Admission,
+    /// A while after the last fault all is well.
+    Recovery,
+    /// System time is within its stated bound.
+    TimeBound,
+    /// System time never goes back within an epoch.
+    TimeForward,
+    /// One master in a term, and one master a while after the last fault; who sends in its place does so only when it was not heard, and
+    /// nobody goes by it.
+    OneMaster,
+    /// With time slots no two nodes transmit at once, unless a fault parts them: see [`Divisions::excuse`].
+    ///
+    /// [`Divisions::excuse`]: super::divided::Divisions::excuse
+    Exclusive,
+    /// With time slots each datagram is on the wire in a window of its sender, before its guard, as the sender reckons, and none is sent
+    /// in a window whose wake-up came too late.
+    InWindow,
+    /// With time slots nobody sends while its own bound is greater than what is allowed, or while it is further off in truth.
+    SilentWhenUnsure,
+}
