@@ -64,7 +64,7 @@ pub use rohrpost_modules::runtime::{
 };
 pub use rohrpost_modules::{
     Module, ModuleError, choice, common, data, description, interface, interfaces, launch, output, parameter,
-    parameters, run, survey, types, value,
+    parameters, run, schema, survey, types,
 };
 
 /// The tools of the field that our interfaces and types speak: spans and events become output lines.

@@ -17,8 +17,8 @@ use rerun::blueprint::{ContainerLike, GraphView, Horizontal, TimeSeriesView, Ver
 use rerun::{AsComponents, GraphEdges, GraphNodes, Scalars, SerializedComponentBatch};
 use rohrpost::Class;
 use rohrpost::config::Installation;
-use rohrpost::description::{DataItem, Description};
 use rohrpost::interfaces::{ClockState, LinkState, Links, PeerLink};
+use rohrpost::schema::{DataItem, Description};
 use std::collections::{BTreeMap, HashMap};
 use std::f32::consts::TAU;
 use std::time::{Duration, Instant};

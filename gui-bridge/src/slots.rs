@@ -15,8 +15,8 @@ use crate::views::is;
 use rerun::blueprint::{ContainerLike, Spatial2DView, TimeSeriesView, Vertical};
 use rerun::{Boxes2D, LineStrips2D, Points2D};
 use rohrpost::config::{Flow, Installation, Tdma, duration_decimal};
-use rohrpost::description::{DataItem, Description};
 use rohrpost::interfaces::{FlowState, FlowStates, SlotState, SlotUse};
+use rohrpost::schema::{DataItem, Description};
 use std::collections::HashMap;
 use std::time::Duration;
 

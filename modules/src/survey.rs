@@ -22,13 +22,13 @@ pub use standing::{Standing, Working};
 pub use usage::Usage;
 
 use crate::launch::{ChildState, known_children};
-use postcard_schema::Schema;
 use rohrpost_config::{Installation, ROUTER, TCP};
 use rohrpost_mailbox::sys::{Scheduling, scheduling_of};
 use rohrpost_mailbox::{
     ClassTraffic, FlowInfo, InspectError, Latency, Loss, MailboxDetail, MailboxInfo, Name, Node, NodeError,
     ParticipantInfo, SlotInfo, local, monotonic_ns, saturating_sum,
 };
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// How much of a node is looked at.

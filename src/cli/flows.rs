@@ -5,8 +5,8 @@ use super::units::fine;
 use super::vocabulary::{Vocabulary, built_in};
 use rohrpost::Name;
 use rohrpost::config::{Contents, Installation};
-use rohrpost::description::Description;
 use rohrpost::interfaces::{FlowState, FlowStates, Links};
+use rohrpost::schema::Description;
 
 /// What the columns say that their heads do not.
 pub(super) const LEGEND: &str = "\

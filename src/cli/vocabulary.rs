@@ -3,8 +3,8 @@
 use rohrpost::Name;
 use rohrpost::common as c;
 use rohrpost::config::{Installation, Program};
-use rohrpost::description::Description;
 use rohrpost::mailbox::Kind;
+use rohrpost::schema::Description;
 use std::collections::BTreeMap;
 
 /// The interfaces that were found out so far. Who does not tell its own is not asked again.
@@ -27,7 +27,7 @@ impl Vocabulary {
             Kind::Reply(number) => self.function(number, from, ask).map(|name| answered(&name)),
             Kind::Data(number) => {
                 let items = &self.description(from, ask)?.data;
-                items.iter().find(|item| item.number == number).map(|item| item.name.clone())
+                items.iter().find(|item| item.number == number).map(|item| item.field.name.clone())
             }
             Kind::None => None,
         }

@@ -4,9 +4,9 @@
 //! The oldest look gives way to a new one, and its reader is told to begin anew.
 
 use crate::survey::{MailboxLook, Scope, Seen, Survey};
-use postcard_schema::Schema;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{InspectError, Name, Node};
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

@@ -2,8 +2,8 @@
 
 use super::follow::Subscription;
 use crate::common::DataHead;
-use crate::value::Data;
 use rohrpost_mailbox::Name;
+use rohrpost_schema::Data;
 
 /// Data that a subscription brought.
 pub struct Received<'a> {
