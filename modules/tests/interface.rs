@@ -142,5 +142,8 @@ fn the_hash_is_of_what_matters() {
     assert!(changed(|d| d.functions[1].idempotent = false), "what may be repeated does");
     assert!(changed(|d| d.data[0].field.ty = Vec::<f64>::schema()), "data do");
     // Recordings and other nodes have it: it does not change with the compiler or from run to run.
-    assert_eq!(hash, 1_252_876_277, "the hash has changed, and with it the wire: raise the layout version if that is meant");
+    assert_eq!(
+        hash, 1_252_876_277,
+        "the hash has changed, and with it the wire: raise the layout version if that is meant"
+    );
 }
