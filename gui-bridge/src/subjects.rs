@@ -5,6 +5,7 @@ use crate::blueprint::{Layout, Tab};
 use crate::view::{Datum, View};
 use crate::{Scene, views};
 use rohrpost::config::Show;
+use rohrpost::description::noted;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
 use rohrpost::mailbox::{Node, local};

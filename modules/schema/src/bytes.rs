@@ -23,18 +23,9 @@ pub enum SchemaError {
     /// They go on behind the end.
     #[error("{0} bytes behind the end of the description")]
     Long(usize),
-    /// No kind of type.
-    #[error("{0} is no type")]
-    Tag(u8),
-    /// No kind of members.
-    #[error("{0} is no kind of members")]
-    Members(u8),
-    /// Marks of a field that have no meaning.
-    #[error("{0:#04x} says of a field what this program does not know")]
-    Marks(u8),
-    /// A byte that is neither 0 nor 1.
-    #[error("expected a byte 0 or 1, got {0}")]
-    Flag(u8),
+    /// A byte that this version does not have: what it should be, and the byte.
+    #[error("the byte {1} is no {0}")]
+    Byte(&'static str, u8),
     /// A number that is too large.
     #[error("a number that does not fit {0} bits")]
     Number(u32),
@@ -59,9 +50,7 @@ pub fn hash(bytes: &[u8]) -> u32 {
 impl Type {
     /// As it is stored: the version of the table, then the type.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut writer = Writer::new(false);
-        writer.ty(self);
-        writer.bytes
+        Writer::whole(false, |writer| writer.ty(self))
     }
 
     /// Reads what [`Type::to_bytes`] wrote.
@@ -74,9 +63,7 @@ impl Type {
 
     /// The same without what does not count: texts and ranges.
     pub(crate) fn bare_bytes(&self) -> Vec<u8> {
-        let mut writer = Writer::new(true);
-        writer.ty(self);
-        writer.bytes
+        Writer::whole(true, |writer| writer.ty(self))
     }
 
     /// Tells types apart. Texts and ranges do not count, names and units do.
@@ -88,9 +75,7 @@ impl Type {
 impl Field {
     /// As it is stored: the version of the table, then the field.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut writer = Writer::new(false);
-        writer.field(self);
-        writer.bytes
+        Writer::whole(false, |writer| writer.field(self))
     }
 
     /// Reads what [`Field::to_bytes`] wrote.
@@ -112,110 +97,83 @@ mod mark {
 
 /// Appends.
 pub(crate) struct Writer {
-    pub(crate) bytes: Vec<u8>,
+    bytes: Vec<u8>,
     /// Leaves out what does not count in a hash.
     bare: bool,
 }
 
 impl Writer {
-    pub(crate) fn new(bare: bool) -> Self {
-        Self { bytes: vec![VERSION], bare }
+    /// What `write` writes, behind the version.
+    pub(crate) fn whole(bare: bool, write: impl FnOnce(&mut Self) -> &mut Self) -> Vec<u8> {
+        let mut writer = Self { bytes: vec![VERSION], bare };
+        write(&mut writer);
+        writer.bytes
     }
 
-    pub(crate) fn number(&mut self, number: usize) {
+    pub(crate) fn byte(&mut self, byte: u8) -> &mut Self {
+        self.bytes.push(byte);
+        self
+    }
+
+    pub(crate) fn number(&mut self, number: usize) -> &mut Self {
         write_varint(&mut self.bytes, number as u128);
+        self
     }
 
-    fn counted(&mut self, bytes: &[u8]) {
-        self.number(bytes.len());
-        self.bytes.extend_from_slice(bytes);
+    fn counted(&mut self, bytes: &[u8]) -> &mut Self {
+        self.number(bytes.len()).bytes.extend_from_slice(bytes);
+        self
     }
 
-    pub(crate) fn name(&mut self, name: &str) {
-        self.counted(name.as_bytes());
+    pub(crate) fn name(&mut self, name: &str) -> &mut Self {
+        self.counted(name.as_bytes())
     }
 
     /// What something is for.
-    pub(crate) fn text(&mut self, text: &str) {
-        self.name(if self.bare { "" } else { text });
+    pub(crate) fn text(&mut self, text: &str) -> &mut Self {
+        self.name(if self.bare { "" } else { text })
     }
 
-    pub(crate) fn list<T>(&mut self, members: &[T], write: impl Fn(&mut Self, &T)) {
-        self.number(members.len());
-        members.iter().for_each(|member| write(self, member));
+    pub(crate) fn list<T>(
+        &mut self,
+        members: &[T],
+        write: impl for<'w> Fn(&'w mut Self, &T) -> &'w mut Self,
+    ) -> &mut Self {
+        members.iter().fold(self.number(members.len()), |writer, member| write(writer, member))
     }
 
-    fn named(&mut self, Named { name, text, members }: &Named) {
-        self.name(name);
-        self.text(text);
+    fn named(&mut self, Named { name, text, members }: &Named) -> &mut Self {
+        self.name(name).text(text);
         match members {
-            Members::None => self.bytes.push(0),
-            Members::One(field) => {
-                self.bytes.push(1);
-                self.field(field);
-            }
-            Members::Tuple(fields) => {
-                self.bytes.push(2);
-                self.list(fields, Self::field);
-            }
-            Members::Fields(fields) => {
-                self.bytes.push(3);
-                self.list(fields, Self::field);
-            }
+            Members::None => self.byte(0),
+            Members::One(field) => self.byte(1).field(field),
+            Members::Tuple(fields) => self.byte(2).list(fields, Self::field),
+            Members::Fields(fields) => self.byte(3).list(fields, Self::field),
         }
     }
 
-    pub(crate) fn field(&mut self, Field { name, text, unit, ty, least, most }: &Field) {
+    pub(crate) fn field(&mut self, Field { name, text, unit, ty, least, most }: &Field) -> &mut Self {
         let parts = [
             (mark::TEXT, Some(text.as_bytes()).filter(|text| !text.is_empty() && !self.bare)),
             (mark::UNIT, Some(unit.as_bytes()).filter(|unit| !unit.is_empty())),
             (mark::LEAST, least.as_deref().filter(|_| !self.bare)),
             (mark::MOST, most.as_deref().filter(|_| !self.bare)),
         ];
-        self.name(name);
-        self.bytes.push(parts.iter().filter(|(_, part)| part.is_some()).map(|(mark, _)| mark).sum());
-        parts.iter().filter_map(|(_, part)| *part).for_each(|part| self.counted(part));
-        self.ty(ty);
+        let marks = parts.iter().filter(|(_, part)| part.is_some()).map(|(mark, _)| mark).sum();
+        let marked = self.name(name).byte(marks);
+        parts.iter().filter_map(|(_, part)| *part).fold(marked, Self::counted).ty(ty)
     }
 
-    pub(crate) fn ty(&mut self, ty: &Type) {
-        if let Some(tag) = PLAIN.iter().position(|plain| plain == ty) {
-            return self.bytes.push(tag as u8);
-        }
+    pub(crate) fn ty(&mut self, ty: &Type) -> &mut Self {
         match ty {
-            Type::Option(some) => {
-                self.bytes.push(17);
-                self.ty(some);
-            }
-            Type::List(element) => {
-                self.bytes.push(18);
-                self.ty(element);
-            }
-            Type::Array(length, element) => {
-                self.bytes.push(19);
-                self.number(*length as usize);
-                self.ty(element);
-            }
-            Type::Map(key, value) => {
-                self.bytes.push(20);
-                self.ty(key);
-                self.ty(value);
-            }
-            Type::Tuple(elements) => {
-                self.bytes.push(21);
-                self.list(elements, Self::ty);
-            }
-            Type::Struct(named) => {
-                self.bytes.push(22);
-                self.named(named);
-            }
-            Type::Enum { name, text, variants } => {
-                self.bytes.push(23);
-                self.name(name);
-                self.text(text);
-                self.list(variants, Self::named);
-            }
-            _ => unreachable!("all others are plain"),
+            Type::Option(some) => self.byte(17).ty(some),
+            Type::List(element) => self.byte(18).ty(element),
+            Type::Array(length, element) => self.byte(19).number(*length as usize).ty(element),
+            Type::Map(key, value) => self.byte(20).ty(key).ty(value),
+            Type::Tuple(elements) => self.byte(21).list(elements, Self::ty),
+            Type::Struct(named) => self.byte(22).named(named),
+            Type::Enum { name, text, variants } => self.byte(23).name(name).text(text).list(variants, Self::named),
+            plain => self.byte(PLAIN.iter().position(|other| other == plain).unwrap_or_default() as u8),
         }
     }
 }
@@ -277,7 +235,7 @@ impl<'a> Reader<'a> {
         match self.byte()? {
             0 => Ok(false),
             1 => Ok(true),
-            other => Err(SchemaError::Flag(other)),
+            other => Err(SchemaError::Byte("yes or no", other)),
         }
     }
 
@@ -312,7 +270,7 @@ impl<'a> Reader<'a> {
             1 => Members::One(Box::new(self.field()?)),
             2 => Members::Tuple(self.list(Self::field)?),
             3 => Members::Fields(self.list(Self::field)?),
-            other => return Err(SchemaError::Members(other)),
+            other => return Err(SchemaError::Byte("kind of members", other)),
         };
         Ok(Named { name, text, members })
     }
@@ -320,12 +278,13 @@ impl<'a> Reader<'a> {
     pub(crate) fn field(&mut self) -> Result<Field, SchemaError> {
         let (name, marks) = (self.text()?, self.byte()?);
         if marks > mark::TEXT + mark::UNIT + mark::LEAST + mark::MOST {
-            return Err(SchemaError::Marks(marks));
+            return Err(SchemaError::Byte("sum of marks", marks));
         }
-        let text = if marks & mark::TEXT == 0 { String::new() } else { self.text()? };
-        let unit = if marks & mark::UNIT == 0 { String::new() } else { self.text()? };
-        let least = if marks & mark::LEAST == 0 { None } else { Some(self.counted()?.to_vec()) };
-        let most = if marks & mark::MOST == 0 { None } else { Some(self.counted()?.to_vec()) };
+        let has = |mark| marks & mark != 0;
+        let text = if has(mark::TEXT) { self.text()? } else { String::new() };
+        let unit = if has(mark::UNIT) { self.text()? } else { String::new() };
+        let least = if has(mark::LEAST) { Some(self.counted()?.to_vec()) } else { None };
+        let most = if has(mark::MOST) { Some(self.counted()?.to_vec()) } else { None };
         Ok(Field { name, text, unit, ty: self.ty()?, least, most })
     }
 
@@ -350,7 +309,7 @@ impl<'a> Reader<'a> {
             (None, 21) => Type::Tuple(self.list(Self::ty)?),
             (None, 22) => Type::Struct(self.named()?),
             (None, 23) => Type::Enum { name: self.text()?, text: self.text()?, variants: self.list(Self::named)? },
-            (None, other) => return Err(SchemaError::Tag(other)),
+            (None, other) => return Err(SchemaError::Byte("type", other)),
         };
         self.depth -= 1;
         Ok(ty)

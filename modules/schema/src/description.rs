@@ -77,16 +77,11 @@ impl Description {
     }
 
     fn written(&self, bare: bool) -> Vec<u8> {
-        let mut writer = Writer::new(bare);
-        writer.name(&self.name);
-        writer.name(&self.class);
-        writer.text(&self.text);
-        writer.list(&self.functions, |writer, function| function.write(writer));
-        writer.list(&self.data, |writer, item| {
-            writer.number(item.number.into());
-            writer.field(&item.field);
-        });
-        writer.bytes
+        Writer::whole(bare, |writer| {
+            let head = writer.name(&self.name).name(&self.class).text(&self.text);
+            head.list(&self.functions, Function::written)
+                .list(&self.data, |writer, item| writer.number(item.number.into()).field(&item.field))
+        })
     }
 
     /// A function by its name.
@@ -101,13 +96,9 @@ impl Description {
 }
 
 impl Function {
-    fn write(&self, writer: &mut Writer) {
-        writer.number(self.number.into());
-        writer.name(&self.name);
-        writer.text(&self.text);
-        writer.bytes.push(u8::from(self.idempotent));
-        writer.list(&self.arguments, Writer::field);
-        writer.ty(&self.result);
+    fn written<'w>(writer: &'w mut Writer, function: &Self) -> &'w mut Writer {
+        let head = writer.number(function.number.into()).name(&function.name).text(&function.text);
+        head.byte(u8::from(function.idempotent)).list(&function.arguments, Writer::field).ty(&function.result)
     }
 
     fn read(reader: &mut Reader<'_>) -> Result<Self, SchemaError> {
