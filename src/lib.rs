@@ -66,7 +66,7 @@ pub use rohrpost_modules::runtime::{
 };
 pub use rohrpost_modules::{
     Module, ModuleError, choice, common, data, description, interface, interfaces, launch, launcher, output, parameter,
-    parameters, run, survey, types, value,
+    parameters, run, schema, survey, types,
 };
 
 /// What a module says: events become lines of output.

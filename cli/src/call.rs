@@ -4,9 +4,8 @@ use super::target::Target;
 use super::units::seconds;
 use crate::terminal::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
-use rohrpost::description::{Description, Function};
 use rohrpost::output::plain;
-use rohrpost::value::{Value, decode, describe_result, describe_type, encode, parse_argument};
+use rohrpost::schema::{Description, Function, Value, decode, describe_field, describe_result, encode, parse_argument};
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
 
@@ -109,14 +108,14 @@ pub(super) fn level_of(text: &str) -> Result<OutputLevel, Failure> {
 fn get(module: Name, data: &str, tool: &mut ToolLink) -> Result<Value, Failure> {
     let description = tool.describe(module)?;
     let item = description.data_item(data).ok_or_else(|| {
-        let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
+        let names: Vec<&str> = description.data.iter().map(|item| item.field.name.as_str()).collect();
         format!("no data `{data}`; it has: {}", names.join(", "))
     })?;
     let number = item.number;
     let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(number,));
     let bytes = tool.call(module, common::GET_DATA, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
     let (_, value) = postcard_u64(&bytes).ok_or("the answer is too short")?;
-    Ok(decode(&item.ty, value)?)
+    Ok(decode(&item.field.ty, value)?)
 }
 
 /// A postcard u64 and what follows it.
@@ -169,11 +168,8 @@ pub(super) fn body_of(function: &Function, texts: &[String]) -> Result<Vec<u8>, 
 
 /// A function with the names and types of its arguments.
 pub(super) fn usage(function: &Function) -> String {
-    let arguments: Vec<String> = function
-        .arguments
-        .iter()
-        .map(|argument| format!(" <{}: {}>", plain::line(&argument.name), describe_type(&argument.ty)))
-        .collect();
+    let arguments: Vec<String> =
+        function.arguments.iter().map(|argument| format!(" <{}>", describe_field(argument))).collect();
     format!("{}{}", plain::line(&function.name), arguments.concat())
 }
 
@@ -194,8 +190,7 @@ fn listing(description: &Description) -> String {
         text.push_str("\ndata\n");
     }
     for item in &description.data {
-        let (name, about) = (plain::line(&item.name), plain::line(&item.text));
-        text.push_str(&format!("  {name}: {}\n      {about}\n", describe_type(&item.ty)));
+        text.push_str(&format!("  {}\n      {}\n", describe_field(&item.field), plain::line(&item.field.text)));
     }
     text.push_str("\nevery module: on, off, status, get DATA, output-level LEVEL");
     text

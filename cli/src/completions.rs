@@ -13,8 +13,8 @@ use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCan
 use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
-use rohrpost::description::Description;
 use rohrpost::output::plain;
+use rohrpost::schema::Description;
 use rohrpost::survey::purpose;
 use rohrpost_config::Installation;
 use std::path::PathBuf;
@@ -171,7 +171,7 @@ fn functions() -> Vec<CompletionCandidate> {
 
 fn data() -> Vec<CompletionCandidate> {
     let data = described().map(|description| description.data).unwrap_or_default();
-    data.iter().map(|item| candidate(&item.name, &item.text)).collect()
+    data.iter().map(|item| candidate(&item.field.name, &item.field.text)).collect()
 }
 
 fn parameters() -> Vec<CompletionCandidate> {
@@ -182,7 +182,7 @@ fn parameters() -> Vec<CompletionCandidate> {
         tool.close();
         answer
     });
-    found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.name, &parameter.text)).collect()
+    found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.field.name, &parameter.field.text)).collect()
 }
 
 /// Arguments of functions that every module has; those of its own are numbers and words.

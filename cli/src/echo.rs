@@ -3,8 +3,7 @@
 use super::target::Target;
 use crate::terminal::{Failure, say};
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
-use rohrpost::description::{DataItem, Description};
-use rohrpost::value::decode;
+use rohrpost::schema::{DataItem, Description, decode};
 use rohrpost::{Name, ToolLink};
 use rohrpost_mailbox::{Kind, local};
 use std::process::ExitCode;
@@ -64,7 +63,7 @@ fn echo(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(), 
 }
 
 fn choose<'a>(description: &'a Description, name: Option<&str>) -> Result<&'a DataItem, Failure> {
-    let names = || description.data.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join(", ");
+    let names = || description.data.iter().map(|item| item.field.name.as_str()).collect::<Vec<_>>().join(", ");
     match (name, &description.data[..]) {
         (_, []) => Err("publishes no data; `rohrpost call NAME` lists what it offers".into()),
         (None, [only]) => Ok(only),
@@ -110,7 +109,7 @@ fn follow(
             continue;
         }
         heard = Instant::now();
-        let value = decode(&item.ty, value)?;
+        let value = decode(&item.field.ty, value)?;
         let line = if arguments.json {
             let stamped = serde_json::json!({
                 "time_ns": head.stamp_ns, "sequence": head.sequence, "missed": head.missed, "value": value,

@@ -4,8 +4,8 @@ use super::table::table;
 use super::units::fine;
 use super::vocabulary::{Vocabulary, built_in};
 use rohrpost::Name;
-use rohrpost::description::Description;
 use rohrpost::interfaces::{FlowState, FlowStates, Links};
+use rohrpost::schema::Description;
 use rohrpost_config::{Contents, Installation};
 
 /// What the columns say that their heads do not.

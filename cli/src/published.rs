@@ -13,7 +13,7 @@ use std::time::Duration;
 pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Result<Vec<(u16, String)>, Failure> {
     let text = running.text(module);
     let description = running.describe(module)?;
-    let known: Vec<(u16, String)> = description.data.into_iter().map(|item| (item.number, item.name)).collect();
+    let known: Vec<(u16, String)> = description.data.into_iter().map(|item| (item.number, item.field.name)).collect();
     let names = || known.iter().map(|(_, name)| plain::line(name)).collect::<Vec<_>>().join(", ");
     match name {
         _ if known.is_empty() => {

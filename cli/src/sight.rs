@@ -5,11 +5,12 @@ use super::target::Running;
 use super::units::short;
 use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
-use rohrpost::description::Description;
+use rohrpost::description::noted;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
 use rohrpost::launcher::{Look, launcher_of};
 use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::output::{iso, plain};
+use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::survey::{LookFailure, MailboxLook, Scope, Seen, Survey, look_at_all};
 use rohrpost::{CallError, Fault, ToolLink};
@@ -210,7 +211,7 @@ impl Running {
     /// What a module offers: as it noted beside its mailboxes, so that it is not asked; on another node it has to be.
     pub(super) fn describe(&self, module: Name) -> Result<Description, Failure> {
         if self.is_own(module) {
-            return Description::noted(&self.node, module).ok_or_else(|| self.absent(module));
+            return noted(&self.node, module).ok_or_else(|| self.absent(module));
         }
         let described = self.sight.with(self, |tool| tool.describe(module))?;
         described.map_err(|error| self.told(module, &error))

@@ -2,7 +2,7 @@
 
 use rohrpost::Name;
 use rohrpost::common as c;
-use rohrpost::description::Description;
+use rohrpost::schema::Description;
 use rohrpost_config::{Installation, Program};
 use rohrpost_mailbox::Kind;
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ impl Vocabulary {
             Kind::Reply(number) => self.function(number, from, ask).map(|name| answered(&name)),
             Kind::Data(number) => {
                 let items = &self.description(from, ask)?.data;
-                items.iter().find(|item| item.number == number).map(|item| item.name.clone())
+                items.iter().find(|item| item.number == number).map(|item| item.field.name.clone())
             }
             Kind::None => None,
         }

@@ -1,8 +1,7 @@
 //! A bridge of one's own: it draws data of a type of one's own, and all else as the usual one does. Put it in the
 //! configuration in that one's place: `program = "own_view"`.
 
-use rohrpost::description::{DataItem, Description};
-use rohrpost::value::Data;
+use rohrpost::schema::{DataItem, Description};
 use rohrpost_gui_bridge::rerun::{Color, Points2D};
 use rohrpost_gui_bridge::{Datum, DrawError, Scene, Tab, View, entity};
 
@@ -18,7 +17,7 @@ struct FireView;
 
 impl View for FireView {
     fn wants(&self, _: &Description, item: &DataItem) -> bool {
-        item.ty == Fires::schema()
+        item.field.ty.is::<Fires>()
     }
 
     fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {

@@ -1,9 +1,9 @@
 //! Draws an invented robot for a minute of its time: `cargo run --profile bridge -p rohrpost-gui-bridge --example scene
 //! scene.rrd`, then `rerun scene.rrd` or `cargo xtask picture scene.rrd scene.png`.
 
+use rohrpost::schema::Value;
 use rohrpost::survey::Standing;
 use rohrpost::types::{Cell, LaserScan, OccupancyGrid, Odometry, Pose, Twist};
-use rohrpost::value::Value;
 use rohrpost_gui_bridge::{Level, Scene, Sink};
 use std::f64::consts::TAU;
 

@@ -1,9 +1,8 @@
 //! Asks a module of another node what it offers, part by part, and waits for nothing.
 
 use rohrpost::common::{DESCRIBE, DescriptionPart, HASH};
-use rohrpost::description::Description;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::value::read_described;
+use rohrpost::schema::Description;
 use rohrpost::{Context, Name};
 use std::time::Duration;
 
@@ -40,7 +39,7 @@ impl Asking {
             };
             self.bytes.extend_from_slice(&part.bytes);
             if self.bytes.len() >= part.total as usize {
-                return read_described(&std::mem::take(&mut self.bytes)).ok();
+                return Description::from_bytes(&std::mem::take(&mut self.bytes)).ok();
             }
         }
     }

@@ -15,8 +15,8 @@ use crate::states::Level;
 use crate::view::{Datum, View};
 use crate::views::is;
 use rerun::Clear;
-use rohrpost::description::{DataItem, Description};
 use rohrpost::interfaces::{BeyondLink, BeyondState};
+use rohrpost::schema::{DataItem, Description};
 use rohrpost::survey::Standing;
 use std::collections::HashMap;
 

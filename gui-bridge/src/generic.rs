@@ -3,7 +3,7 @@
 use crate::scene::Scene;
 use crate::states::cut;
 use rerun::{EntityPath, EntityPathPart, Scalars, TextLog};
-use rohrpost::value::Value;
+use rohrpost::schema::Value;
 use std::collections::HashMap;
 use std::fmt::Write;
 

@@ -4,9 +4,10 @@ use crate::asking::Asking;
 use crate::blueprint::{Layout, Tab};
 use crate::view::{Datum, View};
 use crate::{Scene, views};
-use rohrpost::description::{DataItem, Description};
+use rohrpost::description::noted;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
+use rohrpost::schema::{DataItem, Description};
 use rohrpost::survey::node_of;
 use rohrpost::{Context, ContextError, Name, Rate, Received, Subscription};
 use rohrpost_config::Show;
@@ -123,7 +124,7 @@ impl Subjects {
         for entry in self.entries.iter_mut().filter(|entry| !entry.answered && runs(entry.from)) {
             let is_own = node_of(context.installation(), entry.from) == Some(own);
             let description = match is_own {
-                true => Description::noted(node, entry.from),
+                true => noted(node, entry.from),
                 false => entry.asking.get_or_insert_default().poll(context, entry.from),
             };
             let Some(description) = description else { continue };
@@ -217,7 +218,7 @@ impl Entry {
         };
         let item = description.data_item(name).cloned();
         if item.is_none() {
-            let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
+            let names: Vec<&str> = description.data.iter().map(|item| item.field.name.as_str()).collect();
             tracing::warn!("{} has no data `{name}` to draw; it has: {}", self.module, names.join(", "));
         }
         item.into_iter().collect()

@@ -2,8 +2,7 @@
 
 use crate::blueprint::Tab;
 use crate::scene::{DrawError, RATE_HZ, Scene};
-use rohrpost::description::{DataItem, Description};
-use rohrpost::value::{Data, Value, decode};
+use rohrpost::schema::{Data, DataItem, Description, Value, decode};
 use rohrpost::{Name, Rate};
 use rohrpost_config::Installation;
 use std::time::Duration;
@@ -92,11 +91,15 @@ impl Datum<'_> {
     /// # Errors
     /// When the sender does not keep to its description.
     pub fn value(&self) -> Result<Value, DrawError> {
-        decode(&self.item.ty, self.bytes).map_err(|error| self.unreadable(&error))
+        decode(&self.item.field.ty, self.bytes).map_err(|error| self.unreadable(&error))
     }
 
     fn unreadable(&self, cause: &dyn std::fmt::Display) -> DrawError {
-        DrawError::Unreadable { module: self.module.into(), data: self.item.name.clone(), cause: cause.to_string() }
+        DrawError::Unreadable {
+            module: self.module.into(),
+            data: self.item.field.name.clone(),
+            cause: cause.to_string(),
+        }
     }
 }
 

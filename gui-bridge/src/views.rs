@@ -7,12 +7,11 @@ use crate::scene::{DrawError, Scene};
 use crate::slots::{Flows, Slots};
 use crate::states::Level;
 use crate::view::{Datum, View, Wish};
-use rohrpost::description::{DataItem, Description};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CartographerInterface;
 use rohrpost::output::OutputLine;
+use rohrpost::schema::{DataItem, Description, Schema};
 use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose};
-use rohrpost::value::Data;
 
 /// All of them; the last wants everything.
 pub(crate) fn built_in() -> Vec<Box<dyn View>> {
@@ -31,8 +30,8 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
     ]
 }
 
-pub(crate) fn is<T: Data>(item: &DataItem) -> bool {
-    item.ty == T::schema()
+pub(crate) fn is<T: Schema>(item: &DataItem) -> bool {
+    item.field.ty.is::<T>()
 }
 
 /// Scans, from where their scanner stood, or on the robot whose odometry came first.
@@ -153,7 +152,7 @@ impl View for Other {
     }
 
     fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
-        scene.generic(datum.module, &datum.item.name, &datum.value()?);
+        scene.generic(datum.module, &datum.item.field.name, &datum.value()?);
         Ok(())
     }
 

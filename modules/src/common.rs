@@ -1,11 +1,8 @@
 //! The functions that every module has (seed 002, 2.2.1), numbers 1 to 15 of the commands.
 
 use crate::parameter::{Parameter, Refusal};
-use crate::value::meta::{field, itself, list, structure, text};
-use crate::value::{Data, Described};
-use postcard_schema::Schema;
-use postcard_schema::schema::owned::OwnedNamedType;
 use rohrpost_mailbox::{ModuleState, SystemClock, TimeSource};
+use rohrpost_schema::{Data, Schema};
 use serde::{Deserialize, Serialize};
 
 /// Switches the module on. No arguments, no result.
@@ -36,7 +33,7 @@ pub const EXCHANGE: u16 = 12;
 pub const FIRST_OWN: u16 = 16;
 
 /// Hash that commands to the common functions carry, which are of no interface: raised whenever one of them changes.
-pub const HASH: u32 = 3;
+pub const HASH: u32 = 4;
 
 /// Bytes of a description that go into one reply, so that it fits every reply mailbox.
 pub const DESCRIPTION_PART: usize = 768;
@@ -211,7 +208,7 @@ pub enum OutputLevel {
     Trace,
 }
 
-/// A part of a description's bytes (postcard of [`crate::description::Description`]).
+/// A part of a description's bytes (see [`rohrpost_schema::Description`]).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct DescriptionPart {
     /// Bytes of the whole.
@@ -229,17 +226,6 @@ pub struct ParameterPage {
     pub changes: u32,
     /// Those from the index that was asked for.
     pub parameters: Vec<Parameter>,
-}
-
-impl Described for ParameterPage {
-    fn shape() -> OwnedNamedType {
-        let bound = |name| field(name, Option::<Vec<u8>>::schema());
-        let words = ["name", "text", "unit"].map(|name| field(name, text()));
-        let rest = [field("ty", itself()), bound("least"), bound("most"), field("value", Vec::<u8>::schema())];
-        let parameter = structure("Parameter", words.into_iter().chain(rest).collect());
-        let counts = [field("total", u16::schema()), field("changes", u32::schema())];
-        structure("ParameterPage", counts.into_iter().chain([field("parameters", list(parameter))]).collect())
-    }
 }
 
 /// Sets parameters, all of them or none.

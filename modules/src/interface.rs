@@ -1,9 +1,8 @@
 //! What the `interface` attribute makes of a trait: an interface that a module serves and proxies call.
 
 use crate::call::{CallError, Caller, Fault, Pending, append};
-use crate::description::Description;
-use crate::value::Data;
 use rohrpost_mailbox::Name;
+use rohrpost_schema::{Data, Description};
 use std::marker::PhantomData;
 use std::time::Duration;
 

@@ -17,7 +17,7 @@ pub use tcp::{
 use crate::interface;
 use crate::output::OutputLine;
 use crate::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
-use postcard_schema::Schema;
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Why a motor does not drive.

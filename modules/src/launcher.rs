@@ -10,9 +10,9 @@ use crate::call::CallError;
 use crate::call::append;
 use crate::interface;
 use crate::runtime::ToolLink;
-use postcard_schema::Schema;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::Name;
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Where launch stands with a module.

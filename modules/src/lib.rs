@@ -4,8 +4,7 @@
 //! types, interfaces   what modules exchange            robot, builtin   modules that come with Rohrpost
 //! call                commands, once, and replies      runtime          the loop of a module's thread
 //! publish             who wants which data             launch           starts, watches and stops a node's modules
-//! value, description  data without its types           output           what modules say
-//! parameter           settings that may change
+//! parameter           settings that may change         output           what modules say
 //! ```
 //!
 //! Module authors use it through the crate `rohrpost`.
@@ -33,8 +32,8 @@ pub mod robot;
 pub mod runtime;
 pub mod survey;
 pub mod types;
-pub mod value;
 
 pub use module::{Module, ModuleError};
 pub use rohrpost_macros::{choice, data, interface, parameters};
+pub use rohrpost_schema as schema;
 pub use runtime::run;

@@ -2,12 +2,10 @@
 
 pub use crate::call::append;
 pub use crate::call::{CallError, Caller, Fault, Pending};
-pub use crate::description::{Argument, DataItem, Description, Function};
 pub use crate::interface::{DataPort, Interface, Proxy, ProxyCore, Serve};
 pub use crate::parameter::{Declared, Parameter, ParameterSet, ParameterType, Refusal, put_parameter};
 pub use crate::runtime::{read_arguments, write_result};
-pub use crate::value::Data;
 pub use postcard::from_bytes;
-pub use postcard_schema;
 pub use rohrpost_mailbox::Name;
+pub use rohrpost_schema as schema;
 pub use serde;

@@ -3,9 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_modules::call::Fault;
+use rohrpost_modules::common::HASH;
 use rohrpost_modules::interface;
 use rohrpost_modules::interface::{Interface, Serve};
-use rohrpost_modules::value::Data;
+use rohrpost_modules::interfaces::{CartographerInterface, CollectorInterface, LaserInterface, MotorInterface};
+use rohrpost_modules::launcher::LauncherInterface;
+use rohrpost_modules::schema::{Description, Schema, describe_field};
 
 /// Opens and closes.
 ///
@@ -15,7 +18,11 @@ pub trait Gripper {
     /// Closes with a force.
     /// In newtons.
     #[command(16)]
-    fn close(&mut self, force_n: f32, name: Option<String>) -> Result<u8, String>;
+    fn close(
+        &mut self,
+        #[schema(unit = "N", min = 0.0, max = 40.0)] force_n: f32,
+        name: Option<String>,
+    ) -> Result<u8, String>;
 
     /// Opens.
     #[command(17, idempotent)]
@@ -27,6 +34,7 @@ pub trait Gripper {
 
     /// What it feels.
     #[data(1)]
+    #[schema(unit = "Pa")]
     fn pressure() -> Vec<f32>;
 }
 
@@ -53,13 +61,45 @@ fn a_description_says_it_all() {
     assert_eq!((close.number, close.idempotent, close.text.as_str()), (16, false, "Closes with a force. In newtons."));
     let arguments: Vec<_> = close.arguments.iter().map(|argument| (argument.name.as_str(), &argument.ty)).collect();
     assert_eq!(arguments, [("force_n", &f32::schema()), ("name", &Option::<String>::schema())]);
+    assert_eq!(describe_field(&close.arguments[0]), "force_n: f32, 0..=40 N");
+    assert_eq!(describe_field(&description.data[0].field), "pressure: [f32] Pa");
     assert_eq!(close.result, Result::<u8, String>::schema());
     let open = description.function("open").unwrap();
     assert!(open.idempotent && open.arguments.is_empty() && open.result == <()>::schema());
     let pressure = description.data_item("pressure").unwrap();
-    assert_eq!((pressure.number, &pressure.ty), (1, &Vec::<f32>::schema()));
-    let bytes = postcard::to_stdvec(&description).unwrap();
-    assert_eq!(postcard::from_bytes::<rohrpost_modules::description::Description>(&bytes).unwrap(), description);
+    assert_eq!((pressure.number, &pressure.field.ty), (1, &Vec::<f32>::schema()));
+    assert_eq!(Description::from_bytes(&description.to_bytes()), Ok(description));
+}
+
+#[test]
+fn what_modules_say_comes_back() {
+    for description in [
+        CartographerInterface::description(),
+        CollectorInterface::description(),
+        LaserInterface::description(),
+        LauncherInterface::description(),
+        MotorInterface::description(),
+    ] {
+        assert_eq!(Description::from_bytes(&description.to_bytes()), Ok(description));
+    }
+}
+
+#[test]
+fn an_older_program_is_refused_by_name() {
+    let said = |server| Fault::InterfaceDiffers { server }.to_string();
+    let ours = HASH;
+    let expected = format!(
+        "the module has common functions of version 3, this program has {ours}: run programs of the same version"
+    );
+    assert!(said(3).starts_with(&expected), "{}", said(3));
+    assert!(
+        said(0x0040_0000).starts_with("interface differs: the module has 0x00400000; build"),
+        "{}",
+        said(0x0040_0000)
+    );
+    // How descriptions began before they had a version: with the length of the name.
+    let error = Description::from_bytes(b"\x05Motor\x05motor").unwrap_err().to_string();
+    assert!(error.starts_with("descriptions of version 5, this program knows 1"), "{error}");
 }
 
 #[test]
@@ -84,24 +124,26 @@ fn the_hash_is_of_what_matters() {
     let description = GripperInterface::description();
     let hash = GripperInterface::hash();
     assert_eq!(hash, description.hash());
-    let changed = |change: fn(&mut rohrpost_modules::description::Description)| {
+    let changed = |change: fn(&mut Description)| {
         let mut other = description.clone();
         change(&mut other);
         other.hash() != hash
     };
     assert!(!changed(|d| d.text = "else".into()), "texts do not count");
     assert!(!changed(|d| d.functions[0].text.clear()), "texts do not count");
-    assert!(!changed(|d| d.data[0].text.clear()), "texts do not count");
+    assert!(!changed(|d| d.data[0].field.text.clear()), "texts do not count");
     assert!(changed(|d| d.functions[0].number = 19), "numbers do");
     assert!(changed(|d| d.functions[0].name = "shut".into()), "names do");
     assert!(changed(|d| d.functions[0].arguments[0].ty = f64::schema()), "types do");
+    assert!(changed(|d| d.functions[0].arguments[0].unit = "mN".into()), "units do");
+    assert!(!changed(|d| d.functions[0].arguments[0].most = None), "ranges do not");
     assert!(changed(|d| d.functions[0].arguments.reverse()), "their order does");
     assert!(changed(|d| d.functions[1].result = u8::schema()), "results do");
     assert!(changed(|d| d.functions[1].idempotent = false), "what may be repeated does");
-    assert!(changed(|d| d.data[0].ty = Vec::<f64>::schema()), "data do");
+    assert!(changed(|d| d.data[0].field.ty = Vec::<f64>::schema()), "data do");
     // Recordings and other nodes have it: it does not change with the compiler or from run to run.
     assert_eq!(
-        hash, 178_475_845,
+        hash, 1_252_876_277,
         "the hash has changed, and with it the wire: raise the layout version if that is meant"
     );
 }

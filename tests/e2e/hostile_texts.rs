@@ -2,11 +2,10 @@
 
 use crate::harness::{OUTPUT, PATIENCE, Place, wait};
 use rohrpost::interface::{Interface, Serve};
-use rohrpost::macro_support::postcard_schema::schema::owned::{OwnedDataModelType, OwnedNamedType, OwnedNamedValue};
-use rohrpost::macro_support::{Argument, DataItem, Description, Function, append};
+use rohrpost::macro_support::append;
 use rohrpost::output::plain::is_obeyed;
 use rohrpost::parameter::{Parameter, ParameterSet, Refusal};
-use rohrpost::value::Data;
+use rohrpost::schema::{DataItem, Description, Field, Function, Members, Named, Schema, Type};
 use rohrpost::{Context, Fault, Module, ModuleError};
 use std::time::Duration;
 
@@ -34,9 +33,9 @@ fn module() {
 }
 
 /// A type whose every name is hostile.
-fn structure(inner: OwnedNamedType) -> OwnedNamedType {
-    let field = OwnedNamedValue { name: HOSTILE.into(), ty: inner };
-    OwnedNamedType { name: HOSTILE.into(), ty: OwnedDataModelType::Struct(vec![field]) }
+fn structure(inner: Type) -> Type {
+    let field = Field::new(HOSTILE, inner).said(HOSTILE, HOSTILE);
+    Type::Struct(Named::new(HOSTILE, Members::Fields(vec![field])).said(HOSTILE))
 }
 
 struct HostileInterface;
@@ -60,7 +59,7 @@ impl Interface for HostileInterface {
             result: structure(String::schema()),
         };
         let mut odd = function(19, HOSTILE);
-        odd.arguments = vec![Argument { name: HOSTILE.into(), ty: structure(String::schema()) }];
+        odd.arguments = vec![Field::new(HOSTILE, structure(String::schema())).said(HOSTILE, HOSTILE)];
         Description {
             name: HOSTILE.into(),
             class: HOSTILE.into(),
@@ -68,9 +67,7 @@ impl Interface for HostileInterface {
             functions: vec![function(FAILS, "fails"), function(TELLS, "tells"), function(REFUSES, "refuses"), odd],
             data: vec![DataItem {
                 number: 1,
-                name: HOSTILE.into(),
-                text: HOSTILE.into(),
-                ty: structure(String::schema()),
+                field: Field::new(HOSTILE, structure(String::schema())).said(HOSTILE, HOSTILE),
             }],
         }
     }
@@ -95,12 +92,7 @@ impl ParameterSet for Parameters {
 
     fn get(&self, index: usize) -> Option<Parameter> {
         (index == 0).then(|| Parameter {
-            name: HOSTILE.into(),
-            text: HOSTILE.into(),
-            unit: HOSTILE.into(),
-            ty: String::schema(),
-            least: None,
-            most: None,
+            field: Field::new(HOSTILE, String::schema()).said(HOSTILE, HOSTILE),
             value: self.0.clone(),
         })
     }

@@ -336,7 +336,7 @@ fn no_bytes_bring_a_module_down() {
     assert_eq!(parameters.len(), 6);
     for parameter in &parameters {
         // Whatever was set has passed the check.
-        let values = vec![(parameter.name.clone(), parameter.value.clone())];
+        let values = vec![(parameter.field.name.clone(), parameter.value.clone())];
         tool.set_parameters(module, &SetParameters { values, only_check: true }).unwrap();
     }
     assert_eq!(robot.pid("probe.0"), pid, "it was not even started again");

@@ -7,7 +7,7 @@ use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::RouterInterface;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::value::Data;
+use rohrpost::schema::Data;
 use rohrpost_routers::lab::stalls::{Watched, judged};
 use std::path::Path;
 use std::time::Duration;

@@ -1,7 +1,8 @@
 //! Programs of another version: nobody guesses, each names both versions and what to do.
 
-use crate::harness::{OUTPUT, Place, Robot, probe};
+use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe};
 use crate::tools::{at_a_node, commands};
+use rohrpost::common;
 use rohrpost_mailbox::LAYOUT_VERSION;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -74,6 +75,21 @@ fn what_launch_of_another_version_noted_is_not_guessed_at() {
     assert!(told.contains("was written by another version of launch; say --config FILE"), "{told}");
     place.say(&["list", "--config", place.path("test.toml").to_str().unwrap()]).ok();
     std::fs::write(&noted, text).unwrap();
+    launch.stop();
+    place.assert_empty();
+}
+
+#[test]
+fn a_program_of_other_common_functions_is_told_both_versions() {
+    let place = Place::new();
+    let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
+    let mut tool = robot.tool(PATIENCE);
+    for function in [common::STATUS, common::DESCRIBE, common::PARAMETERS] {
+        let told = tool.call(robot.name("probe.0"), function, common::HASH - 1, |_| Ok(()), |_| Ok(())).unwrap_err();
+        let both = format!("common functions of version {0}, this program has {0}", common::HASH);
+        assert!(told.to_string().contains(&both), "{told}");
+    }
+    tool.close();
     launch.stop();
     place.assert_empty();
 }

@@ -3,7 +3,7 @@
 use crate::table::table;
 use crate::vocabulary::{Vocabulary, built_in};
 use rohrpost::common::Exchange;
-use rohrpost::description::Description;
+use rohrpost::schema::Description;
 use rohrpost::{Name, ToolLink};
 use rohrpost_config::{Flow, Installation};
 use rohrpost_mailbox::Kind;

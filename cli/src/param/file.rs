@@ -40,9 +40,9 @@ impl Contents {
     pub(super) fn put(&mut self, module: &str, parameters: &[Parameter]) -> Result<(), Failure> {
         let mut text = String::new();
         for parameter in parameters {
-            let range = parameter.with_unit(&parameter.range());
-            let _ = writeln!(text, "# {} ({})", one_line(&parameter.text), one_line(&range));
-            let _ = writeln!(text, "{} = {}", key(&parameter.name), toml_text(&parameter.value()?));
+            let range = parameter.field.with_unit(&parameter.range());
+            let _ = writeln!(text, "# {} ({})", one_line(&parameter.field.text), one_line(&range));
+            let _ = writeln!(text, "{} = {}", key(&parameter.field.name), toml_text(&parameter.value()?));
         }
         self.modules.insert(module.to_owned(), text);
         Ok(())

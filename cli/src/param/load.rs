@@ -5,7 +5,7 @@ use super::{Session, find};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::Name;
 use rohrpost::parameter::from_file;
-use rohrpost::value::Value;
+use rohrpost::schema::Value;
 use rohrpost_config::Saved;
 use std::path::Path;
 use std::process::ExitCode;
@@ -55,9 +55,9 @@ fn load(session: &mut Session, saved: &Saved, module: Name, dry_run: bool) -> Re
     for saved_value in values {
         let at = format!("{}:{}", saved.path.display(), saved_value.line);
         let parameter = find(&parameters, &name, &saved_value.name).map_err(|error| format!("{at}: {error}"))?;
-        let bytes = from_file(&parameter.ty, &saved_value.value)
+        let bytes = from_file(&parameter.field.ty, &saved_value.value)
             .map_err(|error| format!("{at}: `{}`: {error}", saved_value.name))?;
-        wanted.push((parameter.name.clone(), bytes));
+        wanted.push((parameter.field.name.clone(), bytes));
     }
     let changes = set(session, module, wanted, dry_run)?;
     changes.iter().map(|change| told(change, find(&parameters, &name, &change.name)?)).collect()

@@ -179,12 +179,12 @@ fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) -> Result<&'p
         if parameters.is_empty() {
             return no_parameters(module).into();
         }
-        let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+        let names: Vec<&str> = parameters.iter().map(|parameter| parameter.field.name.as_str()).collect();
         let nearest = rohrpost_config::nearest(name, names.iter().copied());
         let nearest = nearest.map_or(String::new(), |nearest| format!("did you mean `{nearest}`? "));
         plain::line(&format!("{module} has no parameter `{name}`; {nearest}it has: {}", names.join(", "))).into()
     };
-    parameters.iter().find(|parameter| parameter.name == name).ok_or_else(unknown)
+    parameters.iter().find(|parameter| parameter.field.name == name).ok_or_else(unknown)
 }
 
 fn no_parameters(module: &str) -> String {

@@ -6,15 +6,15 @@ use rohrpost::Name;
 use rohrpost::common::{Change, SetParameters};
 use rohrpost::output::plain;
 use rohrpost::parameter::{Parameter, from_word, value_text};
-use rohrpost::value::decode;
+use rohrpost::schema::decode;
 use std::process::ExitCode;
 
 pub(super) fn run(session: &mut Session, name: &str, parameter: &str, value: &str) -> Result<ExitCode, Failure> {
     let module = session.running.module(name)?;
     let parameters = session.parameters(module)?;
     let wanted = find(&parameters, name, parameter)?;
-    let bytes = from_word(&wanted.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;
-    let changes = set(session, module, vec![(wanted.name.clone(), bytes)], false)?;
+    let bytes = from_word(&wanted.field.ty, value).map_err(|error| format!("`{parameter}`: {error}"))?;
+    let changes = set(session, module, vec![(wanted.field.name.clone(), bytes)], false)?;
     for change in &changes {
         say(format_args!("{name} {}", told(change, wanted)?));
     }
@@ -34,8 +34,8 @@ pub(super) fn set(
 
 /// `cruise-m-s: 0.6 -> 0.4 m/s`.
 pub(super) fn told(change: &Change, parameter: &Parameter) -> Result<String, Failure> {
-    let text = |bytes: &[u8]| decode(&parameter.ty, bytes).map(|value| value_text(&value));
-    let (old, new) = (text(&change.old)?, parameter.with_unit(&text(&change.new)?));
+    let text = |bytes: &[u8]| decode(&parameter.field.ty, bytes).map(|value| value_text(&value));
+    let (old, new) = (text(&change.old)?, parameter.field.with_unit(&text(&change.new)?));
     let name = &change.name;
     let told =
         if change.old == change.new { format!("{name}: {new} as before") } else { format!("{name}: {old} -> {new}") };

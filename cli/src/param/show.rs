@@ -4,7 +4,7 @@ use super::super::table::table;
 use super::{Session, find, no_parameters};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::parameter::{Parameter, value_text};
-use rohrpost::value::decode;
+use rohrpost::schema::{Field, decode};
 use std::process::ExitCode;
 
 /// Parameters of one module, or of all.
@@ -66,16 +66,16 @@ pub(super) fn get(session: &mut Session, name: &str, parameter: Option<&str>, js
 }
 
 fn row(parameter: &Parameter) -> Result<[String; 5], Failure> {
-    let Parameter { name, unit, text, .. } = parameter;
+    let Field { name, unit, text, .. } = &parameter.field;
     let value = value_text(&parameter.value()?);
     Ok([name.clone(), value, unit.clone(), parameter.range(), text.clone()])
 }
 
 fn object(module: &str, parameter: &Parameter) -> Result<serde_json::Value, Failure> {
-    let Parameter { name, unit, text, ty, least, most, .. } = parameter;
+    let Field { name, unit, text, ty, least, most } = &parameter.field;
     let bound = |bytes: &Option<Vec<u8>>| bytes.as_ref().map(|bytes| decode(ty, bytes)).transpose();
     Ok(serde_json::json!({
-        "module": module, "parameter": name, "value": parameter.value()?, "unit": unit, "type": rohrpost::value::describe_type(ty),
+        "module": module, "parameter": name, "value": parameter.value()?, "unit": unit, "type": rohrpost::schema::describe_type(ty),
         "min": bound(least)?, "max": bound(most)?, "text": text,
     }))
 }

@@ -7,10 +7,9 @@ use super::super::table::{table, time};
 use super::columns::{memory, short};
 use super::model::{Model, Peer, Row, Sample};
 use rohrpost::Name;
-use rohrpost::description::Description;
 use rohrpost::output::plain;
+use rohrpost::schema::{Description, describe_field, describe_result};
 use rohrpost::survey::sum;
-use rohrpost::value::{describe_result, describe_type};
 use rohrpost_config::{Installation, Program};
 use rohrpost_mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use std::time::Duration;
@@ -170,8 +169,8 @@ fn interface(installation: &Installation, face: Name, description: &Description)
         lines.push(format!("      {}", function.text));
     }
     for item in &description.data {
-        lines.push(format!("  data {}: {}", item.name, describe_type(&item.ty)));
-        lines.push(format!("      {}", item.text));
+        lines.push(format!("  data {}", describe_field(&item.field)));
+        lines.push(format!("      {}", item.field.text));
     }
     lines
 }

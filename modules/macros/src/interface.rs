@@ -1,5 +1,6 @@
 //! From a trait to an interface, a dispatcher, a description and a proxy.
 
+use crate::said::Said;
 use crate::text::text_of;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
@@ -71,6 +72,8 @@ struct Command {
     text: String,
     names: Vec<Ident>,
     types: Vec<Type>,
+    /// Of each argument.
+    said: Vec<Said>,
     result: Type,
 }
 
@@ -79,6 +82,7 @@ struct Data {
     name: Ident,
     text: String,
     ty: Type,
+    said: Said,
 }
 
 pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
@@ -91,10 +95,10 @@ pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<Token
             return Err(Error::new(member.span(), "an interface has functions only: #[command(n)] and #[data(n)]"));
         };
         if let Some(number) = take_attribute(&mut function, "command") {
-            commands.push(command(number?, &function)?);
+            commands.push(command(number?, &mut function)?);
             kept.push(TraitItem::Fn(function));
         } else if let Some(number) = take_attribute(&mut function, "data") {
-            data.push(data_item(number?, &function)?);
+            data.push(data_item(number?, &mut function)?);
         } else {
             return Err(Error::new(function.span(), "write #[command(16)] or #[data(1)] before it"));
         }
@@ -114,7 +118,7 @@ fn take_attribute(function: &mut TraitItemFn, name: &str) -> Option<Result<Numbe
     Some(function.attrs.remove(at).parse_args())
 }
 
-fn command(number: Number, function: &TraitItemFn) -> Result<Command> {
+fn command(number: Number, function: &mut TraitItemFn) -> Result<Command> {
     let value: u16 = number.number.base10_parse()?;
     if !(16..=16383).contains(&value) {
         return Err(Error::new(number.number.span(), "own functions have numbers from 16 to 16383"));
@@ -122,14 +126,14 @@ fn command(number: Number, function: &TraitItemFn) -> Result<Command> {
     if let Some(body) = &function.default {
         return Err(Error::new(body.span(), "functions of an interface have no body here; the module gives it"));
     }
-    let signature = &function.sig;
-    plain(signature)?;
-    let mut arguments = signature.inputs.iter();
+    plain(&function.sig)?;
+    let span = function.sig.span();
+    let mut arguments = function.sig.inputs.iter_mut();
     match arguments.next() {
         Some(FnArg::Receiver(receiver)) if receiver.mutability.is_some() && receiver.reference.is_some() => {}
-        _ => return Err(Error::new(signature.span(), "functions take `&mut self` first")),
+        _ => return Err(Error::new(span, "functions take `&mut self` first")),
     }
-    let (mut names, mut types) = (Vec::new(), Vec::new());
+    let (mut names, mut types, mut said) = (Vec::new(), Vec::new(), Vec::new());
     for argument in arguments {
         let FnArg::Typed(argument) = argument else { continue };
         let Pat::Ident(name) = &*argument.pat else {
@@ -138,16 +142,18 @@ fn command(number: Number, function: &TraitItemFn) -> Result<Command> {
         owned(&argument.ty, "arguments travel to another process; take an owned value")?;
         names.push(name.ident.clone());
         types.push((*argument.ty).clone());
+        said.push(Said::take(&mut argument.attrs, &argument.ty)?);
     }
     if names.len() > ARGUMENTS_MAX {
-        return Err(Error::new(signature.span(), "at most eight arguments; put them into a struct"));
+        return Err(Error::new(span, "at most eight arguments; put them into a struct"));
     }
-    let result = match &signature.output {
+    let result = match &function.sig.output {
         ReturnType::Default => syn::parse_quote!(()),
         ReturnType::Type(_, ty) => (**ty).clone(),
     };
     owned(&result, "results travel to another process; return an owned value")?;
-    Ok(Command { number, name: signature.ident.clone(), text: text_of(&function.attrs), names, types, result })
+    let text = text_of(&function.attrs);
+    Ok(Command { number, name: function.sig.ident.clone(), text, names, types, said, result })
 }
 
 /// Nothing that another process could not see or wait for.
@@ -169,7 +175,7 @@ fn owned(ty: &Type, text: &str) -> Result<()> {
     }
 }
 
-fn data_item(number: Number, function: &TraitItemFn) -> Result<Data> {
+fn data_item(number: Number, function: &mut TraitItemFn) -> Result<Data> {
     let value: u16 = number.number.base10_parse()?;
     if number.idempotent {
         return Err(Error::new(number.number.span(), "data are not run; `idempotent` is for commands"));
@@ -182,7 +188,8 @@ fn data_item(number: Number, function: &TraitItemFn) -> Result<Data> {
     };
     owned(ty, "data travel to other processes; name an owned type")?;
     let text = text_of(&function.attrs);
-    Ok(Data { number: number.number, name: function.sig.ident.clone(), text, ty: (**ty).clone() })
+    let said = Said::take(&mut function.attrs, ty)?;
+    Ok(Data { number: number.number, name: function.sig.ident.clone(), text, ty: (**ty).clone(), said })
 }
 
 fn distinct<'a>(numbers: impl Iterator<Item = &'a LitInt>) -> Result<()> {
@@ -225,22 +232,27 @@ fn interface(
     let (trait_name, trait_text) = (name.to_string(), text_of(&item.attrs));
     let doc =
         format!("The interface [`{name}`]: what a module names as its own. Its constants are the data it publishes.");
+    let schema = &quote!(#krate::schema);
     let functions = commands.iter().map(|command| {
-        let Command { number: Number { number, idempotent }, name, text, names, types, result } = command;
+        let Command { number: Number { number, idempotent }, name, text, names, types, said, result } = command;
         let (name, names) = (name.to_string(), names.iter().map(Ident::to_string));
+        let arguments = names.zip(types).zip(said).map(|((name, ty), said)| said.field(schema, &name, "", ty));
         quote! {
-            #krate::Function {
+            #schema::Function {
                 number: #number, name: #name.into(), text: #text.into(), idempotent: #idempotent,
-                arguments: vec![#(#krate::Argument { name: #names.into(), ty: <#types as #krate::Data>::schema() }),*],
-                result: <#result as #krate::Data>::schema(),
+                arguments: vec![#(#arguments),*],
+                result: <#result as #schema::Schema>::schema(),
             }
         }
     });
-    let items = data.iter().map(|Data { number, name, text, ty }| {
-        let name = name.to_string();
-        quote!(#krate::DataItem { number: #number, name: #name.into(), text: #text.into(), ty: <#ty as #krate::Data>::schema() })
+    let items = data.iter().map(|Data { number, name, text, ty, said }| {
+        let field = said.field(schema, &name.to_string(), text, ty);
+        quote!(#schema::DataItem { number: #number, field: #field })
     });
-    let ports = data.iter().map(|Data { number, name, text, ty }| {
+    let of_arguments = commands.iter().flat_map(|command| command.names.iter().zip(&command.types).zip(&command.said));
+    let proofs = of_arguments.map(|((name, ty), said)| said.proof(&name.to_string(), ty));
+    let proofs = proofs.chain(data.iter().map(|item| item.said.proof(&item.name.to_string(), &item.ty)));
+    let ports = data.iter().map(|Data { number, name, text, ty, .. }| {
         let constant = Ident::new(&name.to_string().to_uppercase(), name.span());
         let name = name.to_string();
         quote! {
@@ -260,6 +272,8 @@ fn interface(
         }
     });
     Ok(quote! {
+        #(#proofs)*
+
         #[doc = #doc]
         #vis struct #interface;
 
@@ -276,8 +290,8 @@ fn interface(
         impl #krate::Interface for #interface {
             const CLASS: &'static str = #class;
 
-            fn description() -> #krate::Description {
-                #krate::Description {
+            fn description() -> #schema::Description {
+                #schema::Description {
                     name: #trait_name.into(), class: #class.into(), text: #trait_text.into(),
                     functions: vec![#(#functions),*],
                     data: vec![#(#items),*],
@@ -316,7 +330,7 @@ fn proxy(item: &ItemTrait, krate: &TokenStream, commands: &[Command], data: &[Da
     let (interface, proxy) = (format_ident!("{name}Interface"), format_ident!("{name}Proxy"));
     let doc = format!("Calls the functions of [`{name}`] in another module.");
     let calls = commands.iter().map(|command| {
-        let Command { number: Number { number, .. }, name, text, names, types, result } = command;
+        let Command { number: Number { number, .. }, name, text, names, types, result, .. } = command;
         let begin = format_ident!("begin_{name}");
         let begin_text = format!("Begins [`Self::{name}`] and returns at once; wait for its result later.");
         let (returns, wait) = match result_of(result) {

@@ -1,9 +1,11 @@
-//! The `interface`, `data`, `parameters` and `choice` attributes. Use them through the crate `rohrpost`.
+//! The `interface`, `data`, `parameters` and `choice` attributes, and the derive `Schema`. Use them through the crate `rohrpost`.
 
 #![forbid(unsafe_code)]
 
 mod interface;
 mod parameters;
+mod said;
+mod schema;
 mod text;
 
 use proc_macro::TokenStream;
@@ -18,13 +20,14 @@ use quote::quote;
 ///   does no harm. Functions take `&mut self` and owned arguments, at most eight.
 /// * `#[data(1)] fn scan() -> LaserScan;` declares data. The trait's implementor does not see it; the module publishes it.
 ///
-/// Doc comments become the texts that tools show.
+/// Doc comments become the texts that tools show. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before an argument, or under
+/// `#[data(1)]`, says what values mean; all its keys are optional.
 #[proc_macro_attribute]
 pub fn interface(attributes: TokenStream, item: TokenStream) -> TokenStream {
     interface::expand(attributes.into(), item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
 }
 
-/// Makes a struct or enum fit to travel in packages: derives `Serialize`, `Deserialize` and `Schema`.
+/// Makes a struct or enum fit to travel in packages: derives `Serialize`, `Deserialize` and [`macro@Schema`].
 #[proc_macro_attribute]
 pub fn data(_attributes: TokenStream, item: TokenStream) -> TokenStream {
     let item = proc_macro2::TokenStream::from(item);
@@ -32,13 +35,24 @@ pub fn data(_attributes: TokenStream, item: TokenStream) -> TokenStream {
         #[derive(
             ::rohrpost::macro_support::serde::Serialize,
             ::rohrpost::macro_support::serde::Deserialize,
-            ::rohrpost::macro_support::postcard_schema::Schema,
+            ::rohrpost::macro_support::schema::Schema,
         )]
         #[serde(crate = "::rohrpost::macro_support::serde")]
-        #[postcard(crate = ::rohrpost::macro_support::postcard_schema)]
+        #[schema(crate = ::rohrpost::macro_support::schema)]
         #item
     }
     .into()
+}
+
+/// Describes a struct or enum, so that tools and other languages can read it.
+///
+/// * Doc comments become texts. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before a field says what its values mean; all
+///   its keys are optional. The compiler checks bounds against the type and each other; values are not checked.
+/// * `#[schema(name = "rohrpost.Pose")]` before the item gives it a name that stays when the code is moved or renamed;
+///   without it the name is Rust's, or that of serde's `rename`. Names and units count in an interface's hash, texts and bounds do not.
+#[proc_macro_derive(Schema, attributes(schema))]
+pub fn schema(item: TokenStream) -> TokenStream {
+    schema::expand(item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
 }
 
 /// Makes a struct a module's settings, of which some may change while it runs: its parameters.

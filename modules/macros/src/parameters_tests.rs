@@ -80,9 +80,9 @@ fn what_is_right_is_taken_and_proved() {
         "deserialize_with=\"S::__read_cruise_m_s\"",
         "default=\"S::__default_cruise_m_s\"",
         "unit:\"m/s\"",
-        "\"parameter`cruise-m-s`:`min`isabove`max`\"",
-        "\"parameter`cruise-m-s`:`default`isbelow`min`\"",
-        "\"parameter`cruise-m-s`:`default`isabove`max`\"",
+        "\"`cruise-m-s`:`min`isabove`max`\"",
+        "\"`cruise-m-s`:`default`isbelow`min`\"",
+        "\"`cruise-m-s`:`default`isabove`max`\"",
         "\"`min`of`cruise-m-s`isnonumber\"",
     ] {
         assert!(tokens.contains(words), "no `{words}` in {tokens}");

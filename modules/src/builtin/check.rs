@@ -36,7 +36,7 @@ fn data_of(installation: &Installation, show: &Show) -> Option<Problem> {
     if description.data_item(data).is_some() {
         return None;
     }
-    let names: Vec<&str> = description.data.iter().map(|item| item.name.as_str()).collect();
+    let names: Vec<&str> = description.data.iter().map(|item| item.field.name.as_str()).collect();
     let right = match (nearest(data, names.iter().copied()), &names[..]) {
         (Some(name), _) => format!("did you mean `{name}`?"),
         (None, []) => "it publishes none; drop the entry".into(),

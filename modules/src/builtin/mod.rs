@@ -10,12 +10,12 @@ mod sim;
 
 pub use check::{check, check_saved};
 
-use crate::description::Description;
 use crate::interface::{Interface, Interfaces};
 use crate::interfaces::{RouterInterface, TcpInterface};
 use crate::module::Module;
 use crate::runtime::{Start, StartError, run_started};
 use rohrpost_config::{Installation, Module as Configured, Problem, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER};
+use rohrpost_schema::Description;
 
 /// What can be done with a built-in module.
 struct Builtin {

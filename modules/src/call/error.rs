@@ -2,9 +2,10 @@
 
 use super::{CallEnvelope, ReplyEnvelope};
 use crate::call::append;
+use crate::common::HASH;
 use crate::output::plain::line;
-use postcard_schema::Schema;
 use rohrpost_mailbox::{Name, SendError};
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 use std::time::Duration;
@@ -22,10 +23,7 @@ pub enum Fault {
     #[error("interrupted, outcome unknown: the server was restarted while it had this command")]
     Interrupted,
     /// The caller was compiled with another interface; the server's hash.
-    #[error(
-        "interface differs: the module has {server:#010x}; build caller and module from the same version of the interface \
-         and of Rohrpost (`rohrpost version`)"
-    )]
+    #[error("{}", differs(*server))]
     InterfaceDiffers {
         /// Hash of the server's interface.
         server: u32,
@@ -163,6 +161,20 @@ impl Fault {
             | Self::TooLarge(_) => false,
         }
     }
+}
+
+/// A version of the common functions is a small number; a hash of an interface is one once in 65 536 times.
+fn differs(server: u32) -> String {
+    if server <= u16::MAX.into() {
+        return format!(
+            "the module has common functions of version {server}, this program has {HASH}: run programs of the same version of \
+             Rohrpost (`rohrpost version`)"
+        );
+    }
+    format!(
+        "interface differs: the module has {server:#010x}; build caller and module from the same version of the interface \
+         and of Rohrpost (`rohrpost version`)"
+    )
 }
 
 /// Why a call has no result. `E` is the function's own error.

@@ -1,7 +1,7 @@
 //! The router, seen by tools: its links to other nodes, and the common time.
 
 use crate::interface;
-use postcard_schema::Schema;
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Whether packages reach another node.

@@ -2,7 +2,7 @@
 
 use super::router::CarriedLoss;
 use crate::interface;
-use postcard_schema::Schema;
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Whether packages go to the TCP router and come from it.

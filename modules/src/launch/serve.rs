@@ -4,7 +4,6 @@ use super::child::{Child, Then};
 use super::look::{Looks, see};
 use crate::call::{Fault, Link};
 use crate::common;
-use crate::description::Description;
 use crate::interface::{Interface, Serve};
 use crate::launcher::{Children, ControlError, Launcher, LauncherInterface};
 use crate::launcher::{Look, LookError, LookPage};
@@ -12,6 +11,7 @@ use crate::runtime::refusals::{Cause, Refusals};
 use crate::runtime::server::{Call, Desk, Servant, admit};
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{CreateError, Head, Label, Name, Node, Receiver, SendError, Shape};
+use rohrpost_schema::Description;
 use std::time::Instant;
 
 /// Commands taken in one go: a flood of them must not keep launch from its modules.
@@ -33,7 +33,7 @@ impl Counter {
         let commands = link.participant().clone().receiver(link.me(), Shape::default())?;
         let description = LauncherInterface::description();
         // Writing to a growing vector does not fail.
-        let bytes = postcard::to_stdvec(&description).unwrap_or_default();
+        let bytes = description.to_bytes();
         Ok(Self {
             desk: Desk::new(commands, &installation.callers(link.me())),
             description,

@@ -32,8 +32,8 @@ pub use way::{drain, flush, install, level, lost, retry_at, set_level, suppresse
 pub(crate) use {allowance::Bucket, layer::cut, way::LANES, way::WAITING_LINES};
 
 use crate::common::OutputLevel;
-use postcard_schema::Schema;
 use rohrpost_mailbox::Name;
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Mailbox of the collector that takes lines; a local id of its own.

@@ -1,7 +1,7 @@
 //! What `#[parameters]` makes of one field.
 
 use super::{Parameter, ParameterType, Refusal, from_file, value_text};
-use crate::value::Value;
+use rohrpost_schema::{Field, Value};
 use serde::{Deserialize, Deserializer, de};
 
 /// A parameter as its struct declares it.
@@ -27,12 +27,9 @@ impl<T: ParameterType> Declared<T> {
 
     fn described(&self, value: Vec<u8>) -> Parameter {
         Parameter {
-            name: self.name.into(),
-            text: self.text.into(),
-            unit: self.unit.into(),
-            ty: T::schema(),
-            least: self.least.as_ref().map(bytes_of),
-            most: self.most.as_ref().map(bytes_of),
+            field: Field::new(self.name, T::schema())
+                .said(self.text, self.unit)
+                .bounded(self.least.as_ref().map(bytes_of), self.most.as_ref().map(bytes_of)),
             value,
         }
     }
@@ -78,8 +75,8 @@ impl<T: ParameterType> Declared<T> {
         let value = parameter.value().map_or_else(|error| error.to_string(), |value| value_text(&value));
         Refusal::Range {
             name: self.name.into(),
-            value: parameter.with_unit(&value),
-            range: parameter.with_unit(&parameter.range()),
+            value: parameter.field.with_unit(&value),
+            range: parameter.field.with_unit(&parameter.range()),
         }
     }
 }

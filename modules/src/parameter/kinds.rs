@@ -1,6 +1,6 @@
 //! The types that a parameter can have.
 
-use crate::value::Data;
+use rohrpost_schema::Data;
 
 /// A type that a parameter can have: `bool`, integers of at most 64 bits, `f32`, `f64`, `String`, and enums with
 /// [`crate::choice`].

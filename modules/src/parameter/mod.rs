@@ -51,9 +51,7 @@ pub use kinds::ParameterType;
 pub use words::{from_file, from_word, toml_text, value_text};
 
 use crate::output::plain::line;
-use crate::value::{Value, WalkError, decode};
-use postcard_schema::Schema;
-use postcard_schema::schema::owned::OwnedNamedType;
+use rohrpost_schema::{Field, Schema, Value, WalkError, decode};
 use serde::{Deserialize, Serialize};
 
 /// The parameters of a module and their present values. Written by [`crate::parameters`] for the settings struct.
@@ -77,18 +75,8 @@ pub trait ParameterSet {
 /// A parameter as its module describes it, with its present value.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Its name, as the configuration has it.
-    pub name: String,
-    /// What it is for.
-    pub text: String,
-    /// Unit of its value; empty: none.
-    pub unit: String,
-    /// Its type.
-    pub ty: OwnedNamedType,
-    /// Least value, postcard.
-    pub least: Option<Vec<u8>>,
-    /// Greatest value, postcard.
-    pub most: Option<Vec<u8>>,
+    /// Its name, as the configuration has it, what it is for, unit, type and range.
+    pub field: Field,
     /// Present value, postcard.
     pub value: Vec<u8>,
 }
@@ -99,26 +87,12 @@ impl Parameter {
     /// # Errors
     /// When it is not of the type: then its module is not to be believed.
     pub fn value(&self) -> Result<Value, WalkError> {
-        decode(&self.ty, &self.value)
+        decode(&self.field.ty, &self.value)
     }
 
     /// What values it takes, in words, without the unit: `0..=1.5`, `at least 1`, `left|right`, `f64`.
     pub fn range(&self) -> String {
-        let bound = |bytes: &Option<Vec<u8>>| {
-            let value = bytes.as_ref().and_then(|bytes| decode(&self.ty, bytes).ok());
-            value.map(|value| value_text(&value))
-        };
-        match (bound(&self.least), bound(&self.most)) {
-            (Some(least), Some(most)) => format!("{least}..={most}"),
-            (Some(least), None) => format!("at least {least}"),
-            (None, Some(most)) => format!("at most {most}"),
-            (None, None) => words::type_text(&self.ty),
-        }
-    }
-
-    /// A text with this parameter's unit behind it.
-    pub fn with_unit(&self, text: &str) -> String {
-        if self.unit.is_empty() { text.into() } else { format!("{text} {}", self.unit) }
+        self.field.range().unwrap_or_else(|| words::type_text(&self.field.ty))
     }
 }
 

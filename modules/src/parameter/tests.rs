@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use super::{Parameter, ParameterSet, Refusal, from_file, toml_text, value_text};
-use crate::value::{Value, decode, encode, parse_argument};
 use proptest::prelude::*;
+use rohrpost_schema::{Value, decode, encode, parse_argument};
 
 #[crate::choice(crate = crate::macro_support)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +68,7 @@ fn a_struct_tells_of_its_parameters_and_of_nothing_else() {
     let ranges: Vec<String> = (0..INDEX.len()).map(|index| settings.get(index).unwrap().range()).collect();
     assert_eq!(ranges, ["0..=1.5", "at most 10", "at least -3", "u64", "0.1..=0.9", "left|turn-right", "bool", "text"]);
     let cruise = settings.get(0).unwrap();
-    assert_eq!((cruise.text.as_str(), cruise.unit.as_str()), ("Speed where there is room.", "m/s"));
+    assert_eq!((cruise.field.text.as_str(), cruise.field.unit.as_str()), ("Speed where there is room.", "m/s"));
     assert_eq!(cruise.value().unwrap(), Value::F(0.5));
     let values: Vec<String> =
         (0..INDEX.len()).map(|index| value_text(&settings.get(index).unwrap().value().unwrap())).collect();
@@ -109,7 +109,7 @@ fn what_is_set_is_stored_and_negative_zero_is_zero() {
     let mut settings = settings();
     for (name, text) in [("cruise-m-s", "-0.0"), ("side", "turn_right"), ("greeting", "a\nb"), ("look", "false")] {
         let (index, parameter) = parameter(name);
-        let bytes = encode(&parameter.ty, &parse_argument(&parameter.ty, text).unwrap()).unwrap();
+        let bytes = encode(&parameter.field.ty, &parse_argument(&parameter.field.ty, text).unwrap()).unwrap();
         let accepted = settings.accept(index, &bytes).unwrap();
         settings.put(index, &accepted);
         assert_eq!(settings.get(index).unwrap().value, accepted, "{name}");
@@ -149,7 +149,7 @@ proptest! {
     #[test]
     fn whole_numbers_are_judged_by_their_value(n: i16) {
         let (index, parameter) = parameter("offset");
-        let bytes = encode(&parameter.ty, &Value::I(n.into())).unwrap();
+        let bytes = encode(&parameter.field.ty, &Value::I(n.into())).unwrap();
         prop_assert_eq!(settings().accept(index, &bytes).is_ok(), n >= -3);
     }
 
@@ -179,7 +179,7 @@ proptest! {
         let mut text = String::from("motor = \"motor.0\"\n");
         for index in 0..INDEX.len() {
             let parameter = before.get(index).unwrap();
-            text += &format!("{} = {}\n", parameter.name, toml_text(&parameter.value().unwrap()));
+            text += &format!("{} = {}\n", parameter.field.name, toml_text(&parameter.value().unwrap()));
         }
         let after: Settings = toml::from_str(&text).map_err(|error| TestCaseError::fail(format!("{error}\n{text}")))?;
         prop_assert_eq!(after, before);
@@ -189,9 +189,9 @@ proptest! {
     fn no_description_of_a_liar_brings_a_tool_down(bytes: Vec<u8>, least: Option<Vec<u8>>, most: Option<Vec<u8>>) {
         for index in 0..INDEX.len() {
             let honest = settings().get(index).unwrap();
-            let liar = Parameter { value: bytes.clone(), least: least.clone(), most: most.clone(), ..honest };
+            let liar = Parameter { field: honest.field.bounded(least.clone(), most.clone()), value: bytes.clone() };
             let _ = (liar.value().map(|value| value_text(&value)), liar.range());
-            let _ = decode(&liar.ty, &bytes).map(|value| from_file(&liar.ty, &value));
+            let _ = decode(&liar.field.ty, &bytes).map(|value| from_file(&liar.field.ty, &value));
         }
         let _ = postcard::from_bytes::<crate::common::ParameterPage>(&bytes);
         let _ = postcard::from_bytes::<crate::common::SetParameters>(&bytes);

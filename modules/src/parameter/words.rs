@@ -1,12 +1,11 @@
 //! Values of parameters as people and files write them.
 
-use crate::value::{Value, WalkError, describe_type, encode, parse_argument};
-use postcard_schema::schema::owned::{OwnedDataModelType as Ty, OwnedNamedType};
+use rohrpost_schema::{Type, Value, WalkError, describe_type, encode, parse_argument};
 
 /// A value for people: a choice as a word in kebab-case, all else as ever.
 ///
 /// ```
-/// use rohrpost_modules::{parameter::value_text, value::Value};
+/// use rohrpost_modules::{parameter::value_text, schema::Value};
 /// assert_eq!(value_text(&Value::unit_variant("TurnLeft")), "turn-left");
 /// assert_eq!(value_text(&Value::F(0.5)), "0.5");
 /// ```
@@ -21,8 +20,8 @@ pub fn value_text(value: &Value) -> String {
 ///
 /// # Errors
 /// What is wrong with it. On a command line all is text; in a file a number stands without quotes.
-pub fn from_file(ty: &OwnedNamedType, value: &Value) -> Result<Vec<u8>, String> {
-    if let (Value::Text(text), false) = (value, matches!(ty.ty, Ty::String | Ty::Enum(_))) {
+pub fn from_file(ty: &Type, value: &Value) -> Result<Vec<u8>, String> {
+    if let (Value::Text(text), false) = (value, matches!(ty, Type::Text | Type::Enum { .. })) {
         return Err(format!("{text:?} is text; write a value of type {}, without quotes", type_text(ty)));
     }
     encode(ty, value).map_err(|error| told(ty, &error))
@@ -32,27 +31,29 @@ pub fn from_file(ty: &OwnedNamedType, value: &Value) -> Result<Vec<u8>, String> 
 ///
 /// # Errors
 /// What was expected.
-pub fn from_word(ty: &OwnedNamedType, word: &str) -> Result<Vec<u8>, String> {
+pub fn from_word(ty: &Type, word: &str) -> Result<Vec<u8>, String> {
     let value = parse_argument(ty, word).map_err(|error| told(ty, &error))?;
     encode(ty, &value).map_err(|error| told(ty, &error))
 }
 
 /// A type as people read it; of a choice, its words.
-pub(super) fn type_text(ty: &OwnedNamedType) -> String {
-    match &ty.ty {
-        Ty::Enum(variants) => variants.iter().map(|variant| kebab(&variant.name)).collect::<Vec<_>>().join("|"),
+pub(super) fn type_text(ty: &Type) -> String {
+    match ty {
+        Type::Enum { variants, .. } => {
+            variants.iter().map(|variant| kebab(&variant.name)).collect::<Vec<_>>().join("|")
+        }
         _ => describe_type(ty),
     }
 }
 
-fn told(ty: &OwnedNamedType, error: &WalkError) -> String {
+fn told(ty: &Type, error: &WalkError) -> String {
     error.to_string().replace(&describe_type(ty), &type_text(ty))
 }
 
 /// A value as TOML writes it, so that it reads back as the same.
 ///
 /// ```
-/// use rohrpost_modules::{parameter::toml_text, value::Value};
+/// use rohrpost_modules::{parameter::toml_text, schema::Value};
 /// assert_eq!(toml_text(&Value::unit_variant("TurnLeft")), "\"turn-left\"");
 /// assert_eq!(toml_text(&Value::F(1.0)), "1.0");
 /// ```

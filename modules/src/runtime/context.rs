@@ -8,12 +8,12 @@ use crate::call::{Caller, Link};
 use crate::common::DataHead;
 use crate::interface::{DataPort, Proxy};
 use crate::publish::{Delivery, Newest, Subscriptions};
-use crate::value::Data;
 use rohrpost_config::{ClassTable, Installation, NameTextError, Principal};
 use rohrpost_mailbox::{
     CreateError, Full, Head, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock,
     SystemTime, Type, Watch, Watches, local,
 };
+use rohrpost_schema::Data;
 use std::cell::RefCell;
 use std::io;
 use std::os::fd::AsFd;

@@ -2,10 +2,10 @@
 
 use super::server::Desk;
 use crate::call::Fault;
-use crate::description::Description;
 use crate::interface::{ServeFunction, Served};
 use rohrpost_config::Principal;
 use rohrpost_mailbox::{Name, Receiver};
+use rohrpost_schema::Description;
 
 /// One face. A module without further faces has this one.
 pub(crate) struct Face<M> {
@@ -47,7 +47,7 @@ impl<M> Face<M> {
         let functions = description.functions.iter().map(|f| (f.number, f.name.clone())).collect();
         let data = description.data.iter().map(|item| item.number).collect();
         // Writing to a growing vector does not fail.
-        let description = postcard::to_stdvec(&description).unwrap_or_default();
+        let description = description.to_bytes();
         // For tools that must not ask: a question would be one more package.
         if let Err(error) = commands.set_about(&description) {
             // On a full /dev/shm, say: a module that could take its mailboxes over goes on all the same.

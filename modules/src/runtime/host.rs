@@ -6,13 +6,12 @@ use crate::common::{
     self, Change, DescriptionPart, Exchange, ExchangePage, OutputLevel, ParameterPage, SetParameters, Status,
     TimeReport,
 };
-use crate::description::Description;
 use crate::parameter::{Parameter, Refusal};
-use crate::value::read_described;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
 };
+use rohrpost_schema::Description;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -241,8 +240,8 @@ impl ToolLink {
         loop {
             let from = found.len() as u16;
             let write = |body: &mut Vec<u8>| append(body, &(from,));
-            let read = |bytes: &[u8]| read_described(bytes).map_err(|_| postcard::Error::SerdeDeCustom);
-            let page: ParameterPage = self.call(module, common::PARAMETERS, common::HASH, write, read)?;
+            let page: ParameterPage =
+                self.call(module, common::PARAMETERS, common::HASH, write, |bytes| postcard::from_bytes(bytes))?;
             // What it says of itself is a claim.
             if page.total > PARAMETERS_MAX {
                 let text = format!("its {} parameters are more than {PARAMETERS_MAX}", page.total);
@@ -302,5 +301,5 @@ pub fn describe(link: &mut Link, module: Name, timeout: Duration) -> Result<Desc
             break;
         }
     }
-    read_described(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
+    Description::from_bytes(&bytes).map_err(|error| CallError::BadReply(module, error.to_string()))
 }

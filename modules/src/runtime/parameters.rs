@@ -43,7 +43,7 @@ pub(crate) fn set<M: Module>(
     if !wish.only_check {
         apply(module, context, &wanted, by)?;
     }
-    Ok(wanted.into_iter().map(|Wanted { old, new, .. }| Change { name: old.name, old: old.value, new }).collect())
+    Ok(wanted.into_iter().map(|Wanted { old, new, .. }| Change { name: old.field.name, old: old.value, new }).collect())
 }
 
 fn check(set: &dyn ParameterSet, values: &[(String, Vec<u8>)]) -> Result<Vec<Wanted>, Refusal> {
@@ -66,7 +66,7 @@ fn apply<M: Module>(module: &mut M, context: &mut Context, wanted: &[Wanted], by
         return Ok(());
     }
     put(module, &changed, |wanted| &wanted.new);
-    let names: Vec<&str> = changed.iter().map(|wanted| wanted.old.name.as_str()).collect();
+    let names: Vec<&str> = changed.iter().map(|wanted| wanted.old.field.name.as_str()).collect();
     if let Err(error) = module.parameters_changed(context, &names) {
         put(module, &changed, |wanted| &wanted.old.value);
         return Err(Refusal::Module(error.to_string()));
@@ -74,7 +74,7 @@ fn apply<M: Module>(module: &mut M, context: &mut Context, wanted: &[Wanted], by
     for Wanted { old, new, .. } in changed {
         let text = |bytes: &Vec<u8>| Parameter { value: bytes.clone(), ..old.clone() }.value().map(|v| value_text(&v));
         if let (Ok(before), Ok(after)) = (text(&old.value), text(new)) {
-            tracing::info!("{}: {before} -> {} (by {by})", old.name, old.with_unit(&after));
+            tracing::info!("{}: {before} -> {} (by {by})", old.field.name, old.field.with_unit(&after));
         }
     }
     Ok(())

@@ -2,8 +2,8 @@
 
 use super::follow::Subscription;
 use crate::common::DataHead;
-use crate::value::Data;
 use rohrpost_mailbox::Name;
+use rohrpost_schema::Data;
 
 /// Data that came are not of the type that their publisher's interface says.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -11,12 +11,10 @@ mod traffic;
 use super::{MailboxLook, ModuleSurvey, Survey, Usage, Working};
 use crate::launcher::ChildState;
 use detail::{DetailForm, detail, detail_form};
-use postcard_schema::Schema;
-use postcard_schema::schema::owned::OwnedNamedType;
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{Full, Loss, MailboxInfo, ModuleState, Name, ParticipantInfo, Shape};
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
-use std::hash::Hasher;
 use std::time::Duration;
 use traffic::{ClassForm, FlowForm, LatencyForm, class, class_form, flow, flow_form, latency, latency_form, ns};
 
@@ -53,10 +51,7 @@ impl Seen {
 
     /// Tells the forms of different versions of this program apart: computed from the types below.
     pub(crate) fn format() -> u32 {
-        let mut hasher = siphasher::sip::SipHasher13::new();
-        let schema = OwnedNamedType::from(SeenForm::SCHEMA);
-        hasher.write(&postcard::to_stdvec(&schema).unwrap_or_default());
-        hasher.finish() as u32
+        SeenForm::schema().hash()
     }
 }
 

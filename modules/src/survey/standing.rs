@@ -5,7 +5,7 @@
 
 use super::ModuleSurvey;
 use crate::common::State;
-use crate::description::Description;
+use crate::description::noted;
 use crate::launcher::Phase;
 use crate::output::plain;
 use rohrpost_config::Installation;
@@ -129,7 +129,7 @@ impl Working {
     ) -> Self {
         let mut named = |number: u16| {
             names.find_map(|name| {
-                let functions = Description::noted(node, name)?.functions;
+                let functions = noted(node, name)?.functions;
                 functions.into_iter().find(|function| function.number == number)
             })
         };

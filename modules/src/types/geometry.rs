@@ -1,17 +1,21 @@
 //! Where a robot is and how it moves, in the plane.
 
 use nalgebra::{Isometry2, Vector2};
-use postcard_schema::Schema;
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// A place and a heading in the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[schema(name = "rohrpost.Pose")]
 pub struct Pose {
     /// Metres along x.
+    #[schema(unit = "m")]
     pub x_m: f64,
     /// Metres along y.
+    #[schema(unit = "m")]
     pub y_m: f64,
     /// Radians, counter-clockwise from x; any multiple of a turn may be added.
+    #[schema(unit = "rad")]
     pub heading_rad: f64,
 }
 
@@ -30,15 +34,19 @@ impl From<Isometry2<f64>> for Pose {
 
 /// How fast a body moves in its own frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[schema(name = "rohrpost.Twist")]
 pub struct Twist {
     /// Metres a second, forward.
+    #[schema(unit = "m/s")]
     pub speed_m_s: f64,
     /// Radians a second, counter-clockwise.
+    #[schema(unit = "rad/s")]
     pub turn_rate_rad_s: f64,
 }
 
 /// What a base says of its own motion: counted from where it started, and drifting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[schema(name = "rohrpost.Odometry")]
 pub struct Odometry {
     /// Where the base believes to be, in the frame in which it started.
     pub pose: Pose,

@@ -1,11 +1,12 @@
 //! Maps of free and occupied squares.
 
 use super::Pose;
-use postcard_schema::Schema;
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// What is known of one square: an occupancy in percent, or nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[schema(name = "rohrpost.Cell")]
 pub struct Cell(pub u8);
 
 impl Cell {
@@ -20,10 +21,12 @@ impl Cell {
 
 /// A rectangle of a map. A map larger than a package travels as several of them: each is placed by its own `origin`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[schema(name = "rohrpost.OccupancyGrid")]
 pub struct OccupancyGrid {
     /// Where the outer corner of cell (0, 0) lies; columns run along its x, rows along its y.
     pub origin: Pose,
     /// Side of a cell, metres.
+    #[schema(unit = "m")]
     pub resolution_m: f32,
     /// Cells in a row.
     pub columns: u32,

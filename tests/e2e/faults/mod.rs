@@ -21,7 +21,7 @@ use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{LinkState, Links, PeerLink, RouterInterface};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::value::Data;
+use rohrpost::schema::Data;
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_config::Installation;
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};

@@ -16,12 +16,12 @@ COUNT, DOUBLE, BEAT = 16, 16, 1
 INTERFACE_DIFFERS, UNKNOWN_FUNCTION = 3, 4
 PRIORITY = 96
 
-# `OwnedNamedType` of a u32: its name, and its place among the kinds of types.
-U32 = text("u32") + varint(8)
+# Descriptions: their version, and the tag of a u32. A field's marks are 0 when nothing more is said of it.
+VERSION, U32, NO_MARKS = b"\x01", b"\x04", b"\x00"
 DESCRIPTION = (
-    text("Doubling") + text("probe") + text("Doubles numbers")
+    VERSION + text("Doubling") + text("probe") + text("Doubles numbers")
     + varint(1) + varint(DOUBLE) + text("double") + text("Twice the number") + b"\x01"
-    + varint(1) + text("number") + U32 + U32
+    + varint(1) + text("number") + NO_MARKS + U32 + U32
     + varint(0)
 )
 

@@ -8,8 +8,8 @@ use rohrpost_modules::common::{Change, DataHead, DescriptionPart, SetParameters,
 use rohrpost_modules::interfaces::Page;
 use rohrpost_modules::launcher::Children;
 use rohrpost_modules::runtime::read_arguments;
+use rohrpost_modules::schema::Data;
 use rohrpost_modules::types::{LaserScan, OccupancyGrid, Odometry, Twist};
-use rohrpost_modules::value::Data;
 
 pub(crate) fn run(data: &[u8]) {
     envelopes(data);

@@ -1,12 +1,11 @@
 //! Descriptions that modules give of themselves, and data read by them without a type: what a tool does with both.
 
 use crate::split::Bytes;
-use postcard_schema::schema::owned::OwnedNamedType;
 use rohrpost_modules::common::ParameterPage;
-use rohrpost_modules::description::Description;
 use rohrpost_modules::parameter::{from_file, from_word, toml_text, value_text};
-use rohrpost_modules::value::{
-    self, LIST_SHOWN, Value, decode, describe_result, describe_type, encode, is_word, numbers, parse_argument,
+use rohrpost_modules::schema::{
+    Description, LIST_SHOWN, Type, Value, decode, describe_result, describe_type, encode, is_word, numbers,
+    parse_argument,
 };
 
 /// The first byte says what: a description, a page of parameters, or a type and a value of it.
@@ -20,9 +19,11 @@ pub(crate) fn run(data: &[u8]) {
 }
 
 fn described(bytes: &[u8]) {
-    let Ok(description) = value::read_described::<Description>(bytes) else { return };
-    let again = postcard::to_stdvec(&description).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(value::read_described::<Description>(&again).as_ref(), Ok(&description));
+    let description = match Description::from_bytes(bytes) {
+        Ok(description) => description,
+        Err(error) => return assert!(!error.to_string().is_empty()),
+    };
+    assert_eq!(Description::from_bytes(&description.to_bytes()).as_ref(), Ok(&description));
     assert_eq!(description.hash(), description.clone().hash());
     for function in &description.functions {
         function.arguments.iter().for_each(|argument| of(&argument.ty, bytes));
@@ -31,33 +32,33 @@ fn described(bytes: &[u8]) {
         assert!(description.function(&function.name).is_some());
     }
     for item in &description.data {
-        of(&item.ty, bytes);
-        assert!(description.data_item(&item.name).is_some());
+        of(&item.field.ty, bytes);
+        assert!(description.data_item(&item.field.name).is_some());
     }
 }
 
 fn parameters(bytes: &[u8]) {
-    let Ok(page) = value::read_described::<ParameterPage>(bytes) else { return };
+    let Ok(page) = postcard::from_bytes::<ParameterPage>(bytes) else { return };
     for parameter in &page.parameters {
-        let range = parameter.with_unit(&parameter.range());
-        assert!(range.len() >= parameter.unit.len());
+        let range = parameter.field.with_unit(&parameter.range());
+        assert!(range.len() >= parameter.field.unit.len());
         if let Ok(value) = parameter.value() {
             let _ = (value_text(&value), toml_text(&value));
-            let _ = from_file(&parameter.ty, &value);
+            let _ = from_file(&parameter.field.ty, &value);
         }
-        let _ = from_word(&parameter.ty, &parameter.text);
+        let _ = from_word(&parameter.field.ty, &parameter.field.text);
     }
 }
 
 fn typed(bytes: &[u8]) {
     let mut bytes = Bytes(bytes);
     let length = bytes.half().into();
-    let Ok(ty) = value::read_described::<OwnedNamedType>(bytes.take(length)) else { return };
+    let Ok(ty) = Type::from_bytes(bytes.take(length)) else { return };
     of(&ty, bytes.0);
 }
 
 /// All that is done with a type and bytes that may be one of its values.
-fn of(ty: &OwnedNamedType, bytes: &[u8]) {
+fn of(ty: &Type, bytes: &[u8]) {
     assert!(!describe_type(ty).is_empty());
     let _ = is_word(ty);
     let text = String::from_utf8_lossy(bytes);
@@ -85,7 +86,7 @@ fn shown(value: &Value) {
 }
 
 /// What goes to JSON and comes back means the same.
-fn as_json(ty: &OwnedNamedType, value: &Value) {
+fn as_json(ty: &Type, value: &Value) {
     let json = serde_json::to_string(value).unwrap_or_else(|error| panic!("{value:?}: {error}"));
     // The reader of JSON has a bound of its own on nesting.
     let Ok(read) = serde_json::from_str::<Value>(&json) else { return };

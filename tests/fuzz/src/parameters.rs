@@ -3,12 +3,11 @@
 
 use crate::config::judge;
 use crate::split;
-use postcard_schema::schema::owned::OwnedNamedType;
 use rohrpost_config::{Installation, Saved};
 use rohrpost_modules::builtin::check_saved;
 use rohrpost_modules::parameter::{from_file, from_word, toml_text, value_text};
+use rohrpost_modules::schema::{Schema, Type, Value, decode};
 use rohrpost_modules::types::Twist;
-use rohrpost_modules::value::{Data, Value, decode};
 use std::sync::LazyLock;
 
 const CONFIG: &str = include_str!("../../../config/demo.toml");
@@ -46,7 +45,7 @@ pub(crate) fn run(data: &[u8]) {
     }
 }
 
-fn types() -> [OwnedNamedType; 7] {
+fn types() -> [Type; 7] {
     [
         bool::schema(),
         u8::schema(),
@@ -62,16 +61,16 @@ fn types() -> [OwnedNamedType; 7] {
 fn taken(value: &Value) {
     for ty in types() {
         let Ok(bytes) = from_file(&ty, value) else { continue };
-        let read = decode(&ty, &bytes).unwrap_or_else(|error| panic!("{}: {error}", ty.name));
+        let read = decode(&ty, &bytes).unwrap_or_else(|error| panic!("{ty:?}: {error}"));
         let _ = value_text(&read);
         let Ok(table) = toml::from_str::<toml::Table>(&format!("x = {}", toml_text(&read))) else {
-            assert_eq!(ty.name, "Twist", "`x = {}` is no TOML", toml_text(&read));
+            assert!(ty.is::<Twist>(), "`x = {}` is no TOML", toml_text(&read));
             continue;
         };
         let again = table["x"].clone().try_into::<Value>().unwrap_or_else(|error| panic!("{error}"));
         let again = from_file(&ty, &again).map(|bytes| decode(&ty, &bytes));
         // By text, since a NaN is not itself.
-        assert_eq!(format!("{again:?}"), format!("{:?}", Ok::<_, String>(Ok::<_, ()>(&read))), "{}", ty.name);
+        assert_eq!(format!("{again:?}"), format!("{:?}", Ok::<_, String>(Ok::<_, ()>(&read))), "{ty:?}");
     }
 }
 

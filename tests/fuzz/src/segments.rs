@@ -10,7 +10,7 @@ use rohrpost_mailbox::{
     Full, Label, ModuleState, Name, Node, Participant, Priority, Publications, Receiver, Sender, Shape, SystemClock,
     TimeKeeper, TimeSource, Type, Waiting, monotonic_ns, wait_any,
 };
-use rohrpost_modules::description::Description;
+use rohrpost_modules::description::noted;
 use rohrpost_modules::survey::Survey;
 use std::fs::OpenOptions;
 use std::os::unix::fs::FileExt;
@@ -196,7 +196,7 @@ impl Robot {
             let _ = receiver.set_about(b"\x00\x00\x00\x00\x00");
         }
         if let Some(about) = node.about(MAILBOX) {
-            let _ = (Description::noted(node, MAILBOX), about.len());
+            let _ = (noted(node, MAILBOX), about.len());
         }
     }
 

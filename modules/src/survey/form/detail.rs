@@ -2,8 +2,8 @@
 
 use super::{MailboxForm, mailbox, mailbox_form};
 use crate::survey::MailboxLook;
-use postcard_schema::Schema;
 use rohrpost_mailbox::{MailboxDetail, Name, Party, Priority, SlotInfo, VictimInfo, WaitingPackage};
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 #[derive(Serialize, Deserialize, Schema)]

@@ -1,7 +1,7 @@
 //! What classes received and who sent what to whom, as it travels.
 
-use postcard_schema::Schema;
 use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, FlowSecond, LATENCY_BUCKETS, Latency, Loss, Name, Type};
+use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 

@@ -1,13 +1,11 @@
 //! From bytes to values.
 
-use super::{
-    DEPTH_MAX, EMPTY_MAX, Value, WalkError, WalkProblem, meta,
+use crate::{
+    DEPTH_MAX, EMPTY_MAX, Field, Members, Named, Type, Value, WalkError, WalkProblem,
+    bytes::read_varint,
     scalar::{Integer, shortest},
     show::word,
-    types::{is_byte, is_empty, is_nullable, is_word, unwrapped},
-};
-use postcard_schema::schema::owned::{
-    OwnedDataModelType as Ty, OwnedDataModelVariant as VariantTy, OwnedNamedType, OwnedNamedValue, OwnedNamedVariant,
+    words::{is_byte, is_empty, is_nullable, is_word, unwrapped},
 };
 
 /// The value that `bytes`, all of them, hold according to their description.
@@ -16,7 +14,7 @@ use postcard_schema::schema::owned::{
 /// checks by itself (`NonZeroU8`, its own `Deserialize`) is not in the description and not checked.
 ///
 /// ```
-/// use rohrpost_modules::value::{Data, Value, decode};
+/// use rohrpost_schema::{Schema, Value, decode};
 /// let bytes = postcard::to_stdvec(&(7u8, vec!['a'], Some(f32::INFINITY)))?;
 /// let value = decode(&<(u8, Vec<char>, Option<f32>)>::schema(), &bytes)?;
 /// assert_eq!(value, Value::List(vec![Value::U(7), Value::List(vec![Value::Char('a')]), Value::F(f64::INFINITY)]));
@@ -26,13 +24,8 @@ use postcard_schema::schema::owned::{
 /// # Errors
 ///
 /// Bytes that are cut, that go on, or that another type wrote, with the path to the place where it showed.
-pub fn decode(ty: &OwnedNamedType, bytes: &[u8]) -> Result<Value, WalkError> {
-    decode_within(DEPTH_MAX, ty, bytes)
-}
-
-/// The same with another bound on nesting.
-pub(super) fn decode_within(depth_max: usize, ty: &OwnedNamedType, bytes: &[u8]) -> Result<Value, WalkError> {
-    let mut decoder = Decoder { bytes, depth: 0, depth_max, empty_left: EMPTY_MAX };
+pub fn decode(ty: &Type, bytes: &[u8]) -> Result<Value, WalkError> {
+    let mut decoder = Decoder { bytes, depth: 0, empty_left: EMPTY_MAX };
     let value = decoder.value(ty)?;
     match decoder.bytes.len() {
         0 => Ok(value),
@@ -44,14 +37,13 @@ struct Decoder<'a> {
     /// What is not read yet.
     bytes: &'a [u8],
     depth: usize,
-    depth_max: usize,
     /// How many more values may take no bytes.
     empty_left: usize,
 }
 
 impl<'a> Decoder<'a> {
-    fn value(&mut self, ty: &OwnedNamedType) -> Result<Value, WalkError> {
-        if self.depth >= self.depth_max {
+    fn value(&mut self, ty: &Type) -> Result<Value, WalkError> {
+        if self.depth >= DEPTH_MAX {
             return Err(WalkProblem::TooDeep.into());
         }
         let before = self.bytes.len();
@@ -64,53 +56,61 @@ impl<'a> Decoder<'a> {
         Ok(value)
     }
 
-    fn unbounded(&mut self, ty: &OwnedNamedType) -> Result<Value, WalkError> {
-        if let Some(integer) = Integer::of(&ty.ty) {
+    fn unbounded(&mut self, ty: &Type) -> Result<Value, WalkError> {
+        if let Some(integer) = Integer::of(ty) {
             return Ok(self.integer(integer)?);
         }
-        match &ty.ty {
-            Ty::Bool => Ok(Value::Bool(self.flag()?)),
-            Ty::F32 => Ok(Value::F(shortest(f32::from_le_bytes(self.array()?)))),
-            Ty::F64 => Ok(Value::F(f64::from_le_bytes(self.array()?))),
-            Ty::Char => Ok(Value::Char(self.char()?)),
-            Ty::String => Ok(Value::Text(self.text()?.to_owned())),
-            Ty::ByteArray => Ok(Value::Bytes(self.counted()?.to_vec())),
-            Ty::Seq(element) if is_byte(element) => Ok(Value::Bytes(self.counted()?.to_vec())),
-            Ty::Unit | Ty::UnitStruct => Ok(Value::Null),
-            Ty::Option(inner) => match self.flag()? {
+        match ty {
+            Type::Bool => Ok(Value::Bool(self.flag()?)),
+            Type::F32 => Ok(Value::F(shortest(f32::from_le_bytes(self.array()?)))),
+            Type::F64 => Ok(Value::F(f64::from_le_bytes(self.array()?))),
+            Type::Char => Ok(Value::Char(self.char()?)),
+            Type::Text => Ok(Value::Text(self.text()?.to_owned())),
+            Type::Bytes => Ok(Value::Bytes(self.counted()?.to_vec())),
+            Type::List(element) if is_byte(element) => Ok(Value::Bytes(self.counted()?.to_vec())),
+            Type::Unit => Ok(Value::Null),
+            Type::Option(inner) => match self.flag()? {
                 false => Ok(Value::Null),
                 true if is_nullable(inner) => Ok(Value::Variant("Some".into(), Box::new(self.value(inner)?))),
                 true => self.value(inner),
             },
-            Ty::NewtypeStruct(inner) => self.value(inner),
-            Ty::Seq(element) => {
-                let length = self.length(is_empty(element, self.depth))?;
+            Type::List(element) => {
+                let length = self.length(is_empty(element))?;
                 self.list((0..length).map(|_| element.as_ref()))
             }
-            Ty::Tuple(elements) | Ty::TupleStruct(elements) => self.list(elements.iter()),
-            Ty::Map { key, val } => self.map(key, val),
-            Ty::Struct(fields) => self.fields(fields),
-            Ty::Enum(variants) => self.variant(variants),
-            Ty::Schema => self.value(&meta::DESCRIPTION),
+            Type::Array(length, element) => self.list((0..*length).map(|_| element.as_ref())),
+            Type::Tuple(elements) => self.list(elements.iter()),
+            Type::Map(key, value) => self.map(key, value),
+            Type::Struct(named) => self.members(&named.members),
+            Type::Enum { variants, .. } => self.variant(variants),
             _ => unreachable!("integers are read above"),
         }
     }
 
-    fn list<'t>(&mut self, types: impl Iterator<Item = &'t OwnedNamedType>) -> Result<Value, WalkError> {
+    fn list<'t>(&mut self, types: impl Iterator<Item = &'t Type>) -> Result<Value, WalkError> {
         let elements = types.enumerate().map(|(index, ty)| self.value(ty).map_err(|error| error.within_element(index)));
         Ok(Value::List(elements.collect::<Result<_, _>>()?))
     }
 
-    fn fields(&mut self, fields: &[OwnedNamedValue]) -> Result<Value, WalkError> {
-        let entry = |field: &OwnedNamedValue| match self.value(&field.ty) {
+    fn members(&mut self, members: &Members) -> Result<Value, WalkError> {
+        match members {
+            Members::None => Ok(Value::Null),
+            Members::One(field) => self.value(&field.ty),
+            Members::Tuple(fields) => self.list(fields.iter().map(|field| &field.ty)),
+            Members::Fields(fields) => self.fields(fields),
+        }
+    }
+
+    fn fields(&mut self, fields: &[Field]) -> Result<Value, WalkError> {
+        let entry = |field: &Field| match self.value(&field.ty) {
             Ok(value) => Ok((field.name.clone(), value)),
             Err(error) => Err(error.within(&field.name)),
         };
         Ok(Value::Map(fields.iter().map(entry).collect::<Result<_, WalkError>>()?))
     }
 
-    fn map(&mut self, key: &OwnedNamedType, val: &OwnedNamedType) -> Result<Value, WalkError> {
-        let length = self.length(is_empty(key, self.depth) && is_empty(val, self.depth))?;
+    fn map(&mut self, key: &Type, val: &Type) -> Result<Value, WalkError> {
+        let length = self.length(is_empty(key) && is_empty(val))?;
         if !is_word(key) {
             let mut pairs = Vec::new();
             for index in 0..length {
@@ -128,21 +128,11 @@ impl<'a> Decoder<'a> {
         Ok(Value::Map(entries))
     }
 
-    fn variant(&mut self, variants: &[OwnedNamedVariant]) -> Result<Value, WalkError> {
+    fn variant(&mut self, variants: &[Named]) -> Result<Value, WalkError> {
         let index = self.varint(32)? as u64;
         let known = usize::try_from(index).ok().and_then(|index| variants.get(index));
         let variant = known.ok_or(WalkProblem::NoSuchVariant { index, known: variants.len() })?;
-        let payload = match &variant.ty {
-            VariantTy::UnitVariant => Ok(Value::Null),
-            VariantTy::NewtypeVariant(inner) => self.value(inner),
-            VariantTy::TupleVariant(elements) => match elements.as_slice() {
-                // `Result` describes its variants like this; serde, and so JSON, knows them as newtypes.
-                [only] => self.value(only),
-                _ => self.list(elements.iter()),
-            },
-            VariantTy::StructVariant(fields) => self.fields(fields),
-        };
-        let payload = payload.map_err(|error| error.within(&variant.name))?;
+        let payload = self.members(&variant.members).map_err(|error| error.within(&variant.name))?;
         Ok(Value::Variant(variant.name.clone(), Box::new(payload)))
     }
 
@@ -170,21 +160,8 @@ impl<'a> Decoder<'a> {
         }
     }
 
-    /// Seven bits a byte, the lowest first; the highest bit of a byte says that another follows.
     fn varint(&mut self, bits: u32) -> Result<u128, WalkProblem> {
-        let mut number = 0;
-        for shift in (0..bits).step_by(7) {
-            let byte = self.byte()?;
-            let seven = u128::from(byte & 0x7f);
-            if bits - shift < 7 && seven >> (bits - shift) != 0 {
-                break;
-            }
-            number |= seven << shift;
-            if byte & 0x80 == 0 {
-                return Ok(number);
-            }
-        }
-        Err(WalkProblem::BadNumber { bits })
+        read_varint(bits, || self.byte())?.ok_or(WalkProblem::BadNumber { bits })
     }
 
     fn char(&mut self) -> Result<char, WalkProblem> {

@@ -1,32 +1,29 @@
 //! Numbers of all widths: their range, their bytes' width, and how they read as text.
 
-use super::{Value, WalkProblem};
-use postcard_schema::schema::owned::OwnedDataModelType as Ty;
+use crate::{Type, Value, WalkProblem};
 
 /// A type of whole numbers.
 #[derive(Clone, Copy)]
-pub(super) struct Integer {
-    pub(super) name: &'static str,
-    pub(super) signed: bool,
-    pub(super) bits: u32,
+pub(crate) struct Integer {
+    pub(crate) name: &'static str,
+    pub(crate) signed: bool,
+    pub(crate) bits: u32,
 }
 
 impl Integer {
-    /// The integer type that `ty` is, if it is one. `usize` has 64 bits on every machine that Rohrpost runs on.
-    pub(super) fn of(ty: &Ty) -> Option<Self> {
+    /// The integer type that `ty` is, if it is one.
+    pub(crate) fn of(ty: &Type) -> Option<Self> {
         let (name, signed, bits) = match ty {
-            Ty::I8 => ("i8", true, 8),
-            Ty::I16 => ("i16", true, 16),
-            Ty::I32 => ("i32", true, 32),
-            Ty::I64 => ("i64", true, 64),
-            Ty::I128 => ("i128", true, 128),
-            Ty::Isize => ("isize", true, 64),
-            Ty::U8 => ("u8", false, 8),
-            Ty::U16 => ("u16", false, 16),
-            Ty::U32 => ("u32", false, 32),
-            Ty::U64 => ("u64", false, 64),
-            Ty::U128 => ("u128", false, 128),
-            Ty::Usize => ("usize", false, 64),
+            Type::I8 => ("i8", true, 8),
+            Type::I16 => ("i16", true, 16),
+            Type::I32 => ("i32", true, 32),
+            Type::I64 => ("i64", true, 64),
+            Type::I128 => ("i128", true, 128),
+            Type::U8 => ("u8", false, 8),
+            Type::U16 => ("u16", false, 16),
+            Type::U32 => ("u32", false, 32),
+            Type::U64 => ("u64", false, 64),
+            Type::U128 => ("u128", false, 128),
             _ => return None,
         };
         Some(Self { name, signed, bits })
@@ -41,7 +38,7 @@ impl Integer {
     }
 
     /// `value` as `U` or `I` within the range, whatever number it came as.
-    pub(super) fn number(self, value: &Value) -> Result<Value, WalkProblem> {
+    pub(crate) fn number(self, value: &Value) -> Result<Value, WalkProblem> {
         let fitting = match (self.signed, value) {
             (false, Value::U(n)) => Some(*n).filter(|n| *n <= self.unsigned_max()).map(Value::U),
             (true, Value::I(n)) => {
@@ -64,7 +61,7 @@ impl Integer {
     }
 
     /// Reads `12`, `-3`, `0x1f` and `1e3`.
-    pub(super) fn parse(self, text: &str) -> Result<Value, WalkProblem> {
+    pub(crate) fn parse(self, text: &str) -> Result<Value, WalkProblem> {
         let whole = text.parse().map(Value::I).or_else(|_| text.parse().map(Value::U)).ok().or_else(|| hex(text));
         let number = match whole {
             Some(number) => number,
@@ -77,7 +74,7 @@ impl Integer {
         WalkProblem::Expected { expected: self.expectation(), got: shortened(got) }
     }
 
-    pub(super) fn expectation(self) -> String {
+    pub(crate) fn expectation(self) -> String {
         format!("a whole number ({})", self.name)
     }
 
@@ -101,7 +98,7 @@ fn hex(text: &str) -> Option<Value> {
 }
 
 /// `value` as a number with a fraction. `name` is that of the type, `f32` or `f64`.
-pub(super) fn float(name: &'static str, value: &Value) -> Result<f64, WalkProblem> {
+pub(crate) fn float(name: &'static str, value: &Value) -> Result<f64, WalkProblem> {
     let number = match value {
         Value::F(x) => *x,
         Value::I(n) => *n as f64,
@@ -116,7 +113,7 @@ pub(super) fn float(name: &'static str, value: &Value) -> Result<f64, WalkProble
 }
 
 /// Reads what integers take, and `-0.5`, `1e-3`, `NaN`, `inf`, `-inf`.
-pub(super) fn parse_float(name: &'static str, text: &str) -> Result<f64, WalkProblem> {
+pub(crate) fn parse_float(name: &'static str, text: &str) -> Result<f64, WalkProblem> {
     if let Some(number) = hex(text) {
         return float(name, &number);
     }
@@ -140,7 +137,7 @@ fn float_out_of_range(name: &'static str, got: &str) -> WalkProblem {
 const POWERS: [f64; 15] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14];
 
 /// The `f64` of the shortest decimal that is this `f32` and no other: people read and type 1.2, not 1.2000000476837158.
-pub(super) fn shortest(number: f32) -> f64 {
+pub(crate) fn shortest(number: f32) -> f64 {
     let exact = f64::from(number);
     // Six digits of a decimal survive in an `f32`, nine tell all `f32`s apart. Numbers of usual size go this way, as the
     // way by text below takes several times as long and scans have many numbers.
@@ -157,7 +154,7 @@ pub(super) fn shortest(number: f32) -> f64 {
 }
 
 /// What came instead, fit for one line of a terminal.
-pub(super) fn shortened(text: &str) -> String {
+pub(crate) fn shortened(text: &str) -> String {
     const SHOWN: usize = 40;
     let short: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
     if text.chars().nth(SHOWN).is_some() { short + "…" } else { short }

@@ -2,7 +2,7 @@
 //!
 //! With serde_json, enable its feature `float_roundtrip`: else it reads some numbers one bit off.
 
-use super::Value;
+use crate::Value;
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer,
     de::{self, MapAccess, SeqAccess, Visitor},
@@ -42,7 +42,7 @@ impl Serialize for Value {
 }
 
 /// From formats that describe themselves, as JSON does. The result may not be in the form that decoding gives
-/// (`5` is a `U` for an `i8`, too); [`encode`](super::encode) knows what is meant.
+/// (`5` is a `U` for an `i8`, too); [`encode`](crate::encode) knows what is meant.
 impl<'de> Deserialize<'de> for Value {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(ValueVisitor)

@@ -37,10 +37,10 @@ pub enum WalkProblem {
         left: usize,
     },
     /// Too many elements that take no bytes.
-    #[error("more than {} values that take no bytes", super::EMPTY_MAX)]
+    #[error("more than {} values that take no bytes", crate::EMPTY_MAX)]
     TooManyEmpty,
     /// The description or the value nests too deep.
-    #[error("nested more than {} deep", super::DEPTH_MAX)]
+    #[error("nested more than {} deep", crate::DEPTH_MAX)]
     TooDeep,
     /// A byte that stands for no bool or option.
     #[error("expected a byte 0 or 1, got {got}")]
@@ -107,12 +107,6 @@ pub enum WalkProblem {
     /// A field is given twice.
     #[error("given twice")]
     FieldTwice,
-    /// Bytes that the type itself refuses.
-    #[error("{error}")]
-    NotRead {
-        /// What it says.
-        error: String,
-    },
 }
 
 fn count(number: usize, noun: &str) -> String {
@@ -129,7 +123,7 @@ impl WalkError {
     /// The same error, seen from outside of the field or argument `name`.
     ///
     /// ```
-    /// use rohrpost_modules::value::{Data, parse_argument};
+    /// use rohrpost_schema::{Schema, parse_argument};
     /// let error = parse_argument(&f64::schema(), "fast").unwrap_err().within("speed_m_s");
     /// assert_eq!(error.to_string(), "speed_m_s: expected a number (f64), got `fast`");
     /// ```
@@ -141,7 +135,7 @@ impl WalkError {
     }
 
     /// The same error, seen from outside of the element `index`.
-    pub(super) fn within_element(self, index: usize) -> Self {
+    pub(crate) fn within_element(self, index: usize) -> Self {
         self.within(&format!("[{index}]"))
     }
 }

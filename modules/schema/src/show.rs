@@ -1,6 +1,6 @@
 //! Values for people: one line of text, and numbers to plot.
 
-use super::Value;
+use crate::Value;
 use std::fmt::{self, Write};
 
 /// How many elements of a list [`Value`]'s `Display` prints.
@@ -21,7 +21,7 @@ impl Value {
     /// One line for people, lists cut after `limit` elements. Prints with a precision as `Display` does.
     ///
     /// ```
-    /// use rohrpost_modules::value::Value;
+    /// use rohrpost_schema::Value;
     /// let ranges = Value::List((0..360).map(|i| Value::F(f64::from(i) / 8.0)).collect());
     /// let scan = Value::Map(vec![("beams".into(), Value::U(360)), ("ranges_m".into(), ranges)]);
     /// assert_eq!(scan.display(2).to_string(), "{beams: 360, ranges_m: [0, 0.125, … 358 more]}");
@@ -116,7 +116,7 @@ fn show_name(name: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
 }
 
 /// A value of a type that is a word, as the key of a map: without quotes, and exact.
-pub(super) fn word(value: &Value) -> String {
+pub(crate) fn word(value: &Value) -> String {
     match value {
         Value::Char(char) => char.to_string(),
         Value::Text(text) | Value::Variant(text, _) => text.clone(),
@@ -130,7 +130,7 @@ pub(super) fn word(value: &Value) -> String {
 /// Of each list only the first `limit` elements are taken. A value that is a number has the empty path.
 ///
 /// ```
-/// use rohrpost_modules::value::{Value, numbers};
+/// use rohrpost_schema::{Value, numbers};
 /// let value = Value::Map(vec![("on".into(), Value::Bool(true)), ("levels".into(), Value::Bytes(vec![7, 8, 9]))]);
 /// assert_eq!(numbers(&value, 2), [("on".into(), 1.0), ("levels[0]".into(), 7.0), ("levels[1]".into(), 8.0)]);
 /// ```

@@ -1,17 +1,14 @@
 //! From values to bytes.
 
-use super::{
-    DEPTH_MAX, Value, WalkError, WalkProblem,
+use crate::{
+    DEPTH_MAX, Field, Members, Named, Type, Value, WalkError, WalkProblem,
     argument::parse_word,
-    meta,
+    bytes::write_varint,
     scalar::{Integer, float, shortened},
-    types::{expectation, find_variant, is_byte, is_nullable, is_word, unwrapped},
-};
-use postcard_schema::schema::owned::{
-    OwnedDataModelType as Ty, OwnedDataModelVariant as VariantTy, OwnedNamedType, OwnedNamedValue, OwnedNamedVariant,
+    words::{expectation, find_variant, is_byte, is_nullable, is_word, unwrapped},
 };
 
-/// The bytes that a value of the described type has, the inverse of [`decode`](super::decode).
+/// The bytes that a value of the described type has, the inverse of [`decode`](crate::decode).
 ///
 /// Takes each value in the form that `decode` gives, and where only one thing can be meant also as JSON or a person
 /// has it:
@@ -24,7 +21,9 @@ use postcard_schema::schema::owned::{
 /// - maps: a `List` of pairs.
 ///
 /// ```
-/// use rohrpost_modules::{types::Twist, value::{Data, Value, encode}};
+/// use rohrpost_schema::{Schema, Value, encode};
+/// #[derive(Debug, PartialEq, serde::Deserialize, Schema)]
+/// struct Twist { speed_m_s: f64, turn_rate_rad_s: f64 }
 /// let value: Value = serde_json::from_str(r#"{"turn_rate_rad_s": "inf", "speed_m_s": 2}"#)?;
 /// let twist: Twist = postcard::from_bytes(&encode(&Twist::schema(), &value)?)?;
 /// assert_eq!(twist, Twist { speed_m_s: 2.0, turn_rate_rad_s: f64::INFINITY });
@@ -34,7 +33,7 @@ use postcard_schema::schema::owned::{
 /// # Errors
 ///
 /// A value that does not fit the type, with the path to it and what was expected.
-pub fn encode(ty: &OwnedNamedType, value: &Value) -> Result<Vec<u8>, WalkError> {
+pub fn encode(ty: &Type, value: &Value) -> Result<Vec<u8>, WalkError> {
     let mut encoder = Encoder { bytes: Vec::new(), depth: 0 };
     encoder.value(ty, value)?;
     Ok(encoder.bytes)
@@ -46,7 +45,7 @@ struct Encoder {
 }
 
 impl Encoder {
-    fn value(&mut self, ty: &OwnedNamedType, value: &Value) -> Result<(), WalkError> {
+    fn value(&mut self, ty: &Type, value: &Value) -> Result<(), WalkError> {
         if self.depth >= DEPTH_MAX {
             return Err(WalkProblem::TooDeep.into());
         }
@@ -56,44 +55,46 @@ impl Encoder {
         Ok(())
     }
 
-    fn unbounded(&mut self, ty: &OwnedNamedType, value: &Value) -> Result<(), WalkError> {
-        if let Some(integer) = Integer::of(&ty.ty) {
+    fn unbounded(&mut self, ty: &Type, value: &Value) -> Result<(), WalkError> {
+        if let Some(integer) = Integer::of(ty) {
             self.integer(integer, &integer.number(value)?);
             return Ok(());
         }
-        match (&ty.ty, value) {
-            (Ty::Bool, Value::Bool(flag)) => self.bytes.push(u8::from(*flag)),
-            (Ty::F32, _) => self.bytes.extend((float("f32", value)? as f32).to_le_bytes()),
-            (Ty::F64, _) => self.bytes.extend(float("f64", value)?.to_le_bytes()),
-            (Ty::Char | Ty::String, Value::Char(char)) => self.counted(char.encode_utf8(&mut [0; 4]).as_bytes()),
-            (Ty::Char, Value::Text(text)) if text.chars().count() == 1 => self.counted(text.as_bytes()),
-            (Ty::String, Value::Text(text)) => self.counted(text.as_bytes()),
-            (Ty::ByteArray, Value::Bytes(bytes)) => self.counted(bytes),
-            (Ty::ByteArray, Value::List(numbers)) => self.list_of_bytes(numbers)?,
-            (Ty::Seq(element), Value::Bytes(bytes)) if is_byte(element) => self.counted(bytes),
-            (Ty::Unit | Ty::UnitStruct, Value::Null) => {}
-            (Ty::Option(_), Value::Null) => self.bytes.push(0),
-            (Ty::Option(inner), _) => {
+        match (ty, value) {
+            (Type::Bool, Value::Bool(flag)) => self.bytes.push(u8::from(*flag)),
+            (Type::F32, _) => self.bytes.extend((float("f32", value)? as f32).to_le_bytes()),
+            (Type::F64, _) => self.bytes.extend(float("f64", value)?.to_le_bytes()),
+            (Type::Char | Type::Text, Value::Char(char)) => self.counted(char.encode_utf8(&mut [0; 4]).as_bytes()),
+            (Type::Char, Value::Text(text)) if text.chars().count() == 1 => self.counted(text.as_bytes()),
+            (Type::Text, Value::Text(text)) => self.counted(text.as_bytes()),
+            (Type::Bytes, Value::Bytes(bytes)) => self.counted(bytes),
+            (Type::Bytes, Value::List(numbers)) => self.list_of_bytes(numbers)?,
+            (Type::List(element), Value::Bytes(bytes)) if is_byte(element) => self.counted(bytes),
+            (Type::Unit, Value::Null) => {}
+            (Type::Option(_), Value::Null) => self.bytes.push(0),
+            (Type::Option(inner), _) => {
                 let some = if is_nullable(inner) { marked_some(ty, value)? } else { value };
                 self.bytes.push(1);
                 self.value(inner, some)?;
             }
-            (Ty::Seq(element), Value::List(values)) => {
+            (Type::List(element), Value::List(values)) => {
                 self.varint(values.len() as u128);
                 self.list(values.iter().map(|value| (element.as_ref(), value)))?;
             }
-            (Ty::Tuple(types) | Ty::TupleStruct(types), Value::List(values)) => self.tuple(types, values)?,
-            (Ty::Map { key, val }, Value::Map(entries)) if is_word(key) => self.map(key, val, entries)?,
-            (Ty::Map { key, val }, Value::List(pairs)) => self.pairs(ty, key, val, pairs)?,
-            (Ty::Struct(fields), Value::Map(entries)) => self.fields(fields, entries)?,
-            (Ty::Enum(variants), _) => self.variant(ty, variants, value)?,
-            (Ty::Schema, _) => self.value(&meta::DESCRIPTION, value)?,
+            (Type::Array(length, element), Value::List(values)) => {
+                self.tuple(*length as usize, values.iter().map(|_| element.as_ref()), values)?;
+            }
+            (Type::Tuple(types), Value::List(values)) => self.tuple(types.len(), types.iter(), values)?,
+            (Type::Map(key, val), Value::Map(entries)) if is_word(key) => self.map(key, val, entries)?,
+            (Type::Map(key, val), Value::List(pairs)) => self.pairs(ty, key, val, pairs)?,
+            (Type::Struct(named), _) => self.members(&named.members, value).ok_or_else(|| mismatch(ty, value))??,
+            (Type::Enum { variants, .. }, _) => self.variant(ty, variants, value)?,
             _ => return Err(mismatch(ty, value).into()),
         }
         Ok(())
     }
 
-    fn list<'t>(&mut self, elements: impl Iterator<Item = (&'t OwnedNamedType, &'t Value)>) -> Result<(), WalkError> {
+    fn list<'t>(&mut self, elements: impl Iterator<Item = (&'t Type, &'t Value)>) -> Result<(), WalkError> {
         for (index, (ty, value)) in elements.enumerate() {
             self.value(ty, value).map_err(|error| error.within_element(index))?;
         }
@@ -101,24 +102,36 @@ impl Encoder {
     }
 
     fn list_of_bytes(&mut self, numbers: &[Value]) -> Result<(), WalkError> {
-        let byte = OwnedNamedType { name: String::new(), ty: Ty::U8 };
         self.varint(numbers.len() as u128);
-        self.list(numbers.iter().map(|number| (&byte, number)))
+        self.list(numbers.iter().map(|number| (&Type::U8, number)))
     }
 
-    fn tuple(&mut self, types: &[OwnedNamedType], values: &[Value]) -> Result<(), WalkError> {
-        if types.len() != values.len() {
-            return Err(WalkProblem::WrongLength { expected: types.len(), got: values.len() }.into());
-        }
-        self.list(types.iter().zip(values))
-    }
-
-    fn map(
+    fn tuple<'t>(
         &mut self,
-        key: &OwnedNamedType,
-        val: &OwnedNamedType,
-        entries: &[(String, Value)],
+        expected: usize,
+        types: impl Iterator<Item = &'t Type>,
+        values: &'t [Value],
     ) -> Result<(), WalkError> {
+        if expected != values.len() {
+            return Err(WalkProblem::WrongLength { expected, got: values.len() }.into());
+        }
+        self.list(types.zip(values))
+    }
+
+    /// What a struct or variant has in it; none when the value is of another form.
+    fn members(&mut self, members: &Members, value: &Value) -> Option<Result<(), WalkError>> {
+        match (members, value) {
+            (Members::None, Value::Null) => Some(Ok(())),
+            (Members::One(field), _) => Some(self.value(&field.ty, value)),
+            (Members::Tuple(fields), Value::List(values)) => {
+                Some(self.tuple(fields.len(), fields.iter().map(|field| &field.ty), values))
+            }
+            (Members::Fields(fields), Value::Map(entries)) => Some(self.fields(fields, entries)),
+            _ => None,
+        }
+    }
+
+    fn map(&mut self, key: &Type, val: &Type, entries: &[(String, Value)]) -> Result<(), WalkError> {
         self.varint(entries.len() as u128);
         for (name, value) in entries {
             let within = |error: WalkError| error.within(name);
@@ -128,13 +141,7 @@ impl Encoder {
         Ok(())
     }
 
-    fn pairs(
-        &mut self,
-        map: &OwnedNamedType,
-        key: &OwnedNamedType,
-        val: &OwnedNamedType,
-        pairs: &[Value],
-    ) -> Result<(), WalkError> {
+    fn pairs(&mut self, map: &Type, key: &Type, val: &Type, pairs: &[Value]) -> Result<(), WalkError> {
         self.varint(pairs.len() as u128);
         for (index, pair) in pairs.iter().enumerate() {
             let encoded = match pair {
@@ -146,7 +153,7 @@ impl Encoder {
         Ok(())
     }
 
-    fn fields(&mut self, fields: &[OwnedNamedValue], entries: &[(String, Value)]) -> Result<(), WalkError> {
+    fn fields(&mut self, fields: &[Field], entries: &[(String, Value)]) -> Result<(), WalkError> {
         let mut used = 0;
         for (index, field) in fields.iter().enumerate() {
             // Mostly they stand in order; and by their place, fields that share a name are told apart.
@@ -166,19 +173,16 @@ impl Encoder {
         Ok(())
     }
 
-    fn variant(&mut self, ty: &OwnedNamedType, variants: &[OwnedNamedVariant], value: &Value) -> Result<(), WalkError> {
+    fn variant(&mut self, ty: &Type, variants: &[Named], value: &Value) -> Result<(), WalkError> {
         let (name, payload) = named(value).ok_or_else(|| mismatch(ty, value))?;
         let (index, variant) = find_variant(variants, name).ok_or_else(|| mismatch(ty, value))?;
         self.varint(index as u128);
-        let encoded = match (&variant.ty, payload) {
-            (VariantTy::UnitVariant, Value::Null) => Ok(()),
-            (VariantTy::NewtypeVariant(inner), _) => self.value(inner, payload),
-            (VariantTy::TupleVariant(types), _) if types.len() == 1 => self.value(&types[0], payload),
-            (VariantTy::TupleVariant(types), Value::List(values)) => self.tuple(types, values),
-            (VariantTy::StructVariant(fields), Value::Map(entries)) => self.fields(fields, entries),
-            (VariantTy::StructVariant(fields), Value::Null) => self.fields(fields, &[]),
-            _ => return Err(mismatch(ty, value).into()),
+        let payload = match (&variant.members, payload) {
+            // All of them are optional, or it is a mistake that says which is not given.
+            (Members::Fields(_), Value::Null) => &Value::Map(Vec::new()),
+            _ => payload,
         };
+        let encoded = self.members(&variant.members, payload).ok_or_else(|| mismatch(ty, value))?;
         encoded.map_err(|error| error.within(&variant.name))
     }
 
@@ -192,12 +196,8 @@ impl Encoder {
         }
     }
 
-    fn varint(&mut self, mut number: u128) {
-        while number >= 0x80 {
-            self.bytes.push(number as u8 | 0x80);
-            number >>= 7;
-        }
-        self.bytes.push(number as u8);
+    fn varint(&mut self, number: u128) {
+        write_varint(&mut self.bytes, number);
     }
 
     fn counted(&mut self, bytes: &[u8]) {
@@ -220,7 +220,7 @@ fn named(value: &Value) -> Option<(&str, &Value)> {
 }
 
 /// What is inside of a `Some` of which the value itself may be `Null`.
-fn marked_some<'v>(ty: &OwnedNamedType, value: &'v Value) -> Result<&'v Value, WalkProblem> {
+fn marked_some<'v>(ty: &Type, value: &'v Value) -> Result<&'v Value, WalkProblem> {
     match named(value) {
         Some(("Some", payload)) => Ok(payload),
         _ => Err(mismatch(ty, value)),
@@ -228,7 +228,7 @@ fn marked_some<'v>(ty: &OwnedNamedType, value: &'v Value) -> Result<&'v Value, W
 }
 
 /// All fields found their entries, but there are more entries: either unknown ones, or one of them twice.
-fn surplus(fields: &[OwnedNamedValue], entries: &[(String, Value)]) -> WalkError {
+fn surplus(fields: &[Field], entries: &[(String, Value)]) -> WalkError {
     let unknown = entries.iter().find(|(name, _)| fields.iter().all(|field| field.name != *name));
     if let Some((name, _)) = unknown {
         let known: Vec<_> = fields.iter().map(|field| field.name.escape_debug().to_string()).collect();
@@ -239,7 +239,7 @@ fn surplus(fields: &[OwnedNamedValue], entries: &[(String, Value)]) -> WalkError
     WalkError::from(WalkProblem::FieldTwice).within(twice.map_or("", |(_, (name, _))| name))
 }
 
-fn mismatch(ty: &OwnedNamedType, value: &Value) -> WalkProblem {
+fn mismatch(ty: &Type, value: &Value) -> WalkProblem {
     let got = match value {
         Value::Text(text) => shortened(text),
         other => shortened(&other.display(4).to_string()),

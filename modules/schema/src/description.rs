@@ -1,0 +1,114 @@
+//! What a module tells of itself: its functions and data, by which tools print, call and record it.
+
+use crate::bytes::{Reader, SchemaError, Writer, hash};
+use crate::{Field, Type};
+use serde::Serialize;
+
+/// What an interface offers. A module answers `describe` with it.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Description {
+    /// Name of the trait.
+    pub name: String,
+    /// Class of modules that offer it.
+    pub class: String,
+    /// What it is for.
+    pub text: String,
+    /// Its functions, by number.
+    pub functions: Vec<Function>,
+    /// Its data, by number.
+    pub data: Vec<DataItem>,
+}
+
+/// A function that can be called.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Function {
+    /// Command number.
+    pub number: u16,
+    /// Its name.
+    pub name: String,
+    /// What it does.
+    pub text: String,
+    /// Whether running it twice does no harm.
+    pub idempotent: bool,
+    /// Its arguments, in order.
+    pub arguments: Vec<Field>,
+    /// What it returns.
+    pub result: Type,
+}
+
+/// Data that can be asked for or subscribed to.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct DataItem {
+    /// Data number.
+    pub number: u16,
+    /// Its name, what it is, and its type.
+    #[serde(flatten)]
+    pub field: Field,
+}
+
+impl Description {
+    /// As it is sent and stored: the version of the table, then all of it.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.written(false)
+    }
+
+    /// Reads what [`Description::to_bytes`] wrote.
+    ///
+    /// # Errors
+    /// What is wrong with the bytes.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, SchemaError> {
+        Reader::whole(bytes, |reader| {
+            Ok(Self {
+                name: reader.text()?,
+                class: reader.text()?,
+                text: reader.text()?,
+                functions: reader.list(Function::read)?,
+                data: reader
+                    .list(|reader| Ok(DataItem { number: reader.number(16)? as u16, field: reader.field()? }))?,
+            })
+        })
+    }
+
+    /// Tells interfaces apart: callers and servers must have the same. Numbers, types, units, and names of functions and arguments
+    /// count (to swap two numbers is a mistake that types do not show); texts and ranges do not. A mistake goes unseen once in four
+    /// billion; malice is not what it is for.
+    pub fn hash(&self) -> u32 {
+        hash(&self.written(true))
+    }
+
+    fn written(&self, bare: bool) -> Vec<u8> {
+        Writer::whole(bare, |writer| {
+            let head = writer.name(&self.name).name(&self.class).text(&self.text);
+            head.list(&self.functions, Function::written)
+                .list(&self.data, |writer, item| writer.number(item.number.into()).field(&item.field))
+        })
+    }
+
+    /// A function by its name.
+    pub fn function(&self, name: &str) -> Option<&Function> {
+        self.functions.iter().find(|function| function.name == name)
+    }
+
+    /// Data by its name.
+    pub fn data_item(&self, name: &str) -> Option<&DataItem> {
+        self.data.iter().find(|item| item.field.name == name)
+    }
+}
+
+impl Function {
+    fn written<'w>(writer: &'w mut Writer, function: &Self) -> &'w mut Writer {
+        let head = writer.number(function.number.into()).name(&function.name).text(&function.text);
+        head.byte(u8::from(function.idempotent)).list(&function.arguments, Writer::field).ty(&function.result)
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, SchemaError> {
+        Ok(Self {
+            number: reader.number(16)? as u16,
+            name: reader.text()?,
+            text: reader.text()?,
+            idempotent: reader.flag()?,
+            arguments: reader.list(Reader::field)?,
+            result: reader.ty()?,
+        })
+    }
+}

@@ -1,0 +1,193 @@
+//! What types are made of.
+
+use crate::{Schema, decode};
+use serde::Serialize;
+
+/// What a value is, and how its bytes are to be read.
+///
+/// ```
+/// use rohrpost_schema::{Schema, Type};
+/// assert_eq!(<Option<[f32; 3]>>::schema(), Type::option(Type::Array(3, Box::new(Type::F32))));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Type {
+    /// Nothing.
+    Unit,
+    /// True or false.
+    Bool,
+    /// A whole number from 0, of 8 bits.
+    U8,
+    /// Of 16 bits.
+    U16,
+    /// Of 32 bits.
+    U32,
+    /// Of 64 bits; also `usize`.
+    U64,
+    /// Of 128 bits.
+    U128,
+    /// A whole number with a sign, of 8 bits.
+    I8,
+    /// Of 16 bits.
+    I16,
+    /// Of 32 bits.
+    I32,
+    /// Of 64 bits; also `isize`.
+    I64,
+    /// Of 128 bits.
+    I128,
+    /// A number with a fraction, of 32 bits.
+    F32,
+    /// Of 64 bits.
+    F64,
+    /// One character.
+    Char,
+    /// Text.
+    Text,
+    /// Bytes that are bytes to serde, too.
+    Bytes,
+    /// A value or none.
+    Option(Box<Type>),
+    /// Any number of one type.
+    List(Box<Type>),
+    /// So many of one type.
+    Array(u32, Box<Type>),
+    /// Keys, and what belongs to each.
+    Map(Box<Type>, Box<Type>),
+    /// One after the other.
+    Tuple(Vec<Type>),
+    /// A struct.
+    Struct(Named),
+    /// An enum.
+    Enum {
+        /// Its name, as in [`Named`].
+        name: String,
+        /// What it is.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        text: String,
+        /// Its variants, by number.
+        variants: Vec<Named>,
+    },
+}
+
+/// A struct, or a variant of an enum.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Named {
+    /// A name that others may rely on: it is of the author's choice, counts in hashes, and stays when code is moved.
+    pub name: String,
+    /// What it is.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub text: String,
+    /// What is in it.
+    pub members: Members,
+}
+
+/// What a struct or variant has in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Members {
+    /// Nothing.
+    None,
+    /// One without a name, which it wraps.
+    One(Box<Field>),
+    /// Several without names.
+    Tuple(Vec<Field>),
+    /// Fields by their names.
+    Fields(Vec<Field>),
+}
+
+/// A type in its place: a field of a struct, an argument of a function, data, a parameter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Its name; empty where it has none.
+    pub name: String,
+    /// What it is for.
+    pub text: String,
+    /// Unit of its value; empty: none.
+    pub unit: String,
+    /// Its type.
+    pub ty: Type,
+    /// Least value, postcard of the type. What a range means is the author's word to people and tools; decoding does not check it.
+    pub least: Option<Vec<u8>>,
+    /// Greatest value, likewise.
+    pub most: Option<Vec<u8>>,
+}
+
+impl Field {
+    /// A field of which only this is known.
+    pub fn new(name: impl Into<String>, ty: Type) -> Self {
+        Self { name: name.into(), text: String::new(), unit: String::new(), ty, least: None, most: None }
+    }
+
+    /// The same with a text and a unit; empty: none.
+    #[must_use]
+    pub fn said(mut self, text: impl Into<String>, unit: impl Into<String>) -> Self {
+        (self.text, self.unit) = (text.into(), unit.into());
+        self
+    }
+
+    /// The same with bounds, each postcard of the type.
+    #[must_use]
+    pub fn bounded(mut self, least: Option<Vec<u8>>, most: Option<Vec<u8>>) -> Self {
+        (self.least, self.most) = (least, most);
+        self
+    }
+
+    /// What values it may have, in words, without the unit: `0..=1.5`, `at least 1`; none when nothing bounds it.
+    pub fn range(&self) -> Option<String> {
+        let bound = |bytes: &Option<Vec<u8>>| decode(&self.ty, bytes.as_ref()?).ok().map(|value| value.to_string());
+        match (bound(&self.least), bound(&self.most)) {
+            (Some(least), Some(most)) => Some(format!("{least}..={most}")),
+            (Some(least), None) => Some(format!("at least {least}")),
+            (None, Some(most)) => Some(format!("at most {most}")),
+            (None, None) => None,
+        }
+    }
+
+    /// A text with this field's unit behind it.
+    pub fn with_unit(&self, text: &str) -> String {
+        if self.unit.is_empty() { text.into() } else { format!("{text} {}", self.unit) }
+    }
+}
+
+impl Named {
+    /// Without a text.
+    pub fn new(name: impl Into<String>, members: Members) -> Self {
+        Self { name: name.into(), text: String::new(), members }
+    }
+
+    /// The same with a text.
+    #[must_use]
+    pub fn said(mut self, text: impl Into<String>) -> Self {
+        self.text = text.into();
+        self
+    }
+}
+
+impl Members {
+    /// Those that there are, in the order of their bytes.
+    pub fn fields(&self) -> &[Field] {
+        match self {
+            Self::None => &[],
+            Self::One(field) => std::slice::from_ref(field),
+            Self::Tuple(fields) | Self::Fields(fields) => fields,
+        }
+    }
+}
+
+impl Type {
+    /// This or nothing.
+    pub fn option(some: Self) -> Self {
+        Self::Option(Box::new(some))
+    }
+
+    /// A list of these.
+    pub fn list(element: Self) -> Self {
+        Self::List(Box::new(element))
+    }
+
+    /// Whether it is the type that `T` describes; texts and ranges may differ.
+    pub fn is<T: Schema>(&self) -> bool {
+        self.bare_bytes() == T::schema().bare_bytes()
+    }
+}

@@ -1,0 +1,50 @@
+//! Data whose type is known from a description alone.
+
+/// Data whose Rust type is not known.
+///
+/// Each type has one form, the one that [`decode`](crate::decode) gives; [`encode`](crate::encode) takes more, see there.
+///
+/// | Rust | here | JSON |
+/// |---|---|---|
+/// | `()`, unit struct, `None` | `Null` | `null` |
+/// | `Some(x)` | `x`; where `x` itself can be `Null` (`Option<()>`, `Option<Option<u8>>`): `Variant("Some", x)` | `x`; `"Some"`, `{"Some": x}` |
+/// | `u8` … `u128`; `i8` … `i128` | `U`; `I` | number; text if it fits no 64 bits |
+/// | `f64`, `f32` | `F`; an `f32` as its shortest decimal: 1.2, not 1.2000000476837158 | number, `"NaN"`, `"inf"`, `"-inf"` |
+/// | `Vec<u8>`, byte strings | `Bytes` | list |
+/// | other lists, tuples, arrays | `List` | list |
+/// | struct; map with keys of one word ([`is_word`](crate::is_word)) | `Map` in the order of the bytes | object |
+/// | map with other keys | `List` of `List`s of key and value | list of pairs |
+/// | newtype struct | what it wraps | the same |
+/// | enum | `Variant`; without payload: `Variant(name, Null)` | `{"name": payload}`; `"name"` |
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Nothing: a unit, or no value where one is optional.
+    Null,
+    /// True or false.
+    Bool(bool),
+    /// A whole number of a signed type.
+    I(i128),
+    /// A whole number of an unsigned type.
+    U(u128),
+    /// A number with a fraction.
+    F(f64),
+    /// One character.
+    Char(char),
+    /// Text.
+    Text(String),
+    /// Bytes.
+    Bytes(Vec<u8>),
+    /// Elements of a list or tuple.
+    List(Vec<Value>),
+    /// Fields of a struct, or entries of a map.
+    Map(Vec<(String, Value)>),
+    /// A choice by name, and what it carries (`Null`: nothing).
+    Variant(String, Box<Value>),
+}
+
+impl Value {
+    /// The choice `name` without payload.
+    pub fn unit_variant(name: impl Into<String>) -> Self {
+        Self::Variant(name.into(), Box::new(Self::Null))
+    }
+}
