@@ -55,7 +55,6 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "what the thread of the clock does, and why it could not",
     ),
     ("routers/src/tcp/server/door.rs", "routers/src/tcp/server/mod.rs", "lets connections in"),
-    ("cli/src/sight.rs", "cli/src/target.rs", "who runs is found where one can look, and one looks at who runs"),
     (
         "routers/src/session/server/mod.rs",
         "routers/src/session/server/places.rs",

@@ -24,6 +24,7 @@ mod keys;
 mod launch;
 mod list;
 mod log;
+mod look;
 mod mailbox;
 mod manager;
 mod net;
