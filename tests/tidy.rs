@@ -81,7 +81,6 @@ const KNOTS: &[(&str, usize)] = &[
     ("modules/src/runtime/runner.rs", 4),
     ("routers/src/sim/book.rs", 12),
     ("routers/src/sim/run.rs", 9),
-    ("xtask/src/main.rs", 8),
 ];
 
 #[test]
