@@ -13,12 +13,6 @@ use syn::visit::{self, Visit};
 
 /// Two files that name each other, and why that is right.
 const PAIRS: &[(&str, &str, &str)] = &[
-    (
-        "benches/src/harness/child.rs",
-        "benches/src/harness/shared.rs",
-        "memory of both processes, and what is waited for in it",
-    ),
-    ("benches/src/harness/ping_pong.rs", "benches/src/harness/place.rs", "two ends, and where each runs"),
     ("config/src/classes.rs", "config/src/reader.rs", "a table is read, and says which words are names"),
     ("gui-bridge/src/files.rs", "gui-bridge/src/sink.rs", "a sink is begun with a file, and both fail alike"),
     (
