@@ -66,7 +66,6 @@ const KNOTS: &[(&str, usize)] = &[
     ("config/src/installation.rs", 8),
     ("gui-bridge/src/views.rs", 4),
     ("gui-bridge/src/scene.rs", 10),
-    ("mailbox/src/receiver.rs", 5),
     ("modules/src/builtin/mod.rs", 7),
     ("modules/src/call/error.rs", 5),
     ("modules/src/survey.rs", 8),
