@@ -14,12 +14,6 @@ use syn::visit::{self, Visit};
 /// Two files that name each other, and why that is right.
 const PAIRS: &[(&str, &str, &str)] = &[
     (
-        "benches/src/harness/child.rs",
-        "benches/src/harness/shared.rs",
-        "memory of both processes, and what is waited for in it",
-    ),
-    ("benches/src/harness/ping_pong.rs", "benches/src/harness/place.rs", "two ends, and where each runs"),
-    (
         "config/src/installation.rs",
         "config/src/saved.rs",
         "what is saved is a part of an installation, and is read and told by its names",
@@ -60,12 +54,6 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ),
     ("routers/src/tcp/server/door.rs", "routers/src/tcp/server/mod.rs", "lets connections in"),
     (
-        "cli/src/keys/certificates.rs",
-        "cli/src/keys/certificates/written.rs",
-        "writes what the parent makes, and fails as it does",
-    ),
-    ("cli/src/sight.rs", "cli/src/target.rs", "who runs is found where one can look, and one looks at who runs"),
-    (
         "routers/src/session/server/mod.rs",
         "routers/src/session/server/places.rs",
         "a part of the server's state, and the functions for it",
@@ -90,22 +78,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
 ];
 
 /// Knots of more than two files that are still to be untied: a file of each, and how many there are.
-const KNOTS: &[(&str, usize)] = &[
-    ("benches/src/cases/mod.rs", 9),
-    ("benches/src/cases/lan/mod.rs", 6),
-    ("gui-bridge/src/views.rs", 4),
-    ("gui-bridge/src/scene.rs", 10),
-    ("mailbox/src/receiver.rs", 5),
-    ("cli/src/main.rs", 3),
-    ("cli/src/demo.rs", 3),
-    ("cli/src/doctor/mod.rs", 8),
-    ("cli/src/graph/mod.rs", 3),
-    ("cli/src/log.rs", 4),
-    ("cli/src/net/mod.rs", 3),
-    ("cli/src/param/mod.rs", 5),
-    ("cli/src/tcp/mod.rs", 3),
-    ("xtask/src/main.rs", 8),
-];
+const KNOTS: &[(&str, usize)] = &[("gui-bridge/src/views.rs", 4), ("gui-bridge/src/scene.rs", 10)];
 
 #[test]
 fn files_of_a_crate_do_not_name_each_other_in_circles() {

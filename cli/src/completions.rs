@@ -8,7 +8,7 @@ use super::call::COMMON;
 use super::target::{Running, Target};
 use crate::terminal::{Failure, say};
 use clap::builder::StyledStr;
-use clap::{Arg, Command, CommandFactory, ValueEnum};
+use clap::{Arg, Command, ValueEnum};
 use clap_complete::engine::{ArgValueCandidates, ArgValueCompleter, CompletionCandidate, PathCompleter};
 use clap_complete::env::{Bash, CompleteEnv, EnvCompleter, Fish, Zsh};
 use rohrpost::Name;
@@ -59,16 +59,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Answers and ends, if a shell asks. To be called before anything else.
-pub(super) fn answer() {
-    CompleteEnv::with_factory(command).var(VARIABLE).complete();
+/// Answers and ends, if a shell asks about this command line. To be called before anything else.
+pub(super) fn answer(command: fn() -> Command) {
+    CompleteEnv::with_factory(|| with_candidates(command())).var(VARIABLE).complete();
 }
 
-/// The command line, with what each argument can be. Arguments mean the same wherever they have the same name.
-fn command() -> Command {
-    with_candidates(super::Arguments::command())
-}
-
+/// The same command line, with what each argument can be. Arguments mean the same wherever they have the same name.
 fn with_candidates(command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
     let named = command.get_name().to_owned();

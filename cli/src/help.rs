@@ -1,6 +1,6 @@
 //! `rohrpost --help`: its subcommands, those of every day first.
 
-use clap::{Command, CommandFactory};
+use clap::Command;
 
 /// Headings and their subcommands, in the order of a newcomer's days.
 const GROUPS: [(&str, &[&str]); 7] = [
@@ -13,9 +13,8 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("Else", &["run", "router", "tcp-router", "tcp-client", "help"]),
 ];
 
-/// The command line, with its subcommands in groups.
-pub(super) fn command() -> Command {
-    let command = super::Arguments::command();
+/// The same command line, with its subcommands in groups.
+pub(super) fn grouped(command: Command) -> Command {
     let template = format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}\nOptions:\n{{options}}{{after-help}}",
         groups(&command)
@@ -38,11 +37,13 @@ fn groups(command: &Command) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Arguments;
+    use clap::CommandFactory;
 
     #[test]
     fn each_subcommand_is_in_one_group() {
         let mut grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
-        let command = super::super::Arguments::command();
+        let command = Arguments::command();
         let mut there: Vec<&str> = command.get_subcommands().map(Command::get_name).chain(["help"]).collect();
         grouped.sort_unstable();
         there.sort_unstable();
@@ -51,7 +52,7 @@ mod tests {
 
     #[test]
     fn help_shows_what_is_done_first_and_keeps_within_eighty_columns() {
-        let help = command().render_help().to_string();
+        let help = grouped(Arguments::command()).render_help().to_string();
         let at = |text: &str| help.find(text).unwrap_or_else(|| panic!("{text}: {help}"));
         assert!(
             at("Usage: rohrpost") < at("To begin:")

@@ -1,13 +1,15 @@
 //! `rohrpost log`: what modules say, and how much of it.
 
+mod arguments;
 mod filter;
 mod levels;
 mod reader;
 
-use super::target::{Running, Target};
 use crate::terminal::{Failure, complain, say};
+pub(super) use arguments::Arguments;
 use filter::Filter;
 use levels::Setting;
+pub(super) use reader::LINES_FROM;
 use reader::Reader;
 use rohrpost::Name;
 use rohrpost::interface::Interface;
@@ -19,65 +21,6 @@ use std::time::Duration;
 
 /// New lines are asked for so often.
 const POLL: Duration = Duration::from_millis(200);
-/// Number of `lines_from` in the collector's interface.
-pub(super) const LINES_FROM: u16 = 16;
-
-#[derive(clap::Args)]
-#[command(after_help = "Examples:
-  rohrpost log                           what was said so far
-  rohrpost log --follow                  and what is said from now on
-  rohrpost log --level warn              only warnings and errors
-  rohrpost log --module pilot.0 --text wall --since '5 min'
-  rohrpost log --level pilot.0=debug     makes pilot.0 say more; with --follow, and shows it
-  rohrpost log --level laser=error       makes all lasers say errors only
-  rohrpost log --levels                  from which level on each module speaks")]
-pub(super) struct Arguments {
-    #[command(flatten)]
-    target: Target,
-    /// Go on with new lines until Ctrl-C.
-    #[arg(long, short)]
-    follow: bool,
-    /// LEVEL: only lines as important as this: error, warn, info, debug, trace. NAME=LEVEL: set from which level on this
-    /// module, or each of this class, speaks, until it starts anew.
-    #[arg(long, value_name = "LEVEL|NAME=LEVEL")]
-    level: Vec<String>,
-    /// List from which level on each module speaks.
-    #[arg(long, conflicts_with_all = ["follow", "level"])]
-    levels: bool,
-    /// Only lines of this module; may be given several times.
-    #[arg(long, value_name = "NAME")]
-    module: Vec<String>,
-    /// Only lines of modules of this class; may be given several times.
-    #[arg(long, value_name = "CLASS")]
-    class: Vec<String>,
-    /// Only lines that contain this, in small or capital letters.
-    #[arg(long)]
-    text: Option<String>,
-    /// Only lines of the last while, such as '5 min'.
-    #[arg(long, value_name = "DURATION")]
-    since: Option<String>,
-    /// Only the last lines, so many.
-    #[arg(long, short = 'n', value_name = "COUNT")]
-    last: Option<usize>,
-    /// Wait so long for each answer, seconds.
-    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
-    timeout: f64,
-    /// One JSON object a line.
-    #[arg(long)]
-    json: bool,
-}
-
-impl Arguments {
-    /// Whether something here says which lines to show.
-    fn chooses_lines(&self) -> bool {
-        let level = self.level.iter().any(|level| !level.contains('='));
-        level
-            || !(self.module.is_empty() && self.class.is_empty())
-            || self.text.is_some()
-            || self.since.is_some()
-            || self.last.is_some()
-    }
-}
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
@@ -180,24 +123,5 @@ impl Show<'_> {
             return true;
         }
         say(format_args!("… {note}"))
-    }
-}
-
-/// An answer that did not come, with what to do about it.
-fn told(running: &Running, collector: Name, error: &rohrpost::CallError) -> String {
-    use rohrpost::{CallError, Fault};
-    let name = running.text(collector);
-    let said = running.told(collector, error).to_string();
-    match error {
-        CallError::Fault(_, Fault::ModuleOff) => {
-            format!("the collector {name} is switched off: `rohrpost call {name} on` switches it on")
-        }
-        CallError::Timeout(..) => {
-            format!(
-                "{said} It hangs or is stopped: `rohrpost list` shows its process; if you end that, launch starts another"
-            )
-        }
-        CallError::NotSent(_) => format!("{said} It collects what modules say; `rohrpost list` shows what runs"),
-        _ => said,
     }
 }

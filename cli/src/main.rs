@@ -24,6 +24,7 @@ mod keys;
 mod launch;
 mod list;
 mod log;
+mod look;
 mod mailbox;
 mod manager;
 mod net;
@@ -52,7 +53,7 @@ mod version;
 mod vocabulary;
 mod watch;
 
-use clap::{FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::complain;
 
@@ -135,8 +136,9 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    completions::answer();
-    let arguments = Arguments::from_arg_matches(&help::command().get_matches()).unwrap_or_else(|error| error.exit());
+    completions::answer(Arguments::command);
+    let matches = help::grouped(Arguments::command()).get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let result = match arguments.command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Launch(arguments) => launch::run(&arguments),

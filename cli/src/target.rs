@@ -150,25 +150,13 @@ impl Running {
     }
 
     /// Whether the configuration has it, or has a range of tools for it.
-    fn is_known(&self, module: Name) -> bool {
+    pub(super) fn is_known(&self, module: Name) -> bool {
         self.installation.module(module).is_some() || module.class() == self.installation.classes.tool()
     }
 
     /// Whether it has mailboxes on the node that the tool takes part on.
-    fn is_here(&self, module: Name) -> bool {
+    pub(super) fn is_here(&self, module: Name) -> bool {
         self.node.mailboxes().is_ok_and(|all| all.iter().any(|mailbox| mailbox.module() == module))
-    }
-
-    /// The module or face that a user names, or a program run by hand: one of the configuration, with mailboxes here, of another system,
-    /// or of this one and registered at the TCP router.
-    pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
-        let module = self.installation.classes.parse_name(text)?.module();
-        let is_other = self.is_beyond(module) && module.system() != self.installation.system.id;
-        if is_other || self.is_known(module) || self.is_here(module) || self.is_hosted_beyond(module) {
-            return Ok(module);
-        }
-        let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
-        Err(format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into())
     }
 
     /// A module that has no mailboxes where it should be: why, and what to do.

@@ -5,7 +5,6 @@
 use crate::files::{open_shared, open_to_read};
 use crate::name::Name;
 use crate::node::{Node, NodeError};
-use crate::receiver::Receiver;
 use crate::step::step;
 use std::fs;
 use std::io::{self, Read, Write};
@@ -22,25 +21,19 @@ fn unfinished(node: &Path, name: Name) -> PathBuf {
     node.join(format!("{:08x}.about.new", name.raw()))
 }
 
-impl Receiver {
-    /// Lays these words beside the mailbox, in place of what an earlier owner said.
-    ///
-    /// # Errors
-    /// When they cannot be written; what was there stays.
-    pub fn set_about(&self, words: &[u8]) -> Result<(), NodeError> {
-        let node = self.participant().node().path();
-        let (path, unfinished) = (path_of(node, self.name()), unfinished(node, self.name()));
-        let write = || {
-            let _ = fs::remove_file(&unfinished);
-            open_shared(&unfinished, true)?.write_all(words)?;
-            step!("about: written");
-            fs::rename(&unfinished, &path)
-        };
-        write().map_err(|error: io::Error| {
-            let _ = fs::remove_file(&unfinished);
-            NodeError::of(&path, error)
-        })
-    }
+/// Lays these words beside a mailbox, in place of what an earlier owner said; the caller owns it.
+pub(crate) fn set(node: &Node, name: Name, words: &[u8]) -> Result<(), NodeError> {
+    let (path, unfinished) = (path_of(node.path(), name), unfinished(node.path(), name));
+    let write = || {
+        let _ = fs::remove_file(&unfinished);
+        open_shared(&unfinished, true)?.write_all(words)?;
+        step!("about: written");
+        fs::rename(&unfinished, &path)
+    };
+    write().map_err(|error: io::Error| {
+        let _ = fs::remove_file(&unfinished);
+        NodeError::of(&path, error)
+    })
 }
 
 impl Node {

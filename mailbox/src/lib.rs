@@ -47,7 +47,7 @@
 //! 1. `word`, `slots`, `hot`: the protocol. `queue`: what the receiver knows, and when it must look. `latest`: what replaces what.
 //! 2. `bell`, `doorbell`, `waiting`, `watch`: sleeping and waking.
 //! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics, and what is asked of the processor.
-//! 4. `sender`, `place`, `receiver`: what users hold; `routes`: what is on other nodes. `node`, `entry`, `participant`, `lock`, `registry`: who lives, and who owns what.
+//! 4. `sender`, `place`, `receiver`: what users hold; `routes`: what is on other nodes. `node`, `entry`, `participant`, `lock`, `registry`, `unlink`: who lives, and who owns what.
 //! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes on with (H)
@@ -103,6 +103,7 @@ mod sync;
 pub mod sys;
 mod system_time;
 mod traffic;
+mod unlink;
 mod waiting;
 mod watch;
 mod word;

@@ -1,18 +1,19 @@
-//! The receiving side of a mailbox: read a package in place, most important first; sleep when there is none.
+//! The receiving side of a mailbox: read a package in place, most important first. A receiver that finds none sleeps in `waiting`.
 
+use crate::about;
 use crate::clock::monotonic_ns;
 use crate::counters::Loss;
 use crate::layout::{Shape, stored_ns};
 use crate::lock::Held;
 use crate::name::{Name, Priority};
+use crate::node::NodeError;
 use crate::package::{Head, Options};
 use crate::participant::Participant;
 use crate::queue::Queue;
-use crate::registry;
 use crate::segment::Segment;
 use crate::slots::Taken;
 use crate::step::step;
-use crate::waiting::{Waiting, wait};
+use crate::unlink;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -75,32 +76,16 @@ impl Receiver {
         (self.queue.len(), self.queue.first())
     }
 
-    fn hand_out(&self, in_hand: InHand) -> Package<'_> {
+    pub(crate) fn hand_out(&self, in_hand: InHand) -> Package<'_> {
         Package { segment: &self.segment, queue: &self.queue, in_hand }
     }
 
-    /// The most important package; sleeps until there is one.
-    pub fn receive(&mut self) -> Package<'_> {
-        loop {
-            if let Some(in_hand) = self.next() {
-                return self.hand_out(in_hand);
-            }
-            self.wait(Waiting::default());
-        }
-    }
-
-    /// The most important package; waits until there is one, at most for a timeout ([`Duration`](std::time::Duration)) or as a [`Waiting`] says.
-    pub fn receive_timeout(&mut self, waiting: impl Into<Waiting>) -> Option<Package<'_>> {
-        let waiting = waiting.into();
-        loop {
-            if let Some(in_hand) = self.next() {
-                return Some(self.hand_out(in_hand));
-            }
-            if waiting.is_over() {
-                return None;
-            }
-            self.wait(waiting);
-        }
+    /// Lays these words beside the mailbox, in place of what an earlier owner said.
+    ///
+    /// # Errors
+    /// When they cannot be written; what was there stays.
+    pub fn set_about(&self, words: &[u8]) -> Result<(), NodeError> {
+        about::set(self.participant.node(), self.name(), words)
     }
 
     /// Removes the mailbox. What it still holds is lost, and counted in the result.
@@ -110,7 +95,7 @@ impl Receiver {
         step!("close: retired");
         // If it cannot be removed (the registry stays locked, the directory is gone), it is retired all the same: nobody
         // sends there any more, and the next receiver replaces it.
-        let _ = registry::remove(self.participant.node(), self.name());
+        let _ = unlink::remove(self.participant.node(), self.name());
         // After the fence of `retire` a sender either sees it and takes its package back, or its package is seen here.
         self.queue.rescan(&slots);
         let mut lost = 0;
@@ -122,12 +107,8 @@ impl Receiver {
         lost
     }
 
-    fn wait(&mut self, waiting: Waiting) {
-        wait(&mut [self], None, waiting, || false, |sleep| sleep());
-    }
-
     /// Takes the next package that is not too old.
-    fn next(&mut self) -> Option<InHand> {
+    pub(crate) fn next(&mut self) -> Option<InHand> {
         self.search_if_due();
         let slots = self.segment.slots();
         loop {
@@ -235,7 +216,7 @@ impl Receiver {
 }
 
 /// A taken slot, and what its prefix says.
-struct InHand {
+pub(crate) struct InHand {
     taken: Taken,
     head: Head,
     published_ns: u64,

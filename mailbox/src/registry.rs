@@ -3,7 +3,6 @@
 //! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A file
 //! gets its name last, whole; so nobody ever opens half a mailbox.
 
-use crate::about;
 use crate::counters::Loss;
 use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{Shape, ShapeError};
@@ -16,6 +15,7 @@ use crate::queue::Queue;
 use crate::receiver::Receiver;
 use crate::segment::{BadSegment, Segment, path_of};
 use crate::step::step;
+use crate::unlink::unlink;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -199,19 +199,6 @@ fn retire(old: &Segment) {
         slots.release(taken);
     }
     slots.settle(|victim| old.page().counters.gave_way(victim));
-}
-
-/// Takes a mailbox's name away; the caller owns it.
-pub(crate) fn remove(node: &Node, name: Name) -> Result<(), NodeError> {
-    unlink(node, name, &RegistryLock::take(node.path())?)
-}
-
-fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeError> {
-    about::remove(node, name);
-    fs::remove_file(path_of(node.path(), name)).map_err(|error| NodeError::Io(path_of(node.path(), name), error))?;
-    step!("unlink: gone");
-    node.raise_registry_epoch();
-    Ok(())
 }
 
 impl Node {

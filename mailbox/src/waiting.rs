@@ -2,7 +2,7 @@
 
 use crate::doorbell::Slept;
 use crate::name::Priority;
-use crate::receiver::Receiver;
+use crate::receiver::{Package, Receiver};
 use crate::step::step;
 use crate::watch::Watches;
 use std::sync::Arc;
@@ -50,7 +50,7 @@ impl Waiting {
         self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()))
     }
 
-    pub(crate) fn is_over(&self) -> bool {
+    fn is_over(&self) -> bool {
         self.left() == Some(Duration::ZERO)
     }
 
@@ -120,15 +120,63 @@ pub fn wait_above(
     slept
 }
 
+impl Receiver {
+    /// The most important package; sleeps until there is one.
+    pub fn receive(&mut self) -> Package<'_> {
+        loop {
+            if let Some(in_hand) = self.next() {
+                return self.hand_out(in_hand);
+            }
+            self.wait(Waiting::default());
+        }
+    }
+
+    /// The most important package; waits until there is one, at most for a timeout ([`Duration`](std::time::Duration)) or as a [`Waiting`] says.
+    pub fn receive_timeout(&mut self, waiting: impl Into<Waiting>) -> Option<Package<'_>> {
+        let waiting = waiting.into();
+        loop {
+            if let Some(in_hand) = self.next() {
+                return Some(self.hand_out(in_hand));
+            }
+            if waiting.is_over() {
+                return None;
+            }
+            self.wait(waiting);
+        }
+    }
+
+    fn wait(&mut self, waiting: Waiting) {
+        wait(&mut [self], None, waiting, || false, |sleep| sleep());
+    }
+}
+
+impl Watches {
+    /// Sleeps as [`wait_any`](crate::wait_any) does, also until one of the descriptors is ready; [`Watches::next_ready`] tells
+    /// which. They are looked at before this returns, also when it did not sleep.
+    ///
+    /// # Panics
+    /// When a mailbox is not of the participant that watches.
+    pub fn wait_any(
+        &mut self,
+        receivers: &mut [&mut Receiver],
+        waiting: impl Into<Waiting>,
+        other: impl Fn() -> bool,
+    ) -> Duration {
+        let mut slept = Duration::ZERO;
+        wait(receivers, Some(self), waiting.into(), other, |sleep| slept = timed(sleep));
+        slept
+    }
+}
+
 /// How long this takes.
-pub(crate) fn timed(sleep: impl FnOnce()) -> Duration {
+fn timed(sleep: impl FnOnce()) -> Duration {
     let began = Instant::now();
     sleep();
     began.elapsed()
 }
 
 /// Waits. To sleep it calls `asleep`, which calls what it is given; the clock is read by who wants to know how long that was.
-pub(crate) fn wait(
+fn wait(
     receivers: &mut [&mut Receiver],
     watches: Option<&mut Watches>,
     waiting: Waiting,

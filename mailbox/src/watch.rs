@@ -3,8 +3,6 @@
 use crate::bell::Bell;
 use crate::doorbell;
 use crate::participant::Participant;
-use crate::receiver::Receiver;
-use crate::waiting::{Waiting, timed, wait};
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::sync::Arc;
@@ -126,22 +124,6 @@ impl Watches {
     /// Whether none is watched.
     pub fn is_empty(&self) -> bool {
         self.watched.is_empty()
-    }
-
-    /// Sleeps as [`wait_any`](crate::wait_any) does, also until one of the descriptors is ready; [`Watches::next_ready`] tells
-    /// which. They are looked at before this returns, also when it did not sleep.
-    ///
-    /// # Panics
-    /// When a mailbox is not of the participant that watches.
-    pub fn wait_any(
-        &mut self,
-        receivers: &mut [&mut Receiver],
-        waiting: impl Into<Waiting>,
-        other: impl Fn() -> bool,
-    ) -> Duration {
-        let mut slept = Duration::ZERO;
-        wait(receivers, Some(self), waiting.into(), other, |sleep| slept = timed(sleep));
-        slept
     }
 
     pub(crate) fn participant(&self) -> &Arc<Participant> {

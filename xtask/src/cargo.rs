@@ -1,6 +1,6 @@
 //! Where things are, and how other programs are run.
 
-use crate::Failure;
+use crate::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 

@@ -5,8 +5,8 @@
 //! find that command line by the environment variable `ROHRPOST_RERUN`, and have to fail without it, saying
 //! `run them by "cargo xtask test", which installs Rerun's command line`.
 
-use crate::Failure;
 use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE, cargo};
+use crate::failure::Failure;
 use crate::venv;
 use crate::{fuzz, tsan};
 use std::process::{Command, ExitCode};

@@ -1,7 +1,7 @@
 //! `cargo demo`: from a fresh clone to a robot on the screen.
 
-use crate::Failure;
 use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE};
+use crate::failure::Failure;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 

@@ -4,8 +4,8 @@
 //! What it finds of new ways is kept below `target/fuzz/found`, for longer runs to go on from; an input that breaks a
 //! promise is a file in `target/fuzz`, and goes into `tests/fuzz/corpus` once the mistake is mended.
 
-use crate::Failure;
 use crate::cargo::{self, cargo, host};
+use crate::failure::Failure;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};

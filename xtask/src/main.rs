@@ -6,6 +6,7 @@
 mod cargo;
 mod checks;
 mod demo;
+mod failure;
 mod fuzz;
 mod picture;
 mod tsan;
@@ -28,9 +29,6 @@ cargo xtask tsan
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
     A picture of a drawing as its viewer shows it, without a screen.
 ";
-
-/// A failure as it is told to the user: what went wrong, and what to do.
-pub(crate) type Failure = String;
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

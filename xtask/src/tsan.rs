@@ -3,8 +3,8 @@
 //! The stable toolchain brings ThreadSanitizer's library, but asks to be told that one means it (`RUSTC_BOOTSTRAP`). That is said
 //! for this build alone.
 
-use crate::Failure;
 use crate::cargo::{self, cargo, host};
+use crate::failure::Failure;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, ExitCode};

@@ -2,8 +2,8 @@
 //!
 //! Its version is that of the `rerun` crate: a viewer reads the drawings of its own version best.
 
-use crate::Failure;
 use crate::cargo;
+use crate::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

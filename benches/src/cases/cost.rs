@@ -3,7 +3,7 @@
 //! The receiver has taken everything before the clock starts, and looks for more. Only the sends are timed; what the clock
 //! itself takes is measured beforehand and subtracted.
 
-use super::Case;
+use super::case::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::vyukov::{Memory, Vyukov};
 use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};

@@ -9,7 +9,7 @@
 //! The flooder pauses for 2 ms in 20, so that the receiver sleeps now and then and the kernel's fair server stays out. Only
 //! what was sent while the mailbox was full counts: from before the send until it has been copied out.
 
-use super::Case;
+use super::case::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::{Queue, TwoRings, TwoRingsReceiver, TwoRingsSender};
 use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};

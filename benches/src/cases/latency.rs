@@ -3,7 +3,7 @@
 //! All echo; one way is half of the round trip. Everything is copied in and out, except where it is loaned: there 16 bytes are
 //! written and read at each end, whatever the size.
 
-use super::Case;
+use super::case::Case;
 use super::rivals::Rival;
 use crate::harness::{Cell, Failure, Placement, Scheduling, Scratch, time_two_processes};
 use crate::ours::{How, Mailboxes};

@@ -2,7 +2,7 @@
 //!
 //! Each turn makes its node anew, in a process of its own.
 
-use super::{Case, Done, as_failure};
+use super::case::{Case, Done, as_failure};
 use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;

@@ -1,6 +1,6 @@
 //! Shared memory that a mailbox takes, asked of the file system.
 
-use super::Case;
+use super::case::Case;
 use crate::harness::Failure;
 use crate::one_way::Ground;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};

@@ -1,5 +1,6 @@
 //! The cases. To add one: something that has a name and gives rows, and a line in [`all`].
 
+mod case;
 mod cost;
 mod flood;
 #[cfg(feature = "lan")]
@@ -16,34 +17,10 @@ pub mod tcp;
 #[cfg(feature = "lan")]
 pub mod tdma;
 
+pub use case::Case;
 pub use startup::run_hidden_program;
 
-use crate::harness::{Failure, Scheduling};
-use crate::rounds::Row;
-use crate::settings::Settings;
-
-/// What goes wrong in a turn that does many different things.
-type Done<T> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
-
-/// As a turn has to say it. What was skipped remains so.
-fn as_failure(what: &str) -> impl Fn(Box<dyn std::error::Error + Send + Sync>) -> Failure {
-    move |error| match error.downcast::<Failure>() {
-        Ok(failure) => *failure,
-        Err(error) => Failure::of(what, error),
-    }
-}
-
-/// Something that is measured, against whom, and with which target.
-pub trait Case {
-    /// As `--only` and the table call it.
-    fn name(&self) -> String;
-
-    /// Measures. A contender that fails or is skipped is a row that says so; `Err` is for what hits the whole case.
-    ///
-    /// # Errors
-    /// When the case cannot be begun.
-    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure>;
-}
+use crate::harness::Scheduling;
 
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {

@@ -3,7 +3,7 @@
 //! One thread sends some and then receives them, so its receiver never sleeps. System calls are counted by a tracer: between two
 //! marks, which are system calls themselves. Beside it stands something that is known to use what is counted.
 
-use super::Case;
+use super::case::Case;
 use crate::counting::heap_uses;
 use crate::floors::Queue;
 use crate::harness::{Failure, sample_in_child};

@@ -3,7 +3,7 @@
 //! The mailbox rejects what finds no room and its sender tries again, so nothing is lost: the rings and queues beside it make
 //! their senders wait, too.
 
-use super::Case;
+use super::case::Case;
 use crate::floors::Queue;
 use crate::floors::ring::{Bare, DEPTH, Futex, RingReceiver, RingSender, Shared as Ring};
 use crate::harness::{Failure, Scheduling, Shared};

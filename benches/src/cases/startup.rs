@@ -9,7 +9,7 @@
 //! role, so that exec costs all the same; what they do after `main` has rows of its own. All have their defaults: a mailbox of
 //! `Shape::default()`, a queue of the kernel's default size.
 
-use super::{Case, Done, as_failure};
+use super::case::{Case, Done, as_failure};
 use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;

@@ -1,6 +1,6 @@
 //! A forked process that does one thing, tells why it failed, and dies with its parent.
 
-use super::{Failure, Shared, Zeroable, interrupted};
+use super::{Failure, Gate, Shared, Zeroable, interrupted};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork, getppid};
@@ -133,5 +133,21 @@ impl Drop for Child {
             let _ = kill(self.pid, Signal::SIGKILL);
             let _ = waitpid(self.pid, None);
         }
+    }
+}
+
+impl Gate {
+    /// Waits for children that come here and then go on until they are dropped.
+    ///
+    /// # Errors
+    /// What a child failed with that does not come, else as [`Self::meet`].
+    pub fn meet_children(&self, children: &mut Vec<Child>) -> Result<(), Failure> {
+        let Err(late) = self.meet(children.len() as u32 + 1) else { return Ok(()) };
+        for mut child in std::mem::take(children) {
+            if child.has_ended()? {
+                child.finish(Instant::now())?;
+            }
+        }
+        Err(late)
     }
 }

@@ -1,6 +1,6 @@
 //! Ping-pong: one end sends and waits for the echo. Half of the round trip is what one way takes.
 
-use super::{Child, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, interrupted, settle};
+use super::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, interrupted, settle};
 use rohrpost_mailbox::monotonic_ns;
 use std::time::{Duration, Instant};
 
@@ -21,15 +21,6 @@ const HEAD_START: Duration = Duration::from_millis(10);
 const GRACE: Duration = Duration::from_secs(30);
 /// The second end has so long when the first has ended: the last word to it may be lost, which it has to notice itself.
 const SECOND_ENDS: Duration = Duration::from_secs(8);
-
-/// Which of the two ends.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum End {
-    /// Sends first, and measures.
-    Ping,
-    /// Sends back what it receives.
-    Pong,
-}
 
 /// One end of a connection in both directions.
 pub trait Link {

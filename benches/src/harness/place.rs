@@ -1,6 +1,6 @@
 //! Where a process runs and how it is scheduled.
 
-use super::{End, Failure};
+use super::Failure;
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::unistd::Pid;
@@ -8,6 +8,15 @@ use rohrpost_mailbox::sys;
 
 /// SCHED_FIFO priority of everything that is timed: above ordinary work, below the kernel's own threads.
 const PRIORITY: u8 = 50;
+
+/// Which of the two ends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum End {
+    /// Sends first, and measures.
+    Ping,
+    /// Sends back what it receives.
+    Pong,
+}
 
 /// Which processors the two ends have.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,6 +1,6 @@
 //! Memory that the parent and the processes it forks all see.
 
-use super::{Child, Failure};
+use super::Failure;
 use std::num::NonZeroUsize;
 use std::ops::Deref;
 use std::ptr::NonNull;
@@ -83,19 +83,5 @@ impl Gate {
             std::thread::sleep(Duration::from_millis(1));
         }
         Ok(())
-    }
-
-    /// Waits for children that come here and then go on until they are dropped.
-    ///
-    /// # Errors
-    /// What a child failed with that does not come, else as [`Self::meet`].
-    pub fn meet_children(&self, children: &mut Vec<Child>) -> Result<(), Failure> {
-        let Err(late) = self.meet(children.len() as u32 + 1) else { return Ok(()) };
-        for mut child in std::mem::take(children) {
-            if child.has_ended()? {
-                child.finish(Instant::now())?;
-            }
-        }
-        Err(late)
     }
 }

@@ -1,7 +1,8 @@
 //! The configuration of a demo: the folder's own, or a copy with what the command line says written in. A copy keeps each line
 //! where it was, and messages name the file that it was made from.
 
-use super::{Arguments, GUI, Joined};
+use super::arguments::{Arguments, Joined};
+use super::drawing::GUI;
 use crate::check;
 use crate::keys::certificates::{self, Which};
 use crate::terminal::Failure;

@@ -1,10 +1,12 @@
 //! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
 
 use super::account::{self, Balance};
-use super::beyond;
+use super::arguments::{Arguments, Joined};
+use super::asked::{FIRST_FUNCTION, map_line, running};
+use super::drawing::{drawing, drawn};
 use super::losses::Losses;
 use super::takeover::{Seen, Victim, Watch};
-use super::{Arguments, FIRST_FUNCTION, Joined, copy, drawn};
+use super::{beyond, copy};
 use crate::launch::{Nodes, lab};
 use crate::speech::Speech;
 use crate::summary::print_classes;
@@ -37,7 +39,7 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     if nodes != usize::from(count) {
         return Err(format!("{} has {nodes} nodes; say --nodes {nodes}", installation.shown.display()).into());
     }
-    let (drawing, begun) = (super::drawing(&installation), SystemTime::now());
+    let (drawing, begun) = (drawing(&installation), SystemTime::now());
     // Before the first thread, of which the speech has two.
     let lab = lab(&installation)?;
     let speech = Speech::begin()?;
@@ -160,10 +162,10 @@ fn classes(surveys: &[Survey]) -> Vec<ClassTraffic> {
 
 fn map(installation: &Installation, tool: &mut ToolLink) -> String {
     let read = |bytes: &[u8]| from_bytes::<MapCounts>(bytes);
-    let mapper = super::running(installation, CartographerInterface::CLASS);
+    let mapper = running(installation, CartographerInterface::CLASS);
     let counts = mapper.map(|name| tool.call(name, FIRST_FUNCTION, CartographerInterface::hash(), |_| Ok(()), read));
     match counts {
-        Some(Ok(counts)) => super::map_line(&counts),
+        Some(Ok(counts)) => map_line(&counts),
         Some(Err(error)) => format!("map: {error}\n"),
         None => String::new(),
     }

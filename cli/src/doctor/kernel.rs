@@ -1,7 +1,7 @@
 //! The kernel and the processor: what may keep a thread waiting.
 
+use super::finding::{Finding, State};
 use super::machine::Machine;
-use super::{Finding, State};
 use crate::daemons::{self, Daemon};
 
 /// Open-file-description locks came with it.

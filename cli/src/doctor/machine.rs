@@ -1,7 +1,7 @@
 //! What is read of a computer: files below a root, and the few things that no file tells.
 
-use super::network::Lan;
-use super::security::Protection;
+use super::lan::Lan;
+use super::protection::Protection;
 use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
 use rohrpost_mailbox::sys::{self, Room};
 use rohrpost_mailbox::{Node, NodeError, base_directory};

@@ -1,6 +1,6 @@
 //! How late a thread wakes up: a second of sleeping until each millisecond.
 
-use super::{Finding, State};
+use super::finding::{Finding, State};
 use crate::table::time;
 use rohrpost_mailbox::sys::{self, Scheduling};
 use std::time::{Duration, Instant};

@@ -1,17 +1,21 @@
 //! `rohrpost doctor`: whether this computer lets a robot run in time, and what would mend it.
 
+mod finding;
 mod kernel;
+mod lan;
 mod machine;
 mod measure;
 mod network;
 mod place;
+mod protection;
 mod rights;
 mod security;
 
 use crate::terminal::{Failure, say};
+use finding::{Finding, State};
 use machine::{Machine, Needs};
+use protection::Protection;
 use rohrpost::launch::choose_node;
-use security::Protection;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -34,56 +38,6 @@ pub(super) struct Arguments {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-}
-
-/// How good something is.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum State {
-    Ok,
-    /// A robot runs, and may be late.
-    Warn,
-    /// It does not run, or not for long.
-    Bad,
-}
-
-impl State {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Warn => "warn",
-            Self::Bad => "bad",
-        }
-    }
-}
-
-/// One thing that was looked at.
-#[derive(Debug)]
-struct Finding {
-    what: &'static str,
-    state: State,
-    /// What is.
-    is: String,
-    /// Why it matters.
-    why: &'static str,
-    /// What mends it: a command, if one does.
-    mend: Option<String>,
-}
-
-impl Finding {
-    fn ok(what: &'static str, is: impl Into<String>, why: &'static str) -> Self {
-        Self { what, state: State::Ok, is: is.into(), why, mend: None }
-    }
-
-    /// Something that is not as it should be, and what mends it.
-    fn not(
-        state: State,
-        what: &'static str,
-        is: impl Into<String>,
-        why: &'static str,
-        mend: impl Into<String>,
-    ) -> Self {
-        Self { what, state, is: is.into(), why, mend: Some(mend.into()) }
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {

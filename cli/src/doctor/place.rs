@@ -1,7 +1,7 @@
 //! Where a node would lie, what surrounds it, and what is there already.
 
+use super::finding::{Finding, State};
 use super::machine::{Bridge, Machine, Needs, Seen};
-use super::{Finding, State};
 use rohrpost_config::size_text;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! What this user and this process may.
 
+use super::finding::{Finding, State};
 use super::machine::{Limit, Machine, Needs};
-use super::{Finding, State};
 use rohrpost_config::FIFO_MAX;
 
 /// Bit of CAP_SYS_NICE.

@@ -1,8 +1,8 @@
 //! What `doctor` says of computers that were written down, and of networks.
 
+use super::lan::{Lan, Peer, Port, PortState, Reach, Stamps};
 use super::machine::{Asked, Bridge, NodeFound, Seen};
-use super::network::{Lan, Peer, Port, PortState, Reach, Stamps};
-use super::security::{Lan as OfLan, Tcp as OfTcp};
+use super::protection::{Lan as OfLan, Tcp as OfTcp};
 use super::*;
 use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
 use std::fs;

@@ -1,6 +1,6 @@
 //! The graph for Graphviz.
 
-use super::{Carries, Graph};
+use super::parts::{Carries, Graph};
 use std::fmt::Write;
 
 pub(super) fn write(graph: &Graph, all: bool) -> String {

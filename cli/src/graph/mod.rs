@@ -1,6 +1,7 @@
 //! `rohrpost graph`: who sends what to whom, how often, from the counters of those who send.
 
 mod dot;
+mod parts;
 mod svg;
 
 use super::sight::Silence;
@@ -10,11 +11,10 @@ use super::units::{Stop, bytes, seconds};
 use super::vocabulary::{Vocabulary, answered};
 use super::watch::Tracks;
 use crate::terminal::{Failure, say};
+use parts::{Carries, Edge, Graph, Module};
 use rohrpost::Name;
-use rohrpost::output::plain;
-use rohrpost::survey::{Scope, Standing, Survey, is_hop};
+use rohrpost::survey::{Scope, Survey, is_hop};
 use rohrpost_mailbox::{FlowInfo, Kind};
-use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -51,66 +51,6 @@ pub(super) struct Arguments {
     /// Write it there.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-}
-
-/// Modules, and what goes from one to another.
-#[derive(Serialize)]
-struct Graph {
-    installation: String,
-    /// The node that the tool looked from.
-    node: String,
-    /// Those that are shown.
-    nodes: Vec<String>,
-    /// Those of them that do not answer.
-    silent: Vec<Silence>,
-    /// What rates are measured over.
-    interval_s: f64,
-    modules: Vec<Module>,
-    edges: Vec<Edge>,
-}
-
-#[derive(Serialize)]
-struct Module {
-    module: String,
-    node: String,
-    faces: Vec<String>,
-    state: String,
-    priority: u8,
-    /// It need not run.
-    #[serde(skip)]
-    is_left_out: bool,
-}
-
-impl Module {
-    /// Whether nothing of it runs that one could see. What sends from outside the configuration has no standing.
-    fn is_down(&self) -> bool {
-        let down = [Standing::Stopped, Standing::Unreachable];
-        down.iter().any(|standing| standing.word() == self.state)
-    }
-}
-
-/// What an edge carries.
-#[derive(Serialize, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-#[serde(rename_all = "lowercase")]
-enum Carries {
-    Data,
-    Command,
-    /// A command that every module understands.
-    Common,
-    Reply,
-    Output,
-}
-
-#[derive(Serialize)]
-struct Edge {
-    from: String,
-    to: String,
-    carries: Carries,
-    what: String,
-    packages: u64,
-    packages_per_s: f64,
-    bytes_per_s: f64,
-    refused: u64,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -217,23 +157,6 @@ impl Graph {
         let nodes = nodes.into_iter().map(Into::into).collect();
         Ok(Self { installation, node: running.node_name.clone(), nodes, silent: away, interval_s, modules, edges })
     }
-
-    /// What a drawing is of.
-    fn title(&self) -> String {
-        let word = if self.nodes.len() == 1 { "node" } else { "nodes" };
-        format!("{word} {} of {}", self.nodes.join(", "), self.installation)
-    }
-
-    /// What stands below a module's name: its node if there are several, its faces.
-    fn below<'a>(&'a self, module: &'a Module) -> impl Iterator<Item = String> + use<'a> {
-        let node = (self.nodes.len() > 1).then(|| format!("on {}", module.node));
-        node.into_iter().chain(module.faces.iter().map(|face| format!("+ {face}")))
-    }
-
-    /// The edges that a drawing shows.
-    fn drawn(&self, all: bool) -> impl Iterator<Item = &Edge> {
-        self.edges.iter().filter(move |edge| all || !matches!(edge.carries, Carries::Reply | Carries::Common))
-    }
 }
 
 /// Looks at all nodes, and takes in what everybody sends.
@@ -249,28 +172,6 @@ fn look(running: &Running, nodes: &[&str], tracks: &mut [Tracks]) -> Result<(Vec
         }
     }
     Ok((surveys, silent))
-}
-
-impl Edge {
-    fn add(&mut self, other: &Self) {
-        self.packages += other.packages;
-        self.packages_per_s += other.packages_per_s;
-        self.bytes_per_s += other.bytes_per_s;
-        self.refused += other.refused;
-    }
-
-    /// What a drawing says of it.
-    fn label(&self) -> String {
-        format!("{} {}", plain::line(&self.what), self.rate())
-    }
-
-    fn rate(&self) -> String {
-        match self.packages_per_s {
-            rate if rate < 0.95 => format!("{rate:.2}/s"),
-            rate if rate < 9.5 => format!("{rate:.1}/s"),
-            rate => format!("{rate:.0}/s"),
-        }
-    }
 }
 
 /// What names and numbers mean.

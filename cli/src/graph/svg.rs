@@ -1,6 +1,6 @@
 //! The graph as a drawing. The library `layout` says where things go; this says how they look.
 
-use super::{Carries, Edge, Graph, Module};
+use super::parts::{Carries, Edge, Graph, Module};
 use layout::core::base::Orientation;
 use layout::core::color::Color;
 use layout::core::format::{ClipHandle, RenderBackend};
@@ -267,7 +267,6 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::Carries;
 
     fn graph(modules: usize, edges: &[(usize, usize)]) -> Graph {
         let module = |n: usize| Module {

@@ -1,15 +1,17 @@
 //! What the TCP router and the nodes of a system show each other, so that sessions are sealed and everyone is who he says.
 
+mod error;
 mod shown;
 mod written;
 
+use error::CertificateError;
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose,
     date_time_ymd,
 };
-use rohrpost_config::{Installation, KeysError, check_secret};
+use rohrpost_config::{Installation, check_secret};
 use rohrpost_mailbox::realtime_ns;
-use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, SealError, is_about};
+use rohrpost_routers::tcp::{AUTHORITY, Authority, Holder, PREFIX, is_about};
 pub(crate) use shown::lacking;
 pub(super) use shown::show;
 use std::fs::{self, File};
@@ -33,37 +35,6 @@ pub(crate) enum Which {
     All,
     /// The same by a new authority; the old one is kept aside.
     WithAuthority,
-}
-
-/// Why there are no certificates.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum CertificateError {
-    /// A file.
-    #[error("{0}: {1}")]
-    File(PathBuf, io::Error),
-    /// Others than its owner may read a key.
-    #[error(transparent)]
-    Open(#[from] KeysError),
-    /// The certificate of the authority.
-    #[error(transparent)]
-    Authority(#[from] SealError),
-    /// Half of the authority.
-    #[error(
-        "{certificate} is there, and {secret} is not: without it nothing can be signed. Bring it from where the authority was made; if it is lost, \
-         `rohrpost keys rotate --authority {file}` begins anew, and then the same without `--authority` for each other system of the installation",
-        certificate = .0.display(), secret = .1.display(), file = .2.display()
-    )]
-    NoKey(PathBuf, PathBuf, PathBuf),
-    /// Halves of two.
-    #[error(
-        "{secret} is not the key of {certificate}: they are of two authorities. Bring both from where one of them was made, or \
-         `rohrpost keys rotate --authority {file}` begins anew",
-        certificate = .0.display(), secret = .1.display(), file = .2.display()
-    )]
-    OtherKey(PathBuf, PathBuf, PathBuf),
-    /// What lies there is no key, or a certificate cannot be made.
-    #[error("{0}: {1}")]
-    Unfit(PathBuf, rcgen::Error),
 }
 
 /// Where they are, if the file wants any.

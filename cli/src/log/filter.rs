@@ -2,7 +2,7 @@
 
 use super::super::call;
 use super::super::target::Running;
-use super::Arguments;
+use super::arguments::Arguments;
 use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;

@@ -3,7 +3,8 @@
 use super::super::call;
 use super::super::table::table;
 use super::super::target::Running;
-use super::{Arguments, filter};
+use super::arguments::Arguments;
+use super::filter;
 use crate::terminal::{Failure, complain, say};
 use rohrpost::common::OutputLevel;
 use rohrpost::{Name, ToolLink};

@@ -5,11 +5,13 @@
 //! that is slow or stopped misses nothing that the collector still keeps, and sees what it missed.
 
 use super::super::target::Running;
-use super::{LINES_FROM, told};
 use crate::terminal::Failure;
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::output::OutputLine;
-use rohrpost::{CallError, Name, ToolLink};
+use rohrpost::{CallError, Fault, Name, ToolLink};
+
+/// Number of `lines_from` in the collector's interface.
+pub(crate) const LINES_FROM: u16 = 16;
 
 pub(super) struct Reader<'a> {
     running: &'a Running,
@@ -87,5 +89,23 @@ impl<'a> Reader<'a> {
         let said = std::mem::replace(&mut self.waiting, true);
         let why = || format!("{} Waiting for it.", told(self.running, self.collector, error));
         Ok(News { lines: Vec::new(), note: (!said).then(why), more: false })
+    }
+}
+
+/// An answer that did not come, with what to do about it.
+fn told(running: &Running, collector: Name, error: &CallError) -> String {
+    let name = running.text(collector);
+    let said = running.told(collector, error).to_string();
+    match error {
+        CallError::Fault(_, Fault::ModuleOff) => {
+            format!("the collector {name} is switched off: `rohrpost call {name} on` switches it on")
+        }
+        CallError::Timeout(..) => {
+            format!(
+                "{said} It hangs or is stopped: `rohrpost list` shows its process; if you end that, launch starts another"
+            )
+        }
+        CallError::NotSent(_) => format!("{said} It collects what modules say; `rohrpost list` shows what runs"),
+        _ => said,
     }
 }

@@ -1,6 +1,6 @@
 //! What `rohrpost net` shows of the TCP router: the clients of all nodes as they see themselves, and the server's own view.
 
-use super::Told;
+use super::told::Told;
 use crate::table::{table, time};
 use crate::target::Running;
 use crate::units::{bytes, fine};

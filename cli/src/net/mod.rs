@@ -2,16 +2,15 @@
 
 mod beyond;
 mod show;
+mod told;
 
 use super::round::{Round, Rounds};
 use super::vocabulary::Vocabulary;
 use crate::terminal::{Failure, say};
-use rohrpost::interfaces::{
-    BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, Links, RouterInterface, SlotState, TcpInterface,
-};
-use serde::Serialize;
+use rohrpost::interfaces::{RouterInterface, TcpInterface};
 use std::process::ExitCode;
 use std::time::Duration;
+use told::{Told, rates};
 
 /// Between the two looks that a rate is made of: routers tell how they are twice a second.
 const LOOK_AGAIN: Duration = Duration::from_millis(600);
@@ -31,38 +30,6 @@ exit code is 1 if a router or a client of the TCP router does not answer, a peer
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,
-}
-
-/// What a node's router says.
-#[derive(Clone, Debug, Default, Serialize)]
-struct Told {
-    node: String,
-    /// When it said so, system time.
-    time_ns: u64,
-    links: Option<Links>,
-    clock: Option<ClockState>,
-    slots: Option<SlotState>,
-    flows: Option<FlowStates>,
-    /// How its client stands with the TCP router.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    beyond: Option<BeyondLink>,
-    /// What the TCP router says, if it runs there.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    clients: Option<BeyondClients>,
-    /// Bytes and packages a second, by peer; empty at the first look.
-    rates: Vec<Rates>,
-    /// Why there is nothing.
-    failure: Option<String>,
-}
-
-/// What goes to and comes from a peer, a second.
-#[derive(Clone, Debug, Serialize)]
-struct Rates {
-    node: String,
-    sent_packages_s: f64,
-    sent_bytes_s: f64,
-    received_packages_s: f64,
-    received_bytes_s: f64,
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
@@ -132,33 +99,4 @@ fn ask_router(round: &mut Round, node: String) -> Told {
     let (clock, slots) = (clock.map(|(_, clock)| clock), slots.map(|(_, slots)| slots));
     let flows = flows.map(|(_, flows)| flows);
     Told { node, time_ns, links, clock, slots, flows, failure, ..Told::default() }
-}
-
-/// What went by between two looks; nothing if the router was started anew in between, or has not told anything new.
-fn rates(before: &Told, now: &Told) -> Vec<Rates> {
-    let (Some(old), Some(new)) = (&before.links, &now.links) else { return Vec::new() };
-    let elapsed_s = now.time_ns.saturating_sub(before.time_ns) as f64 * 1e-9;
-    if elapsed_s <= 0.0 || new.uptime_ms < old.uptime_ms {
-        return before.rates.clone();
-    }
-    let rate = |new: u64, old: u64| new.saturating_sub(old) as f64 / elapsed_s;
-    let peers = new.peers.iter().zip(&old.peers).map(|(new, old)| Rates {
-        node: new.node.clone(),
-        sent_packages_s: rate(new.sent.packages, old.sent.packages),
-        sent_bytes_s: rate(new.sent.bytes, old.sent.bytes),
-        received_packages_s: rate(new.received.packages, old.received.packages),
-        received_bytes_s: rate(new.received.bytes, old.received.bytes),
-    });
-    peers.collect()
-}
-
-impl Told {
-    /// Whether what it has of routers answers, all its peers are there, and so is the TCP router.
-    fn is_well(&self) -> bool {
-        use rohrpost::interfaces::LinkState;
-        let all_alive = |links: &Links| links.peers.iter().all(|peer| peer.state == LinkState::Alive);
-        self.failure.is_none()
-            && self.links.as_ref().is_none_or(all_alive)
-            && self.beyond.as_ref().is_none_or(|link| link.state == BeyondState::Up)
-    }
 }

@@ -1,6 +1,7 @@
 //! `rohrpost net`, for people.
 
-use super::{Told, beyond};
+use super::beyond;
+use super::told::Told;
 use crate::flows;
 use crate::slots::kept;
 use crate::table::{table, time};

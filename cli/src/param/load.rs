@@ -1,7 +1,7 @@
 //! `param load`.
 
+use super::session::{Session, find};
 use super::set::{set, told};
-use super::{Session, find};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::Name;
 use rohrpost::parameter::from_file;

@@ -1,7 +1,7 @@
 //! `param save`.
 
 use super::file::Contents;
-use super::{Session, no_parameters};
+use super::session::{Session, no_parameters};
 use crate::terminal::{Failure, complain, say};
 use std::path::Path;
 use std::process::ExitCode;

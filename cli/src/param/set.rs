@@ -1,6 +1,6 @@
 //! `param set`.
 
-use super::{Session, find};
+use super::session::{Session, find};
 use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost::common::{Change, SetParameters};

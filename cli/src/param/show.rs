@@ -1,7 +1,7 @@
 //! `param list` and `param get`.
 
 use super::super::table::table;
-use super::{Session, find, no_parameters};
+use super::session::{Session, find, no_parameters};
 use crate::terminal::{Failure, complain, say};
 use rohrpost::parameter::{Parameter, value_text};
 use rohrpost::schema::{Field, decode};

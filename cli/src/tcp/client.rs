@@ -1,7 +1,7 @@
 //! A node's client of the TCP router, as a module.
 
-use super::{NoSettings, PERIOD, called, certificates, classes, configured, levels};
-use crate::router::{faults::Encoded, impairment};
+use super::ends::{PERIOD, called, certificates, classes, configured, levels};
+use crate::router::{NoSettings, faults::Encoded, impairment};
 use rohrpost::interfaces::{BeyondLink, BeyondOutage, BeyondState, BeyondTime, Tcp, TcpInterface};
 use rohrpost::{Context, Module, ModuleError};
 use rohrpost_config::Reach;

@@ -1,7 +1,7 @@
 //! The TCP router, as a module.
 
-use super::{NoSettings, PERIOD, called, certificates, classes, configured, levels, short};
-use crate::router::faults::Encoded;
+use super::ends::{PERIOD, called, certificates, classes, configured, levels, short};
+use crate::router::{NoSettings, faults::Encoded};
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, Tcp, TcpInterface};
 use rohrpost::{Context, Module, ModuleError, Name};
 use rohrpost_config::Node;
@@ -124,7 +124,7 @@ fn client(member: Member) -> BeyondClient {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tcp::NAME_BYTES_MAX;
+    use crate::tcp::ends::NAME_BYTES_MAX;
     use rohrpost::interfaces::{CarriedLoss, ClassPassed};
     use rohrpost::macro_support::append;
     use rohrpost_routers::session::Cause;

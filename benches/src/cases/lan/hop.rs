@@ -1,6 +1,6 @@
 //! How long a package takes from a module on one node to a module on another, one at a time; everybody sleeps who waits.
 
-use super::{Ground, WHOLE};
+use super::ground::{ETHERNET, Ground, WHOLE};
 use crate::cases::Case;
 use crate::harness::{Cell, Failure, time_two_processes};
 use crate::lan::chain::{time_chain, time_mailbox_chain};
@@ -14,8 +14,6 @@ use std::time::Duration;
 const MESSAGES_PACED: usize = 1_000;
 /// A package each so often, as robots send.
 const PACE: Duration = Duration::from_micros(500);
-/// What a network of today has.
-pub(super) const ETHERNET: u16 = 1_500;
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {

@@ -9,7 +9,7 @@
 //! `junk`: from an address that no node has; `junk of a peer`: from that of the near node, as an attacker may write it on what it sends. The floor of each: a
 //! bare hop by UDP under the same junk, to ports that nobody reads. It tells what the junk costs the computer that carries it, whoever is its target.
 
-use super::{Ground, hop::ETHERNET};
+use super::ground::{ETHERNET, Ground};
 use crate::cases::Case;
 use crate::harness::{Cell, End, Failure, time_two_processes};
 use crate::lan::Wire;

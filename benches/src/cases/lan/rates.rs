@@ -11,7 +11,7 @@
 //! Two nodes share two processors here, so the sending router has one for itself, as the raw sender has. With the sending module on
 //! that one, too, and below its router as launch schedules it, each package costs two changes of process: that is told beside.
 
-use super::{Ground, WHOLE};
+use super::ground::{Ground, WHOLE};
 use crate::cases::Case;
 use crate::harness::{End, Failure};
 use crate::lan::ends::{Sink, Source};

@@ -1,7 +1,6 @@
 //! What it costs that datagrams are sealed: the hop with keys beside the same without, turn by turn.
 
-use super::Ground;
-use super::hop::ETHERNET;
+use super::ground::{ETHERNET, Ground};
 use crate::cases::Case;
 use crate::harness::{Cell, Failure, time_two_processes};
 use crate::lan::ends::Module;

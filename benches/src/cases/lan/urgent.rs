@@ -16,7 +16,7 @@
 //!
 //! The floor, `udp`: sockets in the modules themselves, the flood from one of its own to one of its own, as fast as the routers may send.
 
-use super::Ground;
+use super::ground::Ground;
 use crate::cases::Case;
 use crate::harness::{
     Cell, Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,

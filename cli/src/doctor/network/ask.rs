@@ -1,6 +1,6 @@
 //! Asks this computer how it is joined to the other nodes. Each peer is sent one empty datagram, which a router takes for nobody's.
 
-use super::{Lan, Peer, Port, PortState, Reach, Stamps};
+use crate::doctor::lan::{Lan, Peer, Port, PortState, Reach, Stamps};
 use nix::errno::Errno;
 use nix::ifaddrs::getifaddrs;
 use nix::net::if_::InterfaceFlags;

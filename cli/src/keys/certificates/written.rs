@@ -1,6 +1,6 @@
 //! Files that belong together: all are whole on the disk before the first has its name.
 
-use super::CertificateError;
+use super::error::CertificateError;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;

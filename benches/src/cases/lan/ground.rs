@@ -1,0 +1,46 @@
+//! What the turns of a case happen on: a network of its own, and two nodes with their routers.
+
+use crate::harness::Failure;
+use crate::lan::Wire;
+use crate::lan::nodes::{Network, Nodes};
+use crate::settings::Settings;
+use std::cell::Cell as Counter;
+
+/// As large as a datagram can be, so that none is parted.
+pub(super) const WHOLE: u16 = u16::MAX;
+/// What a network of today has.
+pub(super) const ETHERNET: u16 = 1_500;
+
+/// What all turns of a case happen on.
+pub(super) struct Ground {
+    /// None where there may be no namespaces.
+    wire: Result<Wire, Failure>,
+    /// None where there is no command, or it does not start: then ours has no figure, and the floors still have.
+    nodes: Result<Nodes, Failure>,
+    turns: Counter<u8>,
+}
+
+impl Ground {
+    /// Makes the network and starts the routers.
+    pub(super) fn new(settings: &Settings, network: &Network) -> Self {
+        Self::on(settings, network, Wire::new(network.mtu))
+    }
+
+    /// The same on a network that is there.
+    pub(super) fn on(settings: &Settings, network: &Network, wire: Result<Wire, Failure>) -> Self {
+        let nodes =
+            wire.as_ref().map_err(Clone::clone).and_then(|wire| Nodes::start(wire, network, settings.command()));
+        Self { wire, nodes, turns: Counter::new(0) }
+    }
+
+    pub(super) fn wire(&self) -> Result<&Wire, Failure> {
+        self.wire.as_ref().map_err(Clone::clone)
+    }
+
+    /// For a turn of ours: the nodes, and its number.
+    pub(super) fn turn(&self) -> Result<(&Nodes, u8), Failure> {
+        let turn = self.turns.get();
+        self.turns.set(turn.wrapping_add(1));
+        Ok((self.nodes.as_ref().map_err(Clone::clone)?, turn))
+    }
+}

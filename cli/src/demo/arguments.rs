@@ -1,0 +1,66 @@
+//! What the command line says of a demo.
+
+use rohrpost_routers::impair;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost demo                            a simulated robot drives and maps until Ctrl-C
+  rohrpost demo --seconds 20
+  rohrpost demo --log run.log.gz --speed 10
+  rohrpost demo --nodes 3 --seconds 30 --impair loss=5%,delay=2ms,reorder=5%
+  rohrpost demo --nodes 3 --secure --seconds 30
+  rohrpost demo --nodes 3 --gui tcp --secure --seconds 30
+  rohrpost demo --nodes 3 --tdma --seconds 30
+  rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
+Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) of the present folder if there is one, else its own copy.")]
+pub(crate) struct Arguments {
+    /// End by itself after so many seconds.
+    #[arg(long, value_name = "SECONDS")]
+    pub(super) seconds: Option<f64>,
+    /// Play this CARMEN log (also gzipped) instead of simulating.
+    #[arg(long, value_name = "FILE")]
+    pub(super) log: Option<PathBuf>,
+    /// Times the speed at which the log was recorded.
+    #[arg(long, default_value_t = 10.0, value_name = "X", requires = "log")]
+    pub(super) speed: f64,
+    /// Over so many computers, each a network namespace of this one.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..), conflicts_with = "log")]
+    pub(super) nodes: Option<u8>,
+    /// The nodes send in time slots, each in its own.
+    #[arg(long, requires = "nodes", conflicts_with = "config")]
+    pub(super) tdma: bool,
+    /// How the node with the GUI is joined to the robot: on its LAN, or through the TCP router alone. With `tcp` and --seconds the TCP router
+    /// is killed in the middle of the run (SIGKILL); launch starts it again.
+    #[arg(long, value_enum, default_value = "lan", requires = "nodes", conflicts_with = "tdma")]
+    pub(super) gui: Joined,
+    /// What passes between the nodes is sealed, with keys and certificates that are made for this run.
+    #[arg(long, requires = "nodes")]
+    pub(super) secure: bool,
+    /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch starts it again.
+    #[arg(long, requires_all = ["nodes", "seconds"])]
+    pub(super) kill_master: bool,
+    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. To nodes that are reached by TCP alone
+    /// what is lost is a delay, for all that is behind it.
+    #[arg(long, value_name = "TEXT", requires = "nodes")]
+    pub(super) impair: Option<impair::Settings>,
+    /// Another configuration.
+    #[arg(long, value_name = "FILE", conflicts_with = "log")]
+    pub(super) config: Option<PathBuf>,
+    /// Show it live in the Rerun viewer, if one is installed, instead of writing a file.
+    #[arg(long)]
+    pub(super) viewer: bool,
+    /// Leave the GUI out.
+    #[arg(long, conflicts_with = "viewer")]
+    pub(super) no_gui: bool,
+    /// No live table, only what happens.
+    #[arg(long)]
+    pub(super) quiet: bool,
+}
+
+/// How a node is joined to the others.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Joined {
+    Lan,
+    Tcp,
+}

@@ -1,0 +1,107 @@
+//! The parts of a graph: modules, and edges with what they carry.
+
+use crate::sight::Silence;
+use rohrpost::output::plain;
+use rohrpost::survey::Standing;
+use serde::Serialize;
+
+/// Modules, and what goes from one to another.
+#[derive(Serialize)]
+pub(super) struct Graph {
+    pub(super) installation: String,
+    /// The node that the tool looked from.
+    pub(super) node: String,
+    /// Those that are shown.
+    pub(super) nodes: Vec<String>,
+    /// Those of them that do not answer.
+    pub(super) silent: Vec<Silence>,
+    /// What rates are measured over.
+    pub(super) interval_s: f64,
+    pub(super) modules: Vec<Module>,
+    pub(super) edges: Vec<Edge>,
+}
+
+#[derive(Serialize)]
+pub(super) struct Module {
+    pub(super) module: String,
+    pub(super) node: String,
+    pub(super) faces: Vec<String>,
+    pub(super) state: String,
+    pub(super) priority: u8,
+    /// It need not run.
+    #[serde(skip)]
+    pub(super) is_left_out: bool,
+}
+
+impl Module {
+    /// Whether nothing of it runs that one could see. What sends from outside the configuration has no standing.
+    pub(super) fn is_down(&self) -> bool {
+        let down = [Standing::Stopped, Standing::Unreachable];
+        down.iter().any(|standing| standing.word() == self.state)
+    }
+}
+
+/// What an edge carries.
+#[derive(Serialize, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Carries {
+    Data,
+    Command,
+    /// A command that every module understands.
+    Common,
+    Reply,
+    Output,
+}
+
+#[derive(Serialize)]
+pub(super) struct Edge {
+    pub(super) from: String,
+    pub(super) to: String,
+    pub(super) carries: Carries,
+    pub(super) what: String,
+    pub(super) packages: u64,
+    pub(super) packages_per_s: f64,
+    pub(super) bytes_per_s: f64,
+    pub(super) refused: u64,
+}
+
+impl Graph {
+    /// What a drawing is of.
+    pub(super) fn title(&self) -> String {
+        let word = if self.nodes.len() == 1 { "node" } else { "nodes" };
+        format!("{word} {} of {}", self.nodes.join(", "), self.installation)
+    }
+
+    /// What stands below a module's name: its node if there are several, its faces.
+    pub(super) fn below<'a>(&'a self, module: &'a Module) -> impl Iterator<Item = String> + use<'a> {
+        let node = (self.nodes.len() > 1).then(|| format!("on {}", module.node));
+        node.into_iter().chain(module.faces.iter().map(|face| format!("+ {face}")))
+    }
+
+    /// The edges that a drawing shows.
+    pub(super) fn drawn(&self, all: bool) -> impl Iterator<Item = &Edge> {
+        self.edges.iter().filter(move |edge| all || !matches!(edge.carries, Carries::Reply | Carries::Common))
+    }
+}
+
+impl Edge {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.packages += other.packages;
+        self.packages_per_s += other.packages_per_s;
+        self.bytes_per_s += other.bytes_per_s;
+        self.refused += other.refused;
+    }
+
+    /// What a drawing says of it.
+    pub(super) fn label(&self) -> String {
+        format!("{} {}", plain::line(&self.what), self.rate())
+    }
+
+    pub(super) fn rate(&self) -> String {
+        match self.packages_per_s {
+            rate if rate < 0.95 => format!("{rate:.2}/s"),
+            rate if rate < 9.5 => format!("{rate:.1}/s"),
+            rate => format!("{rate:.0}/s"),
+        }
+    }
+}

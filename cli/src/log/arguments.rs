@@ -1,0 +1,60 @@
+//! What the command line says of lines and levels.
+
+use crate::target::Target;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost log                           what was said so far
+  rohrpost log --follow                  and what is said from now on
+  rohrpost log --level warn              only warnings and errors
+  rohrpost log --module pilot.0 --text wall --since '5 min'
+  rohrpost log --level pilot.0=debug     makes pilot.0 say more; with --follow, and shows it
+  rohrpost log --level laser=error       makes all lasers say errors only
+  rohrpost log --levels                  from which level on each module speaks")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// Go on with new lines until Ctrl-C.
+    #[arg(long, short)]
+    pub(super) follow: bool,
+    /// LEVEL: only lines as important as this: error, warn, info, debug, trace. NAME=LEVEL: set from which level on this
+    /// module, or each of this class, speaks, until it starts anew.
+    #[arg(long, value_name = "LEVEL|NAME=LEVEL")]
+    pub(super) level: Vec<String>,
+    /// List from which level on each module speaks.
+    #[arg(long, conflicts_with_all = ["follow", "level"])]
+    pub(super) levels: bool,
+    /// Only lines of this module; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    pub(super) module: Vec<String>,
+    /// Only lines of modules of this class; may be given several times.
+    #[arg(long, value_name = "CLASS")]
+    pub(super) class: Vec<String>,
+    /// Only lines that contain this, in small or capital letters.
+    #[arg(long)]
+    pub(super) text: Option<String>,
+    /// Only lines of the last while, such as '5 min'.
+    #[arg(long, value_name = "DURATION")]
+    pub(super) since: Option<String>,
+    /// Only the last lines, so many.
+    #[arg(long, short = 'n', value_name = "COUNT")]
+    pub(super) last: Option<usize>,
+    /// Wait so long for each answer, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    pub(super) timeout: f64,
+    /// One JSON object a line.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+impl Arguments {
+    /// Whether something here says which lines to show.
+    pub(super) fn chooses_lines(&self) -> bool {
+        let level = self.level.iter().any(|level| !level.contains('='));
+        level
+            || !(self.module.is_empty() && self.class.is_empty())
+            || self.text.is_some()
+            || self.since.is_some()
+            || self.last.is_some()
+    }
+}

@@ -1,0 +1,174 @@
+//! How tools look at nodes and at their modules: at their own node in its shared memory, at others by way of their launches. Nothing waits
+//! longer than [`PATIENCE`]; a node that does not answer is silent, and that is told.
+
+use crate::sight::{PATIENCE, Silence, silence};
+use crate::target::Running;
+use crate::terminal::Failure;
+use rohrpost::ToolLink;
+use rohrpost::common::GET_DATA;
+use rohrpost::description::noted;
+use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
+use rohrpost::launcher::{Look, launcher_of};
+use rohrpost::macro_support::{DataPort, append, from_bytes};
+use rohrpost::schema::Description;
+use rohrpost::serde::de::DeserializeOwned;
+use rohrpost::survey::{MailboxLook, Scope, Seen, Survey, look_at_all};
+use rohrpost_mailbox::{InspectError, Name};
+
+impl Running {
+    /// Looks at these nodes: at all of them at the same time. In their order: what each shows, or why it does not.
+    pub(super) fn look_at(&self, nodes: &[&str], scope: Scope) -> Result<Vec<Result<Survey, Silence>>, Failure> {
+        let others: Vec<&str> = nodes.iter().copied().filter(|node| *node != self.node_name).collect();
+        let launchers: Vec<Name> = others.iter().filter_map(|node| launcher_of(&self.installation, node)).collect();
+        let seen = match &launchers[..] {
+            [] => Vec::new(),
+            launchers => self.ask(|tool| look_at_all(&mut tool.link, launchers, Look::Survey(scope), PATIENCE))?,
+        };
+        let mut seen = seen.into_iter();
+        let look = |node: &&str| {
+            if *node == self.node_name {
+                let mut survey = Survey::within(scope, &self.node, &self.installation, node)?;
+                survey.ask_kernel();
+                return Ok(Ok(survey));
+            }
+            Ok(match seen.next() {
+                Some(Ok(Seen::Survey(survey))) => Ok(*survey),
+                Some(Err(failure)) => Err(silence(&self.installation, node, &failure)),
+                Some(Ok(Seen::Mailbox(_))) | None => Err(Silence::new(node, "it was not asked")),
+            })
+        };
+        nodes.iter().map(look).collect()
+    }
+
+    /// Looks at one node.
+    pub(super) fn look(&self, node: &str, scope: Scope) -> Result<Survey, Failure> {
+        match self.look_at(&[node], scope)?.pop() {
+            Some(seen) => seen.map_err(|silence| silence.text().into()),
+            None => Err(format!("no node `{node}`").into()),
+        }
+    }
+
+    /// Looks at all nodes that are meant, and makes one survey of them; of those that are silent, the modules that they should have.
+    pub(super) fn survey(&self, scope: Scope) -> Result<(Survey, Vec<Silence>), Failure> {
+        let mut silent = Vec::new();
+        let mut surveys = Vec::new();
+        for seen in self.look_at(&self.shown(), scope)? {
+            match seen {
+                Ok(survey) => surveys.push(survey),
+                Err(silence) => silent.push(silence),
+            }
+        }
+        self.add_since(&mut silent);
+        let names: Vec<&str> = silent.iter().map(|silence| silence.node.as_str()).collect();
+        Ok((Survey::joined(surveys, &names, &self.installation), silent))
+    }
+
+    /// Since when nodes are silent, if the own router knows it.
+    fn add_since(&self, silent: &mut [Silence]) {
+        if silent.is_empty() {
+            return;
+        }
+        let Some(links) = self.links() else { return };
+        for silence in silent {
+            let link = links.peers.iter().find(|link| link.node == silence.node);
+            let quiet = link.filter(|link| link.state != LinkState::Alive).and_then(|link| link.heard_ms);
+            silence.silent_s = quiet.map(|heard_ms| heard_ms as f64 / 1e3);
+        }
+    }
+
+    /// What the own node's router says of its links; none without a router that answers.
+    fn links(&self) -> Option<Links> {
+        let router = self.installation.router_of(&self.node_name)?;
+        self.newest(router, RouterInterface::LINKS).ok()
+    }
+
+    /// The newest value of data that a module publishes.
+    fn newest<T: DeserializeOwned>(&self, module: Name, port: DataPort<T>) -> Result<T, Failure> {
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
+        let told = self.ask(|tool| tool.call(module, GET_DATA, (port.hash)(), write, read))?;
+        told.map(|(_, value)| value).map_err(|error| self.told(module, &error))
+    }
+
+    /// What is registered at the TCP router, or why it is not known; none without `[tcp]`.
+    pub(super) fn hosts_beyond(&self) -> Option<Result<BeyondHosts, Failure>> {
+        if let Some(own) = self.installation.tcp_router() {
+            return Some(self.newest(own, TcpInterface::HOSTS));
+        }
+        let elsewhere = self.installation.tcp_router_elsewhere()?;
+        // Of a package to all systems nobody says that it did not arrive, and only the time would tell.
+        let told = self.takes_part().and_then(|()| self.newest(elsewhere, TcpInterface::HOSTS));
+        Some(told.map_err(|error| format!("{error}; `rohrpost list` in the system that runs it shows them").into()))
+    }
+
+    /// Whether the TCP router says that somebody hosts this name.
+    pub(super) fn is_hosted_beyond(&self, module: Name) -> bool {
+        let Some(Ok(hosts)) = self.hosts_beyond() else { return false };
+        hosts.hosts.iter().any(|host| (host.first..=host.last).contains(&module.raw()))
+    }
+
+    /// Whether this node takes part at the TCP router, or why not.
+    fn takes_part(&self) -> Result<(), Failure> {
+        let Some(client) = self.installation.tcp_client_of(&self.node_name) else { return Ok(()) };
+        let link = self.newest(client, TcpInterface::LINK)?;
+        match link.state {
+            BeyondState::Up => Ok(()),
+            _ if link.why.is_empty() => Err(format!("node {} is not connected yet", link.node).into()),
+            _ => Err(link.why.into()),
+        }
+    }
+
+    /// The modules of all nodes that are meant, but for those that need not run; with why, those that cannot be asked.
+    pub(super) fn modules_to_ask(&self) -> Result<Vec<(Name, Option<Silence>)>, Failure> {
+        let (survey, silent) = self.survey(Scope::Modules)?;
+        let all = survey.modules.iter().filter(|module| !module.is_left_out(&self.installation));
+        let why = |node: &str| silent.iter().find(|silence| silence.node == node).cloned();
+        Ok(all.map(|module| (module.name, why(&module.node))).collect())
+    }
+
+    /// Looks at a mailbox, on whichever node it is; none when that has none of this name.
+    pub(super) fn inspect(&self, name: Name) -> Result<Option<MailboxLook>, Failure> {
+        let node = self.node_of(name);
+        if node == self.node_name {
+            return match MailboxLook::new(&self.node, name) {
+                Ok(look) => Ok(Some(look)),
+                Err(InspectError::Missing(_)) => Ok(None),
+                Err(error @ InspectError::Bad(..)) => Err(self.told(name, &error)),
+            };
+        }
+        let launchers: Vec<Name> = launcher_of(&self.installation, node).into_iter().collect();
+        let what = Look::Mailbox(name.raw());
+        let seen = self.ask(|tool| look_at_all(&mut tool.link, &launchers, what, PATIENCE))?.pop();
+        match seen {
+            Some(Ok(Seen::Mailbox(look))) => Ok(look.map(|look| *look)),
+            Some(Err(failure)) => Err(silence(&self.installation, node, &failure).text().into()),
+            Some(Ok(Seen::Survey(_))) | None => Err(format!("node {node} showed something else").into()),
+        }
+    }
+
+    /// What a module offers: as it noted beside its mailboxes, so that it is not asked; on another node it has to be.
+    pub(super) fn describe(&self, module: Name) -> Result<Description, Failure> {
+        if self.is_own(module) {
+            return noted(&self.node, module).ok_or_else(|| self.absent(module));
+        }
+        let described = self.ask(|tool| tool.describe(module))?;
+        described.map_err(|error| self.told(module, &error))
+    }
+
+    /// The module or face that a user names, or a program run by hand: one of the configuration, with mailboxes here, of another system,
+    /// or of this one and registered at the TCP router.
+    pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
+        let module = self.installation.classes.parse_name(text)?.module();
+        let is_other = self.is_beyond(module) && module.system() != self.installation.system.id;
+        if is_other || self.is_known(module) || self.is_here(module) || self.is_hosted_beyond(module) {
+            return Ok(module);
+        }
+        let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
+        Err(format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into())
+    }
+
+    /// Asks from the tool's place on its own node.
+    fn ask<T>(&self, ask: impl FnOnce(&mut ToolLink) -> T) -> Result<T, Failure> {
+        self.sight.with(|| self.join(PATIENCE), ask)
+    }
+}

@@ -1,0 +1,63 @@
+//! What the TCP router and its clients have in common as modules.
+
+use rohrpost::ModuleError;
+use rohrpost::interfaces::{CarriedLoss, ClassPassed};
+use rohrpost_config::{Installation, Tcp};
+use rohrpost_mailbox::Priority;
+use rohrpost_routers::tcp::Class;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How often they tell how they are.
+pub(super) const PERIOD: Duration = Duration::from_millis(500);
+/// Bytes of a name that sessions take.
+pub(super) const NAME_BYTES_MAX: usize = rohrpost_routers::session::frame::NAME_BYTES_MAX;
+
+/// The section `[tcp]`.
+pub(super) fn configured(installation: &Installation) -> Result<&Tcp, ModuleError> {
+    installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))
+}
+
+/// The folder of the certificates; without one nothing is sealed, and that is said.
+pub(super) fn certificates(installation: &Installation, tcp: &Tcp) -> Option<PathBuf> {
+    if tcp.certificates.is_none() {
+        tracing::warn!("{}", Tcp::UNPROTECTED);
+    }
+    tcp.certificates.as_ref().map(|folder| installation.resolve(folder))
+}
+
+/// The level of each priority.
+pub(super) fn levels(tcp: &Tcp) -> [u8; 256] {
+    std::array::from_fn(|priority| tcp.level(Priority(priority as u8)))
+}
+
+/// What a node's client calls itself at the TCP router.
+pub(super) fn called(node: &str, installation: &Installation) -> String {
+    short(&format!("node {node} of {}", installation.system.name))
+}
+
+/// A name for people, no longer than sessions take it.
+pub(super) fn short(name: &str) -> String {
+    let printable = || name.chars().filter(|c| !c.is_control());
+    let ends = printable().scan(0, |end, c| {
+        *end += c.len_utf8();
+        Some(*end)
+    });
+    printable().take(ends.take_while(|end| *end <= NAME_BYTES_MAX).count()).collect()
+}
+
+/// What was counted of each class, as it is told.
+pub(super) fn classes(all: &[Class]) -> Vec<ClassPassed> {
+    let class = |class: &Class| ClassPassed {
+        class: class.priority.0,
+        packages: class.packages,
+        passed: class.passed,
+        replaced: class.replaced,
+        lost: class
+            .lost
+            .iter()
+            .map(|(cause, packages)| CarriedLoss { cause: cause.word().into(), packages: *packages })
+            .collect(),
+    };
+    all.iter().map(class).collect()
+}
