@@ -97,6 +97,13 @@ pub trait Schema {
     fn schema() -> Type;
 }
 
+impl Type {
+    /// Whether it is the type that `T` describes; texts and ranges may differ.
+    pub fn is<T: Schema>(&self) -> bool {
+        self.bare_bytes() == T::schema().bare_bytes()
+    }
+}
+
 /// [`Schema::LEVELS`] of what has these inside.
 #[doc(hidden)]
 pub const fn deeper(inner: &[usize]) -> usize {

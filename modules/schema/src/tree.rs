@@ -1,6 +1,6 @@
 //! What types are made of.
 
-use crate::{Schema, decode};
+use crate::decode;
 use serde::Serialize;
 
 /// What a value is, and how its bytes are to be read.
@@ -184,10 +184,5 @@ impl Type {
     /// A list of these.
     pub fn list(element: Self) -> Self {
         Self::List(Box::new(element))
-    }
-
-    /// Whether it is the type that `T` describes; texts and ranges may differ.
-    pub fn is<T: Schema>(&self) -> bool {
-        self.bare_bytes() == T::schema().bare_bytes()
     }
 }
