@@ -16,7 +16,6 @@ use rerun::blueprint::{ContainerLike, Spatial2DView, TimeSeriesView, Vertical};
 use rerun::{Boxes2D, LineStrips2D, Points2D};
 use rohrpost::interfaces::{FlowState, FlowStates, SlotState, SlotUse};
 use rohrpost::schema::{DataItem, Description};
-use rohrpost_config::{Flow, Installation, Tdma, duration_decimal};
 use rohrpost_config::{Flow, Installation, duration_decimal};
 use rohrpost_network::Tdma;
 use std::collections::HashMap;
