@@ -90,23 +90,66 @@ fn who_writes_a_module_compiles_no_tool() {
     }
 }
 
+fn manifest(folder: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder).join("Cargo.toml");
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Folders of all packages, the root's `.` first.
+fn packages() -> Vec<String> {
+    let workspace = manifest(".");
+    let members = workspace.split_once("members = [").unwrap().1.split_once(']').unwrap().0;
+    let members = members.split('"').skip(1).step_by(2);
+    [".".to_owned()].into_iter().chain(members.map(String::from)).collect()
+}
+
+/// Names of packages in a section.
+fn named(manifest: &str, section: &str) -> Vec<String> {
+    let lines = manifest.lines().skip_while(|line| *line != section).skip(1).take_while(|line| !line.starts_with('['));
+    lines.filter_map(|line| line.split(['.', ' ', '=']).next()).map(String::from).collect()
+}
+
+#[test]
+fn the_picture_of_the_crates_is_what_their_manifests_say() {
+    let manifests: BTreeMap<String, String> =
+        packages().into_iter().map(|folder| (folder.clone(), manifest(&folder))).collect();
+    let name = |manifest: &str| {
+        let line = manifest.split_once("[package]\nname = \"").unwrap().1;
+        line.split('"').next().unwrap().to_owned()
+    };
+    let folders: BTreeMap<String, &String> =
+        manifests.iter().map(|(folder, manifest)| (name(manifest), folder)).collect();
+    let arrows = manifests.iter().map(|(folder, manifest)| {
+        let needed =
+            named(manifest, "[dependencies]").into_iter().filter_map(|name| Some((*folders.get(&name)?).clone()));
+        (folder.clone(), needed.collect::<BTreeSet<_>>())
+    });
+    // Proofs compile the slot core itself, and need none of us.
+    let said: BTreeMap<_, _> = arrows.filter(|(folder, _)| !folder.starts_with("mailbox/proof")).collect();
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md")).unwrap();
+    let picture = page.split_once("```text\nmailbox\n").unwrap().1.split_once("```").unwrap().0;
+    let drawn = ["mailbox"].into_iter().chain(picture.lines()).map(|line| {
+        let (from, to) = line.split_once("─▶").unwrap_or((line, ""));
+        let to = to.trim().split("  ").next().unwrap_or_default();
+        let to = to.split(", ").filter(|to| !to.is_empty()).map(String::from);
+        (from.trim().to_owned(), to.collect::<BTreeSet<_>>())
+    });
+    assert_eq!(drawn.collect::<BTreeMap<_, _>>(), said, "left: ARCHITECTURE.md, right: the manifests");
+}
+
 /// What `Cargo.toml` says of a package is true, and said of each that others may have.
 #[test]
 fn each_package_says_what_it_is() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let text = |path: &Path| std::fs::read_to_string(path.join("Cargo.toml")).unwrap();
-    let workspace = text(root);
-    let members = workspace.split_once("members = [").unwrap().1.split_once(']').unwrap().0;
-    let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
-    assert!(members.len() > 10, "{members:?}");
-    for member in [""].iter().chain(&members) {
-        let manifest = text(&root.join(member));
+    let all = packages();
+    assert!(all.len() > 10, "{all:?}");
+    for folder in all {
+        let manifest = manifest(&folder);
         let package = manifest.split_once("[package]").unwrap().1;
         let is_ours_alone = manifest.contains("\npublish = false");
         let keys = ["name", "description", "version", "license", "rust-version"];
         for key in keys.into_iter().filter(|_| !is_ours_alone) {
-            assert!(package.contains(&format!("\n{key}")), "{member}/Cargo.toml has no `{key}`");
+            assert!(package.contains(&format!("\n{key}")), "{folder}/Cargo.toml has no `{key}`");
         }
-        assert!(!manifest.contains("example."), "{member}/Cargo.toml names a place that there is not");
+        assert!(!manifest.contains("example."), "{folder}/Cargo.toml names a place that there is not");
     }
 }
