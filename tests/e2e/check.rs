@@ -117,7 +117,7 @@ fn what_a_file_means_can_be_read_by_programs() {
     let number = |module: &serde_json::Value| module["number"].as_u64().unwrap();
     let system = installation["system"]["id"].as_u64().unwrap();
     assert_eq!(number(motor), system << 24 | motor["priority"].as_u64().unwrap() << 16);
-    assert_eq!((&motor["required"], &motor["optional"]), (&false.into(), &false.into()));
+    assert_eq!((&motor["required"], &motor["optional"]), (&true.into(), &false.into()));
     // The opposite of what it says of itself.
     std::fs::write(place.path("sealed.toml"), full.replace("security = \"none\"", "security = \"keys\"")).unwrap();
     let json_of_sealed = place.say(&["check", "sealed.toml", "--json"]).json();
