@@ -163,7 +163,8 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
         assert!(pids.len() >= 3, "{list}");
         // Told to end before launch knows that all are, it would be a start that failed.
-        let robot = place.robot_at(Path::new(if log { "config/demo-log.toml" } else { "config/demo.toml" }), "main");
+        let robot =
+            place.robot_at(Path::new(if log { "../config/demo-log.toml" } else { "../config/demo.toml" }), "main");
         let launcher = launcher_of(&robot.installation, "main").unwrap();
         wait("launch has switched all on", || {
             let children = robot.tool(PATIENCE).children(launcher).ok()?;
