@@ -107,16 +107,9 @@ fn every_panic_arrives_with_its_place_and_message() {
     let restart = "restart = { backoff = \"50 ms\", at-most = 9 }";
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", restart)]);
     for (how, ends, words) in [
-        ("thread", false, &[("thread `wheels` panicked at tests/e2e/probe.rs:", ":\nthe wheels came off")][..]),
-        ("here", true, &[("panicked at tests/e2e/probe.rs:", ":\ntwo lines\nof a panic")]),
-        (
-            "twice",
-            true,
-            &[
-                ("panicked at tests/e2e/probe.rs:", ":\nthe first of two"),
-                ("panicked at tests/e2e/probe.rs:", ":\nthe second of two"),
-            ],
-        ),
+        ("thread", false, &[("thread `wheels` panicked at ", ":\nthe wheels came off")][..]),
+        ("here", true, &[("panicked at ", ":\ntwo lines\nof a panic")]),
+        ("twice", true, &[("panicked at ", ":\nthe first of two"), ("panicked at ", ":\nthe second of two")]),
     ] {
         let pid = robot.pid("probe.0");
         let panicking = Running::start(place.command(&["call", "--timeout", "60", "probe.0", "panic", how]));
@@ -124,7 +117,7 @@ fn every_panic_arrives_with_its_place_and_message() {
             let line = wait(format!("{how}: {begin} … {end}"), || {
                 let has = |line: &Value| {
                     let text = line["text"].as_str().unwrap();
-                    text.contains(begin) && text.ends_with(end)
+                    text.contains(&format!("{begin}{}:", crate::probe::FILE)) && text.ends_with(end)
                 };
                 lines(&place, "probe.0").into_iter().find(has)
             });

@@ -2,6 +2,7 @@
 
 use crate::harness::{OUTPUT, Place, probe, signal, wait};
 use crate::output::{call, lines};
+use crate::probe::FILE;
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use serde_json::Value;
@@ -69,14 +70,14 @@ fn a_panic_comes_once_and_its_back_trace_with_it() {
     });
     let panics = errors.iter().filter(|text| text.contains("two lines"));
     assert_eq!(panics.count(), 1, "{errors:#?}");
-    let is_trace = |text: &str| text.contains("/tests/e2e/probe.rs:") && !text.contains("panicked");
+    let is_trace = |text: &str| text.contains(&format!("/{FILE}:")) && !text.contains("panicked");
     let all = lines(&place, "probe.0");
     assert!(
         all.iter().all(|line| !is_trace(line["text"].as_str().unwrap())),
         "where it came from is no output: {all:#?}"
     );
     let out = launch.stop();
-    assert!(out.contains("error thread `probe::module` panicked at tests/e2e/probe.rs:"), "{out}");
+    assert!(out.contains(&format!("error thread `probe::module` panicked at {FILE}:")), "{out}");
     assert!(out.lines().any(is_trace), "{out}");
     assert!(!out.contains(['\u{1d}', '\u{1e}']), "marks are for launch only: {out:?}");
 }
@@ -149,7 +150,7 @@ fn the_back_trace_of_a_panic_that_comes_again_and_again_is_told_once_with_the_ow
     assert_eq!(said.code, Some(1), "{said:?}");
     let all = said.out + &said.err;
     let count = |text: &str| all.lines().filter(|line| line.contains(text)).count();
-    assert!(count("panicked at tests/e2e/probe.rs:") >= 4, "each end says why: {all}");
+    assert!(count(&format!("panicked at {FILE}:")) >= 4, "each end says why: {all}");
     let place_of_panic = all.lines().find_map(|line| line.split("panicked at ").nth(1)).unwrap();
     let traced = format!("/{}", place_of_panic.trim_end_matches(':'));
     assert_eq!(count(&traced), 1, "{traced} in {all}");

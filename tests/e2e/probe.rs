@@ -27,6 +27,9 @@ fn module() {
     }
 }
 
+/// This file as panics name it.
+pub(crate) const FILE: &str = file!();
+
 /// Numbers of its functions, for commands without a proxy.
 pub(crate) const COUNT: u16 = 16;
 pub(crate) const COUNT_AGAIN: u16 = 17;
