@@ -110,6 +110,11 @@ pub fn describe_type(ty: &Type) -> String {
     described(ty, 0)
 }
 
+/// A name as it may stand among others; somebody else has given it, and it may be empty.
+fn shown(name: &str) -> String {
+    if name.is_empty() { "\"\"".into() } else { name.escape_debug().to_string() }
+}
+
 /// Structs, lists and variants inside each other that are shown, and members of each.
 const LEVELS: usize = 4;
 const MEMBERS: usize = 12;
@@ -140,9 +145,10 @@ fn described(ty: &Type, level: usize) -> String {
         Type::Map(key, value) if is_word(key) => format!("{{<{}>: {}}}", inner(key), inner(value)),
         Type::Map(key, value) => format!("[[{}, {}]]", inner(key), inner(value)),
         Type::Struct(named) => described_members(&named.members, level),
+        Type::Enum { variants, .. } if variants.is_empty() => "(no value)".into(),
         Type::Enum { variants, .. } => joined(variants, "|", |variant| match variant.members {
-            Members::None => variant.name.escape_debug().to_string(),
-            _ => format!("{{{}: {}}}", variant.name.escape_debug(), described_members(&variant.members, level)),
+            Members::None => shown(&variant.name),
+            _ => format!("{{{}: {}}}", shown(&variant.name), described_members(&variant.members, level)),
         }),
         _ => "…".into(),
     }
@@ -163,7 +169,7 @@ fn described_members(members: &Members, level: usize) -> String {
         Members::One(field) => described(&field.ty, level + 1),
         Members::Tuple(fields) => described_tuple(&fields.iter().map(|field| &field.ty).collect::<Vec<_>>(), level),
         Members::Fields(fields) => {
-            let field = |field: &Field| format!("{}: {}", field.name.escape_debug(), described(&field.ty, level + 1));
+            let field = |field: &Field| format!("{}: {}", shown(&field.name), described(&field.ty, level + 1));
             format!("{{{}}}", joined(fields, ", ", field))
         }
     }

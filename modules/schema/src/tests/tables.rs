@@ -211,3 +211,15 @@ fn types_and_values_read_well() {
     let paths: Vec<_> = plotted.iter().map(|(path, _)| path.as_str()).collect();
     assert_eq!(paths, ["pose.x_m", "pose.y_m", "ranges_m[0]", "ranges_m[1]", "mode.Go.speed_m_s"]);
 }
+
+/// Nobody writes such types, and whoever describes itself so is shown all the same.
+#[test]
+fn what_has_no_name_or_no_value_is_shown() {
+    for (bytes, expected) in [
+        (&[1, 23, 0, 0, 0][..], "(no value)"),
+        (&[1, 23, 0, 0, 1, 0, 0, 0], "\"\""),
+        (&[1, 22, 0, 0, 3, 1, 0, 0, 1], "{\"\": bool}"),
+    ] {
+        assert_eq!(Type::from_bytes(bytes).map(|ty| describe_type(&ty)), Ok(expected.into()));
+    }
+}
